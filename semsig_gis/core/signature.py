@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
@@ -93,8 +94,13 @@ def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray
     return wrap_degrees(angles)
 
 
-@dataclass(frozen=True, eq=False)
-class Signature:
+def _listed(numbers: NDArray[Any] | None) -> str:
+    """Return numbers as text."""
+    return "unknown" if numbers is None else " ".join(f"{number:g}" for number in numbers.tolist())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Signature(Displayed):
     """One signature: of a cell, or a query.
 
     Parameters
@@ -144,6 +150,13 @@ class Signature:
                 "give one bearing for each type, or leave one of the two out."
             )
             raise InputError(msg)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": len(self),
+            "codes": _listed(self.codes),
+            "bearings": _listed(self.bearings),
+        }
 
     def __len__(self) -> int:  # noqa: D105
         part = self.codes if self.codes is not None else self.bearings

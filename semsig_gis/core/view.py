@@ -156,7 +156,7 @@ FULL_VIEW: Photo = Photo()
 """The full turn."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class View(Signature):
     """What was seen from one place: a signature of which more may be known.
 
@@ -206,6 +206,11 @@ class View(Signature):
                 kind = np.int64 if name == "photo" else np.float64
                 object.__setattr__(self, name, np.asarray(value, dtype=kind))
         self._check()
+
+    def _facts(self) -> dict[str, object]:
+        seen = ", ".join(f"{photo.width:g}°" for photo in self.photos)
+        told = [name for name in ("ranges", "scores") if getattr(self, name) is not None]
+        return {**super()._facts(), "seen": seen, "told": ", ".join(told) or "no more"}
 
     def _check(self) -> None:
         """Refuse parts that do not fit each other, or numbers out of range."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import shutil
@@ -155,6 +156,25 @@ def test_exported_functions_say_what_they_take_and_give(name: str) -> None:
 def test_no_public_name_is_also_a_module() -> None:
     # Importing such a module would put it in the place of the name.
     assert {path.stem for path in PACKAGE.iterdir()} & {*dir(semsig_gis)} == set()
+
+
+def test_only_what_draws_itself_asks_for_public_names() -> None:
+    """A result hands itself to pictures and maps, which import it, and to nothing else."""
+    public = set(dir(semsig_gis))
+    for path in PACKAGE.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        drawn = {
+            id(node)
+            for function in ast.walk(tree)
+            if isinstance(function, ast.FunctionDef) and function.name in {"plot", "explore"}
+            for node in ast.walk(function)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and node.attr in public:
+                by_name = isinstance(node.value, ast.Name) and node.value.id == "semsig_gis"
+                assert not by_name or id(node) in drawn, path
+            if isinstance(node, ast.ImportFrom) and node.module == "semsig_gis":
+                assert not public & {one.name for one in node.names}, path
 
 
 def test_no_test_reaches_the_network() -> None:

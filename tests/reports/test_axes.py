@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +15,6 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from sentences import refused
 from worlds import random_town
 
-import semsig_gis
 from semsig_gis import build_index, evaluate, identify, localize, locate, named_noise
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 from semsig_gis.core.signs import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
@@ -223,25 +220,3 @@ def test_results_are_shown_on_maps() -> None:
     ):
         assert isinstance(frame, MapFrame)
         assert title in frame.page
-
-
-PACKAGE = Path(semsig_gis.__file__).parent
-
-
-def test_only_what_draws_itself_asks_for_public_names() -> None:
-    """A result hands itself to pictures and maps, which import it, and to nothing else."""
-    public = set(dir(semsig_gis))
-    for path in PACKAGE.rglob("*.py"):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        drawn = {
-            id(node)
-            for function in ast.walk(tree)
-            if isinstance(function, ast.FunctionDef) and function.name in {"plot", "explore"}
-            for node in ast.walk(function)
-        }
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Attribute) and node.attr in public:
-                by_name = isinstance(node.value, ast.Name) and node.value.id == "semsig_gis"
-                assert not by_name or id(node) in drawn, path
-            if isinstance(node, ast.ImportFrom) and node.module == "semsig_gis":
-                assert not public & {one.name for one in node.names}, path

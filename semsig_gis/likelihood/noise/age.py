@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.likelihood.noise.fit import LEAST, MOST, drawn_rates
 from semsig_gis.objects.changes import ClassChange
@@ -30,8 +31,8 @@ NEAR_MOVE = 5.0  # metres; an object that moved farther has gone here and come t
 MEDIAN = math.sqrt(2.0 * math.log(2.0))  # of a distance, in deviations each way
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drift:
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class Drift(Displayed):
     """What changed in the street objects of a city in some years.
 
     Parameters
@@ -79,6 +80,13 @@ class Drift:
         if not sum(item.before for item in self.classes):
             msg = "the drift has no objects before; give a report of a city with some."
             raise InputError(msg)
+
+    def _facts(self) -> dict[str, object]:
+        counts = {
+            name: sum(getattr(item, name) for item in self.classes)
+            for name in ("before", "added", "removed", "moved")
+        }
+        return {"years": f"{self.years:g}", "classes": len(self.classes), **counts}
 
 
 @functools.cache
