@@ -7,7 +7,8 @@ can be plotted into the same axes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, cast, get_args
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap
@@ -27,6 +28,7 @@ from semsig_gis.core.signs import (
     SHADES,
     WHITE,
     class_signs,
+    group_labels,
 )
 from semsig_gis.evaluation.result import PlotKind
 from semsig_gis.likelihood.locate import Location
@@ -36,7 +38,7 @@ from semsig_gis.reports.scenes import MARKERS
 from semsig_gis.reports.shares import curve_of, plot_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from numpy.typing import ArrayLike, NDArray
 
+    from semsig_gis.core.signs import Mark
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.identify.result import Identifiability
@@ -56,22 +59,25 @@ MOST_PIXELS = 4000  # of an image along a side
 KILOMETRE = 1000
 LONGEST_LABEL = 40
 
-# Columns of the cells, as files call them: what they are, their colours on all maps, the numbers.
-COLUMNS: Mapping[
-    str, tuple[str, Mapping[int, str], Callable[[SignatureDatabase], NDArray[np.int64]]]
-] = {
-    "length": ("objects seen", SHADES, lambda database: database.lengths),
-    "type_group_size": (
-        "cells with the same types",
-        GROUP_COLOURS,
-        lambda database: database.type_group_sizes,
-    ),
-    "angle_group_size": (
-        "cells with the same angle levels",
-        GROUP_COLOURS,
-        lambda database: database.angle_group_sizes,
-    ),
+
+class Steps(NamedTuple):
+    """What numbers of cells are, and the name and colour of each range by where it begins."""
+
+    title: str
+    colours: Mapping[int, str] | Mapping[float, str]
+    labels: Sequence[str]
+
+
+_SHADES = [*(f"{low} to {high - 1}" for low, high in pairwise(SHADES)), f"{max(SHADES)} or more"]
+# Columns of the cells, as files call them.
+COLUMNS: Mapping[str, Steps] = {
+    "length": Steps("objects seen", SHADES, _SHADES),
+    "type_group_size": Steps("cells with the same types", GROUP_COLOURS, group_labels()),
+    "angle_group_size": Steps("cells with the same angle levels", GROUP_COLOURS, group_labels()),
 }
+CHANCE_STEPS = Steps(
+    "chance of a cell", CELL_CHANCES, [f"{100 * chance:g} % or more" for chance in CELL_CHANCES]
+)
 COLOUR_OPTIONS = {"cmap", "norm", "vmin", "vmax"}
 
 
@@ -126,10 +132,10 @@ def plot_database(
                 f"each cell{nearest_name(name, COLUMNS)}."
             )
             raise UnknownNameError(msg)
-        title, colours, numbers = COLUMNS[name]
-        values = numbers(database).astype(np.float64)
+        title, values = COLUMNS[name].title, _column(database, name)
         if not COLOUR_OPTIONS & look.keys():
-            axes = _draw_steps(database, values, colours, title=title, ax=ax, legend=legend, **look)
+            axes = map_axes(ax)
+            _draw_steps(axes, database, values, COLUMNS[name], legend=legend, **look)
             axes.set_title(f"{len(database):,} cells, by {title}")
             _frame(axes)
             return axes
@@ -144,6 +150,16 @@ def plot_database(
         _add_bar(axes, image, title)
     _frame(axes)
     return axes
+
+
+def _column(database: SignatureDatabase, name: str) -> NDArray[np.float64]:
+    """Return a column of the cells."""
+    if name == "length":
+        values = database.lengths
+    else:
+        by_type = name == "type_group_size"
+        values = database.type_group_sizes if by_type else database.angle_group_sizes
+    return values.astype(np.float64)
 
 
 def plot_identifiability(
@@ -278,11 +294,11 @@ def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) 
         linewidths=0.5,
         zorder=3,
     )
-    axes.plot(columns["x"][:1], columns["y"][:1], **_place_look(ANSWERS["given"].colour))
+    axes.plot(columns["x"][:1], columns["y"][:1], **_place_look(ANSWERS["given"]))
     axes.set_title(f"The best {len(ranks):,} of {answer.cells:,} cells")
     _frame(axes)
     if legend:
-        _add_bar(axes, shown, "place in the list")
+        _add_bar(axes, shown, "rank")
     return axes
 
 
@@ -378,20 +394,21 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     database, place = location.posterior.database, location.estimate
     _draw_cells(axes := map_axes(ax), database, np.ones(len(database)), cmap=_paint(GROUND))
     chances = np.where(location.chances >= min(CELL_CHANCES), location.chances, np.nan)
-    title = "chance of a cell"
-    _draw_steps(database, chances, CELL_CHANCES, title=title, ax=axes, legend=legend)
+    _draw_steps(axes, database, chances, CHANCE_STEPS, legend=legend)
     # So that single cells are seen from afar; the likeliest last, so that they lie on top.
     seen = location.region[~np.isnan(chances[location.region])][::-1]
     levels = np.digitize(chances[seen], [*CELL_CHANCES]) - 1
     colours = np.array([*CELL_CHANCES.values()])[levels]
     x, y = database.xy[seen].T
     axes.scatter(x, y, c=colours, s=DOT, linewidths=0, marker="s", zorder=2)
-    colour = ANSWERS["given" if location.answer.given else "withheld"].colour
+    mark = ANSWERS["given" if location.answer.given else "withheld"]
     longer, shorter, bearing = place.ellipse()
     # An ellipse of matplotlib is turned against the clock from the east.
     size: dict[str, Any] = {"width": 2 * shorter, "height": 2 * longer, "angle": -bearing}
-    axes.add_patch(Ellipse((place.x, place.y), **size, fill=False, edgecolor=colour, linewidth=1.5))
-    axes.plot(place.x, place.y, **_place_look(colour))
+    axes.add_patch(
+        Ellipse((place.x, place.y), **size, fill=False, edgecolor=mark.colour, linewidth=1.5)
+    )
+    axes.plot(place.x, place.y, **_place_look(mark))
     region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
     low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -405,9 +422,10 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
 GROUND = "#ececea"
 
 
-def _place_look(colour: str) -> dict[str, Any]:
-    ring = {"markerfacecolor": "none", "markeredgecolor": colour, "markeredgewidth": 2.5}
-    return {"linestyle": "", "marker": "o", "markersize": 16, "zorder": 4, **ring}
+def _place_look(mark: Mark) -> dict[str, Any]:
+    marker, share = MARKERS[mark.shape]
+    edge = {"markeredgecolor": mark.colour, "markeredgewidth": 2.5, "markerfacecolor": "none"}
+    return {"linestyle": "", "marker": marker, "markersize": 16 * share, "zorder": 4, **edge}
 
 
 def _paint(colour: str) -> ListedColormap:
@@ -415,43 +433,29 @@ def _paint(colour: str) -> ListedColormap:
 
 
 def _draw_steps(
+    axes: Axes,
     database: SignatureDatabase,
     values: NDArray[np.float64],
-    colours: Mapping[int, str] | Mapping[float, str],
+    steps: Steps,
     *,
-    title: str,
-    ax: Axes | None,
     legend: bool,
     **look: Any,  # noqa: ANN401 - whatever matplotlib takes
-) -> Axes:
-    """Draw numbers in the colours of their ranges, which are given by where each begins."""
-    axes, starts = map_axes(ax), list(colours)
-    levels = np.where(np.isnan(values), np.nan, np.digitize(values, starts) - 1.0)
-    scale = {"cmap": ListedColormap([*colours.values()]), "vmin": -0.5, "vmax": len(starts) - 0.5}
+) -> None:
+    """Draw numbers in the colours of their ranges."""
+    levels = np.where(np.isnan(values), np.nan, np.digitize(values, [*steps.colours]) - 1.0)
+    ends = {"vmin": -0.5, "vmax": len(steps.colours) - 0.5}
+    scale = {"cmap": ListedColormap([*steps.colours.values()]), **ends}
     image = _draw_cells(axes, database, levels, **scale, **look)
     if legend:
-        bar = _add_bar(axes, image, title)
-        bar.set_ticks(range(len(starts)), labels=_range_labels(starts))
+        bar = _add_bar(axes, image, steps.title)
+        bar.set_ticks(range(len(steps.labels)), labels=steps.labels)
         bar.ax.tick_params(length=0)
-    return axes
 
 
 def _add_bar(axes: Axes, shown: ScalarMappable, title: str) -> Colorbar:
     """Tell beside axes what colours mean."""
     figure = cast("Figure", axes.figure)
     return figure.colorbar(shown, ax=axes, shrink=0.7, label=plain(title))
-
-
-def _range_labels(starts: Sequence[float]) -> list[str]:
-    """Return what each range of whole numbers, or of chances, is called."""
-    if starts[0] < 1:
-        return [f"{start:.3%}".rstrip("0%").rstrip(".") + " % or more" for start in starts]
-    ends = [int(start) - 1 for start in starts[1:]]
-    names = [
-        f"{low:,}" if low == high else f"{low:,} to {high:,}"
-        for low, high in zip(starts, ends, strict=False)
-    ]
-    return [*names, f"{starts[-1]:,} or more"]
 
 
 def _draw_cells(
