@@ -126,6 +126,20 @@ const clickAt = (marker, side) => {
   marker.fire("click");
 };
 
+// Where the objects of a wheel are drawn, from its middle.
+const signPlaces = (wheel) =>
+  [...wheel.querySelectorAll(".object > g")].map((sign) => {
+    const { e, f } = sign.transform.baseVal.consolidate().matrix;
+    return [e, f];
+  });
+
+// The objects on the map that are lit, by place.
+const litPlaces = () =>
+  shown((layer) => layer.getElement?.()?.matches?.(".semsig-object.lit")).map((layer) => {
+    const { lat, lng } = layer.getLatLng();
+    return [lat, lng];
+  });
+
 // How many offers of the search are covered by something else.
 const covered = () =>
   [...document.querySelectorAll("[role=option]")].filter((one) => {

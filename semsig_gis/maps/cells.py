@@ -10,6 +10,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.signature import BEARING_UNITS
 from semsig_gis.core.signs import (
     FOUND_RAMP,
     GROUP_COLOURS,
@@ -17,20 +18,20 @@ from semsig_gis.core.signs import (
     SAME_TYPES,
     group_labels,
 )
-from semsig_gis.maps.image import level_image, packed, place_lattices, steps
+from semsig_gis.maps.image import QUANTUM_M, level_image, packed, place_lattices, steps
 from semsig_gis.maps.parts import (
     LIFTING,
     NAMED_CLASSES,
     PAGE_FILES,
     Drawing,
     cell_image,
-    class_titles,
     colour_cells,
     corners_of,
     finished_map,
     free_name,
     isolated,
     layers_of,
+    panel_signs,
     prepared_map,
     ramp_bar,
     sources,
@@ -56,8 +57,9 @@ class CellFacts:
 
     The file ``NAME.js`` defines the function ``semsig.cellFacts.NAME(city, cell)``. It returns what
     there is of ``title``; ``rows``: label and value each; ``jumps``: a label and buttons, each with
-    a text, a cell and a hint; ``marks``: cells to number and to join by lines; ``dots``: cells and
-    colours. ``arrays`` are packed numbers of the cells; ``settings`` are in ``city.grid``.
+    a text, a cell and a hint; ``alike``: cells to compare with, the likeliest first, and why;
+    ``kind``: of that comparison; ``dots``: cells and colours. ``arrays`` are packed numbers of the
+    cells; ``settings`` are in ``city.grid``.
     """
 
     name: str
@@ -76,7 +78,7 @@ class Cells(Drawing):
             arrays |= part.arrays
             grid |= part.settings
         parts = [part.name for part in facts]
-        super().__init__(name, "cells", arrays, grid, class_titles(database), parts, group="ground")
+        super().__init__(name, "cells", arrays, grid, panel_signs(database), parts, group="ground")
         self.files = (*PAGE_FILES, "cells.css", "cells.js", *(f"{part}.js" for part in parts))
         self.database, self.facts = database, facts
 
@@ -105,12 +107,36 @@ def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
 def packed_signatures(
     name: str, database: SignatureDatabase, ends: NDArray[np.int64]
 ) -> dict[str, list[str]]:
-    """Return signatures, with angle levels for bearings, and where those of each cell end."""
+    """Return signatures, with angle levels for bearings, and where those of each cell end.
+
+    Beside them the objects that the cells see, by which the script tells where each one stands.
+    """
+    places, codes = _objects_seen(database)
     return {
         f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
         f"{name}.ends": steps(ends.astype(np.int32)),
         f"{name}.levels": packed(database.levels),
+        f"{name}.x": steps(places[:, 0]),
+        f"{name}.y": steps(places[:, 1]),
+        f"{name}.classes": packed(database.taxonomy.symbol_bytes[codes]),
     }
+
+
+def _objects_seen(database: SignatureDatabase) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return places, in steps of `QUANTUM_M` from the origin, and class codes of objects seen.
+
+    They come from bearings and distances, so that a few objects are there twice, half a metre off.
+    """
+    near = np.argsort(database.distance_units, kind="stable")
+    angles = np.radians(database.bearings[near] + 0.5 * FULL_TURN / BEARING_UNITS)
+    viewpoints = np.repeat(database.xy, database.lengths, axis=0)[near]
+    away = database.distances[near, None] * np.stack([np.sin(angles), np.cos(angles)], axis=1)
+    xy, codes = viewpoints + away - np.array(database.grid.origin), database.codes[near]
+    # Seen from near they are known best, and come first.
+    low = xy.min(axis=0, initial=np.inf)
+    columns, rows = (np.rint(part).astype(np.int64) for part in (xy - low).T)
+    _, first = np.unique((columns << 32 | rows) << 8 | codes, return_index=True)
+    return np.rint(xy[first] / QUANTUM_M).astype(np.int32), codes[first]
 
 
 def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str, Any]]:
@@ -126,6 +152,9 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str,
         "levels": database.spec.levels,
         "step": database.grid.step,
         "beside": BESIDE_M,
+        "sight": database.spec.radius,
+        "reach": database.reach,
+        "quantum": QUANTUM_M,
         "origin": list(database.grid.origin),
         "firstColumn": int(database.columns[0]),
         "mercatorBox": lattices.mercator_box,

@@ -20,14 +20,14 @@ from semsig_gis.maps.parts import (
     add_city,
     cell_signature,
     class_bar,
-    class_titles,
     colour_cells,
     corners_of,
     draw,
     finished_map,
     isolated,
     mark_svg,
-    popup_signature,
+    panel_signature,
+    panel_signs,
     prepared_map,
     query_signature,
     ranks_text,
@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 
 QUERY_FIELDS = (
     *(
-        "True cell sees",
         "Query",
+        "True cell sees",
         "Expected error",
         f"P(error ≤ {Evaluation.success_metres} m)",
         "True rank",
@@ -137,7 +137,7 @@ def evaluation_map(
     for outcome, some in sorted(outcomes.items(), key=lambda one: -one[1].sum()):
         name = f"{outcome.capitalize()} queries ({int(some.sum()):,})"
         points = list(itertools.compress(records, some))
-        look = (QUERY_FIELDS, class_titles(database), points, OUTLINES[OUTCOMES[outcome].shape])
+        look = (QUERY_FIELDS, panel_signs(database), points, OUTLINES[OUTCOMES[outcome].shape])
         draw(page, name, "points", *look, group="queries")
     legend = evaluation_legend(evaluation, radius=field.radius, licenses=database.licenses)
     view = corners_of(database) if map_ is None else None
@@ -157,19 +157,27 @@ def _query_records(
     best_ids = queries["best_cell_id"].fillna(0).to_numpy(np.int64)
     best_rows = np.searchsorted(database.cell_ids, best_ids).tolist()
     next_places, next_errors = _next_cells(evaluation, database)
+    cell_places = to_latlon(database.xy, database.crs).tolist()
+    radius_m = database.spec.radius
     bearings, successful = evaluation.query_bearings, evaluation.successful.tolist()
     records = []
     for number, query in enumerate(queries.itertuples(index=False)):
         located = query.tied > 0
         view = _view(query, database) if query.query_ranges or query.query_sectors else None
-        plain = popup_signature(query.query_types, bearings[number])
-        radius_m = database.spec.radius
-        asked = plain if view is None else query_signature(view, database.taxonomy, radius=radius_m)
+        look = {"place": places[number].tolist(), "turn": query.heading}
+        asked = (
+            panel_signature(
+                query.query_types, bearings[number], kind="query", reach=radius_m, **look
+            )
+            if view is None
+            else query_signature(view, database.taxonomy, radius=radius_m, **look)
+        )
+        true_row, best_row = rows[number], best_rows[number]
         details = [
-            cell_signature(database, rows[number], view, query.heading)
-            if rows[number] >= 0
-            else "no such cell",
             asked if query.query_length else "nothing left of it",
+            cell_signature(database, true_row, view, query.heading, place=cell_places[true_row])
+            if true_row >= 0
+            else "no such cell",
             _metres(query.error_m),
             f"{getattr(query, f'p{Evaluation.success_metres}'):.2f}",
             f"{ranks_text(query.rank_low, query.rank_high)} of {len(database):,}",
@@ -178,7 +186,7 @@ def _query_records(
             if located
             else "none",
             ", ".join(f"{_metres(error)} off" for error in next_errors[number]) or None,
-            cell_signature(database, best_rows[number]) if located else None,
+            cell_signature(database, best_row, place=cell_places[best_row]) if located else None,
         ]
         outcome = "successful" if successful[number] else "failed"
         best = [best_places[number].tolist(), *next_places[number]] if located else None

@@ -26,12 +26,12 @@ from semsig_gis.maps.parts import (
     add_city,
     cell_image,
     cell_signature,
-    class_titles,
     colour_cells,
     draw,
     finished_map,
     isolated,
     mark_svg,
+    panel_signs,
     prepared_map,
     query_signature,
     query_text,
@@ -127,7 +127,7 @@ def location_map(
     candidates = drawings.candidates()
     name = f"Candidates ({len(candidates):,})"
     # The best last, so that they lie on top.
-    titles = class_titles(database)
+    titles = panel_signs(database)
     draw(page, name, "points", CANDIDATE_FIELDS, titles, candidates[::-1], group="answer")
     draw(page, "Best place", "drawings", drawings.place(), group="answer")
     legend, view = location_legend(location), drawings.view() if map_ is None else None
@@ -222,14 +222,14 @@ class _Drawings:
         """Return the candidates, likeliest first."""
         rows = self.location.candidates
         query = self.location.grid_query
-        asked = query_signature(query, self.database.taxonomy, radius=self.database.spec.radius)
+        taxonomy, radius = self.database.taxonomy, self.database.spec.radius
         records = []
         places = self.latlon(rows[["x", "y"]].to_numpy())
         for place, row in zip(places, rows.to_dict("records"), strict=True):
             turn = row.get("heading") or 0.0
             details = [
-                asked,
-                cell_signature(self.database, row["cell"], query, turn),
+                query_signature(query, taxonomy, radius=radius, place=place, turn=turn),
+                cell_signature(self.database, row["cell"], query, turn, place=place),
                 f"{row['chance']:.2%}",
                 f"{row['loglik']:.2f}",
                 _north(row.get("heading")),
@@ -399,7 +399,7 @@ def localization_map(
     add_city(page, database)
     name = f"Candidates ({len(records):,})"
     # The best last, so that they lie on top.
-    titles = class_titles(database)
+    titles = panel_signs(database)
     draw(page, name, "points", RANK_FIELDS, titles, records[::-1], group="answer")
     legend = localization_legend(localization)
     return finished_map(page, database, legend=legend, view=places if map_ is None else None)
@@ -415,14 +415,14 @@ def _candidate_records(
     spread = np.ptp(distances) or 1.0
     colours = mixed((distances - distances.min()) / spread, CANDIDATE_RAMP)
     query = localization.grid_query
-    asked = query_signature(query, database.taxonomy, radius=database.spec.radius)
+    taxonomy, radius_m = database.taxonomy, database.spec.radius
     records = []
     for number, candidate in enumerate(candidates.to_dict("records")):
         rank = ranks_text(candidate["rank_low"], candidate["rank_high"])
         place = places[number].tolist()
         details = [
-            asked,
-            cell_signature(database, int(rows[number]), query),
+            query_signature(query, taxonomy, radius=radius_m, place=place),
+            cell_signature(database, int(rows[number]), query, place=place),
             f"{rank} of {len(database):,}{ties_text(candidate['tied'])}",
             f"{candidate['distance']:.4f}",
             str(candidate["cell_id"]),

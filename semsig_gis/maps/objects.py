@@ -13,7 +13,6 @@ from semsig_gis.core.geometry import COUNT, MERGED, SOURCE, SOURCE_ID
 from semsig_gis.core.signs import class_signs
 from semsig_gis.maps.image import mercator, packed, steps
 from semsig_gis.maps.parts import (
-    OUTLINES,
     Call,
     add_city,
     corners_of,
@@ -22,6 +21,7 @@ from semsig_gis.maps.parts import (
     isolated,
     layers_of,
     prepared_map,
+    sign_look,
     sign_svg,
     sources,
     to_latlon,
@@ -234,12 +234,8 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
     ends = np.cumsum(list(counts.values())).tolist()
     classes = [
         {
-            "title": signs[code].title,
+            **sign_look(signs[code]),
             "symbol": signs[code].symbol,
-            "colour": signs[code].colour,
-            "ink": signs[code].ink,
-            "outline": OUTLINES[signs[code].shape],
-            "drop": signs[code].drop,
             "start": end - count,
             "end": end,
         }

@@ -22,7 +22,7 @@ from pyproj import Transformer
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, across_180
-from semsig_gis.core.signs import SHADES
+from semsig_gis.core.signs import SHADES, VERDICTS, class_signs
 from semsig_gis.core.view import View
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.maps.image import city_image, script_json
@@ -45,8 +45,8 @@ MAX_ZOOM = 20
 CLOSE_ZOOM = 17  # the closest that a new map shows by itself
 # Files of the folder ``js`` that every page has, in this order.
 PAGE_FILES = (
-    *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "search.js", "controls.js"),
-    *("arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
+    *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "wheels.js", "search.js"),
+    *("controls.js", "arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
 )
 WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
@@ -276,47 +276,85 @@ def corners_of(source: SignatureDatabase | StreetObjects) -> NDArray[np.float64]
     return to_latlon(np.stack([source.xy.min(axis=0), source.xy.max(axis=0)]), source.crs)
 
 
-def class_titles(database: SignatureDatabase) -> dict[str, str]:
-    """Return the title of each class by its symbol."""
-    return {item.symbol: item.title for item in database.taxonomy.classes}
+def panel_signs(database: SignatureDatabase) -> dict[str, Any]:
+    """Return the looks of the classes by symbol, and of what became of objects, for the script."""
+    classes = class_signs(database.taxonomy).values()
+    return {
+        "classes": {sign.symbol: sign_look(sign) for sign in classes},
+        "verdicts": {
+            verdict: {"outline": OUTLINES[shape], "colour": VERDICTS[verdict]}
+            for verdict, shape in VERDICT_SHAPES.items()
+        },
+    }
 
 
-def popup_signature(types: str | None, bearings: ArrayLike | None, **look: Any) -> list[Any]:  # noqa: ANN401
-    """Return a signature for the popup: symbols, whole degrees and, if anything, its look."""
+def sign_look(sign: ClassSign) -> dict[str, Any]:
+    """Return the look of a class, for the script."""
+    return {
+        "title": sign.title,
+        "colour": sign.colour,
+        "ink": sign.ink,
+        "outline": OUTLINES[sign.shape],
+        "drop": sign.drop,
+    }
+
+
+def panel_signature(types: str | None, bearings: ArrayLike | None, **look: Any) -> list[Any]:  # noqa: ANN401
+    """Return a signature for the panel: symbols, whole degrees and, if anything, its look."""
     if bearings is None:
         return [types, None]
     degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
     return [types, degrees.tolist(), look] if look else [types, degrees.tolist()]
 
 
-def query_signature(query: Signature, taxonomy: Taxonomy, *, radius: float) -> list[Any]:
-    """Return a query for the popup; `radius` is the visibility range in metres."""
+def query_signature(
+    query: Signature,
+    taxonomy: Taxonomy,
+    *,
+    radius: float,
+    **look: Any,  # noqa: ANN401
+) -> list[Any]:
+    """Return a query for the panel; `radius` is the visibility range in metres.
+
+    ``place`` is where it is drawn, turned by ``turn`` degrees.
+    """
     types = None if query.codes is None else taxonomy.decode(query.codes)
-    look: dict[str, Any] = {}
+    look |= {"kind": "query", "reach": radius}
     if isinstance(query, View):
         if query.ranges is not None:
-            look |= {"reach": radius, "metres": _whole_metres(query.ranges)}
+            look["metres"] = _whole_metres(query.ranges)
         if all(photo.sectors for photo in query.photos):
             look |= {"sectors": _sectors(query.photos), "outside": query.outside().tolist()}
-    return popup_signature(types, query.bearings, **look)
+    return panel_signature(types, query.bearings, **look)
 
 
 def cell_signature(
-    database: SignatureDatabase, cell: int, query: Signature | None = None, turn: float = 0.0
+    database: SignatureDatabase,
+    cell: int,
+    query: Signature | None = None,
+    turn: float = 0.0,
+    *,
+    place: Sequence[float] | None = None,
 ) -> list[Any]:
-    """Return what a cell sees for the popup, in the look of a query that is turned by degrees."""
-    bearings, look = database.signature(cell).bearings, dict[str, Any]()
-    if isinstance(query, View) and bearings is not None:
-        if query.ranges is not None:
-            metres = _whole_metres(database.select(slice(cell, cell + 1)).distances)
-            look |= {"reach": database.spec.radius, "metres": metres}
+    """Return what a cell sees for the panel, in the look of a query that is turned by degrees.
+
+    ``place`` is the latitude and longitude of the cell.
+    """
+    seen = database.select(slice(cell, cell + 1))
+    bearings = seen.bearings
+    look: dict[str, Any] = {
+        "reach": database.spec.radius,
+        "metres": _whole_metres(seen.distances),
+        **({} if place is None else {"place": list(place)}),
+    }
+    if isinstance(query, View):
         photos = [photo.turned(turn) for photo in query.photos]
         # Photos that are turned each by itself have no look in common.
         together = len(photos) == 1 or not any(photo.north_sigma for photo in photos)
         if together and all(photo.sectors for photo in photos):
-            seen = np.any([photo.sees(bearings) for photo in photos], axis=0)
-            look |= {"sectors": _sectors(photos), "outside": np.flatnonzero(~seen).tolist()}
-    return popup_signature(database.types(cell), bearings, **look)
+            sees = np.any([photo.sees(bearings) for photo in photos], axis=0)
+            look |= {"sectors": _sectors(photos), "outside": np.flatnonzero(~sees).tolist()}
+    return panel_signature(database.types(cell), bearings, **look)
 
 
 def _whole_metres(ranges: NDArray[np.float64]) -> list[int | None]:
@@ -414,6 +452,15 @@ OUTLINES = {
     "hexagon": "M0,-1.15L1,-.575V.575L0,1.15L-1,.575V-.575Z",
     "triangle_down": "M0,1.2L1.2,-1.2H-1.2Z",
     "cross": "M-.6,-1.1H.6V-.6H1.1V.6H.6V1.1H-.6V.6H-1.1V-.6H-.6Z",
+}
+
+
+# What stands around the sign of an object, by what became of it.
+VERDICT_SHAPES = {
+    "matched": "circle",
+    "misnamed": "diamond",
+    "missed": "circle",  # in dashes
+    "false": "square",
 }
 
 

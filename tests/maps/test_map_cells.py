@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import time
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.parts import layers_of
+from semsig_gis.maps.parts import layers_of, to_latlon
 from semsig_gis.objects.changes import compare_objects
 
 if TYPE_CHECKING:
@@ -72,9 +73,6 @@ def test_buttons_go_through_the_group_and_to_its_ends(page: MapPage) -> None:
     alike = ALIKE
     assert len(alike) > 4
     said = page.click(CITY, alike[0])
-    bearings = CITY.levels[CITY.offsets[alike[0]] : CITY.offsets[alike[0] + 1]]
-    for level in bearings.tolist():
-        assert f"{int((level + 0.5) * 22.5)}°" in said["text"]
     seen = [alike[0]]
     for _ in range(3):
         said = page.press("next")
@@ -87,10 +85,52 @@ def test_buttons_go_through_the_group_and_to_its_ends(page: MapPage) -> None:
     assert [int(page.press(where)["Cell"]) for where in ("previous", "next")] == [ids[-1], ids[0]]
     page.click(CITY, alike[-1])
     away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[-1]]).T)
-    nearest = ids.index(int(page.press(f"{np.sort(away)[1]:.0f} m")["Cell"]))
-    assert away[nearest] == pytest.approx(np.sort(away)[1])
-    away = np.hypot(*(CITY.xy[alike] - CITY.xy[alike[nearest]]).T)
-    assert away[ids.index(int(page.press("farthest")["Cell"]))] == pytest.approx(away.max())
+    farthest = next(at for at, line in enumerate(choices(page)) if "the farthest" in line)
+    same = group(alike[-1], angles="angle levels" in choices(page)[farthest])
+    page.all(".semsig-go")[farthest].click()
+    cell = int(np.searchsorted(CITY.cell_ids, int(page.told()["Cell"])))
+    assert cell in same
+    away = np.hypot(*(CITY.xy[same] - CITY.xy[alike[-1]]).T)
+    assert away[same.index(cell)] == pytest.approx(away.max())
+
+
+def choices(page: MapPage) -> list[str]:
+    """Return the cells that the panel offers to compare with."""
+    return [one.text for one in page.all(".semsig-choices li > button:first-child")]
+
+
+def test_three_lookalikes_are_told_of_with_their_places(page: MapPage) -> None:
+    page.open(ambiguity_map(CITY))
+    for cell in (LARGEST, *np.flatnonzero(CITY.type_group_sizes == 1)[:3].tolist()):
+        page.click(CITY, cell)
+        told = choices(page)
+        assert len(told) == len(page.all(".semsig-number")) == 3
+        for line in told:
+            latlon = [float(one) for one in line.split("; ")[-1].split(", ")]
+            away = np.hypot(*(to_latlon(CITY.xy, CITY.crs) - latlon).T)
+            other = int(away.argmin())
+            assert away[other] < 2e-5
+            metres = np.hypot(*(CITY.xy[other] - CITY.xy[cell]))
+            assert f"{metres:.0f} m to the " in line
+            count = sum(
+                abs(CITY.types(other).count(one) - CITY.types(cell).count(one))
+                for one in {*CITY.types(other), *CITY.types(cell)}
+            )
+            assert ("more or less" in line) == (count > 0)
+            assert count == 0 or f"{count} object" in line
+
+
+@pytest.mark.parametrize("cell", [LARGEST, int(CITY.lengths.argmax())])
+def test_the_script_finds_what_a_cell_sees_and_where(page: MapPage, cell: int) -> None:
+    page.open(ambiguity_map(CITY))
+    page.click(CITY, cell)
+    part = slice(*CITY.offsets[cell : cell + 2])
+    wheel = page.one(".semsig-wheels svg").get_attribute("aria-label")
+    seen = re.findall(r"(\w) (\d+)° (\d+) m", str(wheel))
+    assert [one[0] for one in seen] == list(CITY.types(cell))
+    off = [float(one[1]) for one in seen] - CITY.bearings[part]
+    assert np.abs((off + 180.0) % 360.0 - 180.0).max() <= 1.5
+    assert [float(one[2]) for one in seen] == pytest.approx(CITY.distances[part], abs=1.1)
 
 
 def test_a_sign_is_a_jump_away_and_layers_are_switched(page: MapPage) -> None:
@@ -120,10 +160,14 @@ def test_what_is_known_of_queries_is_told_too(page: MapPage) -> None:
     same_cells = dataclasses.replace(TOLD, database=dataclasses.replace(CITY))
     page.open(ambiguity_map(CITY, identifiability=same_cells))
     said = page.click(CITY, LARGEST)
-    assert {"It sees", "Found within 30 m", "Taken for 1", "Cell"} <= set(said)
+    assert {"It sees", "Found within 30 m", "Cell"} <= set(said)
+    taken = [line for line in choices(page) if "taken for it" in line]
+    likely = int((TOLD.lookalike_chances[LARGEST] >= 0.01).sum())
+    assert len(taken) == likely
+    assert taken == choices(page)[:likely]
     assert any(line.startswith("Same types: ") for line in page.jumps())
     numbers = page.all(".semsig-number")
-    assert len(numbers) == int((TOLD.lookalike_chances[LARGEST] >= 0.01).sum())
+    assert len(numbers) == 3
 
 
 def whole_percent(chance: float) -> str:
@@ -145,7 +189,7 @@ def test_a_click_on_any_cell_tells_of_it(page: MapPage) -> None:
         assert said["Cell"] == str(CITY.cell_ids[cell])
         assert said["Found within 30 m"] == whole_percent(TOLD.found[cell])
         assert said["Chance given"].startswith(whole_percent(TOLD.itself[cell]))
-        named = [name for name in said if name.startswith("Taken for")]
+        named = [line for line in choices(page) if "taken for it" in line]
         assert len(named) == int((TOLD.lookalike_chances[cell] >= 0.01).sum())
     said = page.click(CITY, int(TOLD.bits.argmin()))
     assert said["Looks like"] == "about 1 cell (0.0 bits are left)"

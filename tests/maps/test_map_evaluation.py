@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import folium
@@ -154,7 +155,7 @@ def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> 
     following = np.searchsorted(CITY.cell_ids, EVALUATION.next_cell_ids[-1])
     off = np.hypot(*(CITY.xy[following] - [row.geometry.x, row.geometry.y]).T)
     assert ", ".join(f"{metres:,.0f} m off" for metres in off) in text
-    dashed = "return lines((one) => one.options.dashArray).length"
+    dashed = "return lines((one) => one.options.dashArray === '5 5').length"
     assert evaluated.ask(dashed) == 1  # to the best place
     empty = "return shown((one) => one instanceof L.CircleMarker && !one.options.fill).length"
     assert evaluated.ask(empty) == 1 + len(EVALUATION.next_cell_ids[-1])
@@ -166,7 +167,7 @@ def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
     lengths = EVALUATION.queries["query_length"]
     letters = """
     return [...document.querySelectorAll(".semsig-wheels text")].map((one) =>
-      one.getAttribute("font-size") * one.ownerSVGElement.getBoundingClientRect().width / 116);
+      one.getAttribute("font-size") * one.getScreenCTM().a);
     """
     for query in (int(lengths.argmin()), int(lengths.argmax())):
         name = f"Query {query + 1:,}: "
@@ -176,24 +177,44 @@ def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
     wheels = evaluated.all(".semsig-wheels figure")
     row = EVALUATION.queries.iloc[query]
     seen = (
-        ("True cell sees", row["types"], CITY.signature(int(row["cell"])).bearings),
         ("Query", row["query_types"], EVALUATION.query_bearings[query]),
+        ("True cell sees", row["types"], CITY.signature(int(row["cell"])).bearings),
     )
     assert wheels[0].rect["y"] == wheels[1].rect["y"]  # side by side
     for wheel, (label, types, bearings) in zip(wheels, seen, strict=False):
         assert bearings is not None
-        assert wheel.find_element(By.TAG_NAME, "figcaption").get_property("innerText") == label
+        assert wheel.find_element(By.TAG_NAME, "figcaption").text.removesuffix(", to 30 m") == label
         degrees = [f"{symbol} {round(float(one)) % 360}°"
                    for symbol, one in zip(types, bearings, strict=True)]  # fmt: skip
-        told = wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label")
-        assert told == f"{label}, clockwise from north: {', '.join(degrees)}"
-        signs = wheel.find_elements(By.TAG_NAME, "text")
-        assert len(signs) == len(types)
-        for sign, one in zip(signs, bearings, strict=True):
-            x, y = (float(str(sign.get_attribute(part))) for part in "xy")
+        told = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
+        assert re.sub(r" \d+ m", "", told) == f"{label}, clockwise from north: {', '.join(degrees)}"
+        places = evaluated.ask("return signPlaces(arguments[0])", wheel)
+        for (x, y), one in zip(places, bearings, strict=True):
             turn = (np.degrees(np.arctan2(x, -y)) - one + 180.0) % 360.0 - 180.0
             assert abs(turn) <= 0.51  # north up, clockwise, whole degrees
             assert np.hypot(x, y) < 54.0
+    # Every object of both has one verdict, and the key counts them.
+    counts = [
+        Counter(
+            str(one.get_attribute("class")).split()[1]
+            for one in wheel.find_elements(By.CSS_SELECTOR, ".object")
+        )
+        for wheel in wheels
+    ]
+    asked, cell = counts
+    assert (
+        asked["matched"] == cell["matched"] <= (Counter(seen[0][1]) & Counter(seen[1][1])).total()
+    )
+    assert asked["misnamed"] == cell["misnamed"]
+    assert (asked["missed"], cell["false"]) == (0, 0)
+    words = {"matched": "matched", "misnamed": "of another class"}
+    key = [one.text for one in evaluated.all(".semsig-key span")]
+    both = asked | {"missed": cell["missed"]}
+    told_of = {**words, "missed": "missed", "false": "extra"}
+    assert key == [f"{both[one]} {word}" for one, word in told_of.items() if both[one]]
+    # Beside it, what the best cell sees.
+    evaluated.all(".semsig-choices button")[1].click()
+    assert evaluated.all("figcaption")[1].text.startswith("Best cell sees")
 
 
 def test_wheels_show_what_queries_looked_at(page: MapPage) -> None:
@@ -201,11 +222,11 @@ def test_wheels_show_what_queries_looked_at(page: MapPage) -> None:
     longest = int(seen.queries["query_length"].argmax())
     page.open(evaluation_map(seen, CITY))
     page.search(f"Query {longest + 1:,}: ", Keys.ENTER)
-    cell, asked, _ = page.all(".semsig-wheels figure")
+    asked, cell = page.all(".semsig-wheels figure")
     pale = []
     for wheel in (cell, asked):
         assert len(wheel.find_elements(By.CSS_SELECTOR, "path.looked")) == 1
-        pale.append(len(wheel.find_elements(By.CSS_SELECTOR, "text.pale")))
+        pale.append(len(wheel.find_elements(By.CSS_SELECTOR, ".outside")))
     row = seen.queries.iloc[longest]
     assert pale == [row["length"] - row["query_length"], 0]
     assert asked.text.endswith("Query, to 30 m")

@@ -122,13 +122,12 @@ def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
     assert asked.text.endswith("Query, to 30 m")
     for wheel in (asked, cell):
         assert len(wheel.find_elements(By.CSS_SELECTOR, "path.looked")) == 1
-        signs = wheel.find_elements(By.TAG_NAME, "text")
-        pale = [str(sign.get_attribute("class")).strip() == "pale" for sign in signs]
+        objects = wheel.find_elements(By.CSS_SELECTOR, ".object")
+        pale = ["outside" in str(one.get_attribute("class")) for one in objects]
         assert pale == outside.tolist()
         told = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
         assert told.count("(outside)") == outside.sum()
-        places = [[float(str(sign.get_attribute(one))) for one in "xy"] for sign in signs]
-        out = np.hypot(*np.transpose(places))
+        out = np.hypot(*np.transpose(page.ask("return signPlaces(arguments[0])", wheel)))
         assert np.corrcoef(out[:-1], metres[:-1])[0, 1] > 0.8
     assert len(asked.find_elements(By.CSS_SELECTOR, "line.ray")) == 1
     assert cell.find_elements(By.CSS_SELECTOR, "line.ray") == []
@@ -184,7 +183,7 @@ def test_a_localization_in_a_browser(page: MapPage) -> None:
     # The query and what the cell sees, side by side.
     page.ask("circles(arguments[0])[0].fire('click')", CANDIDATE_RAMP[0])
     captions = [one.get_property("innerText") for one in page.all("figcaption")]
-    assert captions == ["Query", "Signature"]
+    assert captions == ["Query", "Signature, to 30 m"]
     page.ask("semsig.hide(map)")
     assert f"Types: {CITY.types(LONGEST)}" in page.one(LEGEND).text
     page.switch("Candidates")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_evaluation
@@ -171,3 +172,63 @@ def test_what_a_key_names_is_told_again(page: MapPage) -> None:
         wait_for(page, f"object:{layer}/3")
     for kind, rest in (("query", "0"), ("place", "nowhere"), ("object", "x/1"), ("object", "/-1")):
         assert not page.ask(opened, kind, rest)[0]
+
+
+def lit(page: MapPage) -> list[list[bool]]:
+    """Return of each object of each wheel whether it is lit."""
+    return [
+        [
+            "lit" in str(one.get_attribute("class")).split()
+            for one in wheel.find_elements(By.CSS_SELECTOR, ".object")
+        ]
+        for wheel in page.all(".semsig-wheels figure")
+    ]
+
+
+def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
+    """The oracle is where the objects are that the city was made from."""
+    cell = int(CITY.lengths.argmax())
+    with still(page, 1440, 900):
+        page.open(ambiguity_map(CITY))
+        page.ask("map.setView(arguments[0], 19, {animate: false})", PLACES[cell].tolist())
+        page.click(CITY, cell)
+        first = page.all(".semsig-wheels figure")[0]
+        objects = first.find_elements(By.CSS_SELECTOR, ".object")
+        hint = "Point at an object to see it on the map."
+        assert page.text(".semsig-lit-object") == hint
+        for number in range(0, len(objects), 4):
+            ActionChains(page.browser).move_to_element(objects[number]).perform()
+            assert lit(page)[0] == [at == number for at in range(len(objects))]
+            (place, *mate) = page.ask("return litPlaces()")
+            assert len(mate) == sum(lit(page)[1])
+            code = CITY.codes[CITY.offsets[cell] + number]
+            title = CITY.taxonomy.by_code(int(code)).title
+            assert page.text(".semsig-lit-object").startswith(title)
+            same = to_latlon(OBJECTS.xy[OBJECTS.codes == code], OBJECTS.crs)
+            assert np.abs(same - place).max(axis=1).min() < 1e-5  # a metre
+        ActionChains(page.browser).move_to_element(page.one("h2")).perform()
+        assert page.text(".semsig-lit-object") == hint
+        assert not any(map(any, lit(page)))
+        # From the map to the wheel.
+        page.ask("shown((one) => one.getElement?.()?.matches?.('.semsig-object'))[2].fire('click')")
+        assert lit(page)[0].index(True) == 2
+        # By keyboard, round and back.
+        page.ask("arguments[0].focus()", objects[0])
+        page.browser.switch_to.active_element.send_keys(Keys.ARROW_LEFT)
+        assert lit(page)[0].index(True) == len(objects) - 1
+        page.browser.switch_to.active_element.send_keys(Keys.ARROW_RIGHT, "x")
+        assert lit(page)[0].index(True) == 0
+
+
+def test_what_was_seen_but_not_how_far_is_a_ray(page: MapPage) -> None:
+    page.open(evaluation_map(small_evaluation("light"), small_city()[0]))
+    longest = int(small_evaluation("light").queries["query_length"].argmax())
+    page.search(f"Query {longest + 1}:", Keys.ENTER)
+    ray = "return lines((one) => one.options.color === arguments[0] && one.options.dashArray)"
+    count = len(page.all(".semsig-wheels figure:first-child .object"))
+    assert page.ask(f"{ray}.length", "#808080") == count
+    ActionChains(page.browser).move_to_element(page.one(".semsig-wheels .object")).perform()
+    assert page.ask(f"{ray}.length", "#808080") == count - 1
+    page.ask("lines((one) => one.options.color === '#d55e00' && one.options.weight === 5)[0]"
+             ".fire('mouseout')")  # fmt: skip
+    assert page.ask(f"{ray}.length", "#808080") == count

@@ -85,10 +85,13 @@ semsig.City = class {
     const metres = this.metres(cell, other);
     return metres < 1000 ? `${Math.round(metres)} m` : `${(metres / 1000).toFixed(1)} km`;
   }
-  // Eighths of a turn, clockwise from north.
-  eighth(cell, other) {
+  towards(cell, other) {
     const [[x, y], [u, v]] = [this.placeOf(cell), this.placeOf(other)];
-    return Math.round(Math.atan2(u - x, v - y) / Math.PI * 4 + 8) % 8;
+    return ["north", "north-east", "east", "south-east", "south", "south-west", "west",
+      "north-west"][Math.round(Math.atan2(u - x, v - y) / Math.PI * 4 + 8) % 8];
+  }
+  told(cell) {
+    return this.middle(cell).map((part) => part.toFixed(5)).join(", ");
   }
   part(name, cell) {
     const ends = this.data[`${name}.ends`];
@@ -98,15 +101,79 @@ semsig.City = class {
     return String.fromCharCode(
       ...this.data[`${name}.types`].subarray(...this.part(name, cell)));
   }
+  // The objects that a cell may see: class, degrees, metres.
+  around(name, cell) {
+    const {[`${name}.x`]: x, [`${name}.y`]: y, [`${name}.classes`]: classes} = this.data;
+    const [column, row] = this.placeOf(cell);
+    const {step, firstColumn, quantum, reach} = this.grid;
+    const [east, north] = [step * (firstColumn + column + 0.5), step * (row + 0.5)];
+    const near = [];
+    for (let at = 0; at < x.length; at += 1) {
+      const [right, up] = [x[at] * quantum - east, y[at] * quantum - north];
+      const metres = Math.hypot(right, up);
+      if (metres > reach + 1) continue;
+      const degrees = (Math.atan2(right, up) / Math.PI * 180 + 360) % 360;
+      near.push({symbol: String.fromCharCode(classes[at]), degrees, metres, right, up});
+    }
+    return near.sort((one, other) => one.metres - other.metres);
+  }
+  // What a cell sees: of each object the class, the degrees and, where it is found, the metres.
   signature(name, cell) {
     const levels = this.data[`${name}.levels`].subarray(...this.part(name, cell));
-    const degrees = 360 / this.grid.levels;
-    return [this.types(name, cell),
-      Array.from(levels, (level) => Math.floor((level + 0.5) * degrees))];
+    const types = this.types(name, cell);
+    const span = 360 / this.grid.levels;
+    const near = types ? this.around(name, cell) : [];
+    const metres = [];
+    // The same object may be there twice, a little off.
+    const taken = [];
+    const twice = (one) => taken.some((other) => other === one || (other.symbol === one.symbol
+      && Math.hypot(other.right - one.right, other.up - one.up) < 1.5));
+    const bearings = Array.from(levels, (level, at) => {
+      const middle = (level + 0.5) * span;
+      const off = ({degrees}) => Math.abs((degrees - middle + 540) % 360 - 180);
+      const fit = near.filter((one) =>
+        one.symbol === types[at] && !taken.includes(one) && off(one) <= span / 2 + 1);
+      const found = fit.find((one) => !twice(one)) || fit[0];
+      if (found) taken.push(found);
+      metres.push(found ? Math.round(found.metres) : null);
+      return Math.round(found ? found.degrees : middle) % 360;
+    });
+    return [types, bearings, {metres, reach: this.grid.sight, place: this.middle(cell)}];
+  }
+  // The cells that see most nearly the same classes, with how many objects differ, best first.
+  mostAlike(name, cell, count) {
+    if (!this.counts) {
+      const {[`${name}.types`]: types, [`${name}.ends`]: ends} = this.data;
+      const numbers = new Map();
+      for (const type of types) if (!numbers.has(type)) numbers.set(type, numbers.size);
+      this.counts = new Uint8Array(this.count * numbers.size);
+      this.classes = numbers.size;
+      for (let one = 0, at = 0; one < this.count; one += 1) {
+        for (; at < ends[one]; at += 1) {
+          const place = one * this.classes + numbers.get(types[at]);
+          if (this.counts[place] < 255) this.counts[place] += 1;
+        }
+      }
+    }
+    const {counts, classes} = this;
+    const best = [];
+    for (let other = 0; other < this.count; other += 1) {
+      if (other === cell) continue;
+      let differ = 0;
+      for (let at = 0; at < classes; at += 1) {
+        differ += Math.abs(counts[other * classes + at] - counts[cell * classes + at]);
+      }
+      if (best.length === count && differ > best.at(-1)[1]) continue;
+      const away = this.metres(cell, other);
+      best.push([other, differ, away]);
+      best.sort((one, two) => one[1] - two[1] || one[2] - two[2]);
+      best.length = Math.min(best.length, count);
+    }
+    return best;
   }
 };
 semsig.cellFacts = {};
-semsig.cells = (packed, grid, titles, names) => {
+semsig.cells = (packed, grid, signs, names) => {
   const group = L.layerGroup();
   const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
   const buttons = (city, map, box, jumps) => {
@@ -118,10 +185,10 @@ semsig.cells = (packed, grid, titles, names) => {
         const button = L.DomUtil.create("button", "", line);
         button.textContent = text;
         button.title = title;
-        button.setAttribute("aria-label", title === "near" ? text : title);
+        button.setAttribute("aria-label", title);
         L.DomEvent.on(button, "click", () => {
-          const at = [...box.querySelectorAll("button")].indexOf(button);
-          show(city, map, other).querySelectorAll("button")[at]?.focus();
+          const at = [...box.querySelectorAll(".semsig-jumps button")].indexOf(button);
+          show(city, map, other).querySelectorAll(".semsig-jumps button")[at]?.focus();
         });
       }
       return line;
@@ -138,7 +205,12 @@ semsig.cells = (packed, grid, titles, names) => {
       ([across, along]) => city.latlng(column + across, row + along));
     drawn.addLayer(L.polygon(corners, {...look, fill: false}));
     const parts = names.map((name) => ({
-      rows: [], jumps: [], marks: [], dots: [], ...semsig.cellFacts[name](city, cell)}));
+      rows: [], jumps: [], dots: [], alike: [], ...semsig.cellFacts[name](city, cell)}));
+    // What a cell is taken for goes before what only looks the same.
+    const alike = [];
+    for (const [other, why] of parts.toReversed().flatMap((part) => part.alike)) {
+      if (alike.length < 3 && !alike.some((one) => one[0] === other)) alike.push([other, why]);
+    }
     const sign = (other, options) => {
       const marker = L.circleMarker(city.middle(other), {
         pane: "markerPane", color: semsig.outline(map), weight: 1, fillOpacity: 0.95,
@@ -151,7 +223,7 @@ semsig.cells = (packed, grid, titles, names) => {
     for (const [other, colour] of parts.flatMap((part) => part.dots)) {
       sign(other, {radius: 4, fillColor: colour});
     }
-    parts.flatMap((part) => part.marks).forEach((other, at) => {
+    alike.forEach(([other], at) => {
       drawn.addLayer(
         L.polyline([middle, city.middle(other)], {...look, weight: 2, dashArray: "5 5"}));
       const text = L.DomUtil.create("b", "");
@@ -159,14 +231,20 @@ semsig.cells = (packed, grid, titles, names) => {
       const label = {permanent: true, direction: "center", className: "semsig-number"};
       sign(other, {radius: 9, fillColor: "#fff"}).bindTooltip(text, label);
     });
-    // The page has the level of a bearing, whose middle is told.
-    const half = `\u00b1${Math.round(180 / grid.levels)}\u00b0, middles of levels`;
     const rows = [
       ...(away ? [["Nearest cell", `${Math.round(away)} m from the click`]] : []),
-      ...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)], ["Bearings", half]];
+      ...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)],
+      ["Latitude, longitude", city.told(cell)]];
     const title = parts.map((part) => part.title).filter(Boolean).pop();
-    const box = semsig.details(
-      title, rows.map((one) => one[0]), rows.map((one) => one[1]), titles);
+    const others = alike.map(([other, why], at) => ({
+      label: `${at + 1}: ${city.far(cell, other)} to the ${city.towards(cell, other)}`,
+      line: `${why}; ${city.told(other)}`,
+      signature: () => city.signature("now", other),
+      go: () => show(city, map, other),
+    }));
+    const kind = parts.map((part) => part.kind).find(Boolean);
+    const box = semsig.details(title, rows.map((one) => one[0]), rows.map((one) => one[1]), signs,
+      {others: others.length ? others : null, kind});
     buttons(city, map, box, parts.flatMap((part) => part.jumps));
     semsig.show(map, box, middle, {key: `cell:${city.id(cell)}`, corners, drawn});
     return box;
@@ -196,7 +274,7 @@ semsig.cells = (packed, grid, titles, names) => {
   };
   group.onRemove = (map) => {
     silence();
-    if (drawn && drawn === map.semsigPanel?.told?.drawn) semsig.hide(map);
+    if (map.semsigPanel?.told?.layers.includes(drawn)) semsig.hide(map);
     map.getContainer().classList.remove("semsig-cells");
     L.LayerGroup.prototype.onRemove.call(group, map);
   };

@@ -10,7 +10,7 @@ semsig.cellFacts.change = (city, cell) => {
   const differences = Object.entries(count).filter((one) => one[1] !== 0).map(
     ([symbol, more]) => `${more > 0 ? "+" : "\u2212"}${Math.abs(more)}\u00a0${symbol}`);
   const shown = (signature) => (signature[0] ? signature : "nothing");
-  return {title, rows: [
+  return {title, kind: "dates", rows: [
     ["Before", shown(before)],
     ["Now", shown(after)],
     ["Difference", differences.join(", ") || "of bearings or distances alone"],

@@ -22,10 +22,7 @@ semsig.cellFacts.groups = (city, cell) => {
   const byDistance = (cells) => cells.filter((other) => other !== cell)
     .map((other) => [city.metres(cell, other), other])
     .sort((one, two) => one[0] - two[0]).map((one) => one[1]);
-  const goal = (other, hint) => [(hint === "farthest" ? "farthest: " : "")
-    + city.far(cell, other) + " "
-    + ["N", "NE", "E", "SE", "S", "SW", "W", "NW"][city.eighth(cell, other)], other, hint];
-  const jumps = (label, cells, sorted) => {
+  const jumps = (label, cells) => {
     const at = cells.indexOf(cell);
     const beside = (step) => cells[(at + step + cells.length) % cells.length];
     const number = (value) => value.toLocaleString("en");
@@ -33,8 +30,6 @@ semsig.cellFacts.groups = (city, cell) => {
       [`${label}: ${number(at + 1)} of ${number(cells.length)}`,
         [["\u2039", beside(-1), "previous, from the west"],
           ["\u203a", beside(1), "next, from the west"]]],
-      ["", [...sorted.slice(0, 3).map((other) => goal(other, "near")),
-        ...sorted.slice(3).slice(-1).map((other) => goal(other, "farthest"))]],
     ];
   };
   // The nearest ones, and some from everywhere.
@@ -45,6 +40,8 @@ semsig.cellFacts.groups = (city, cell) => {
     rows: [["It sees", city.signature("now", cell)]],
     jumps: [],
     dots: [],
+    alike: [],
+    kind: "cells",
   };
   for (const [label, cells, colour] of [
     ["Same types", alike, grid.colours[0]],
@@ -54,9 +51,19 @@ semsig.cellFacts.groups = (city, cell) => {
       facts.rows.push([label, "no other cell"]);
     } else {
       const sorted = byDistance(cells);
-      facts.jumps.push(...jumps(label, cells, sorted));
+      facts.jumps.push(...jumps(label, cells));
+      const same = label.toLowerCase();
+      facts.alike.unshift(
+        [sorted[0], `${same}, the nearest`],
+        ...sorted.slice(1).slice(-1).map((other) => [other, `${same}, the farthest`]),
+        ...sorted.slice(1, -1).slice(0, 1).map((other) => [other, `${same}, the next`]));
       facts.dots.push(...drawn(sorted).reverse().map((one) => [one, colour]));
     }
+  }
+  if (facts.alike.length < 3) {
+    facts.alike.push(...city.mostAlike("now", cell, 6).map(
+      ([other, count]) => [other, count === 0 ? "the same objects, in another order"
+        : count === 1 ? "1 object more or less" : `${count} objects more or less`]));
   }
   return facts;
 };

@@ -13,17 +13,10 @@ semsig.cellFacts.lookalikes = (city, cell) => {
     ["Looks like", "about " + like.toLocaleString("en") + (like === 1 ? " cell (" : " cells (")
       + bits.toFixed(1) + " bits are left)"],
   ];
-  const marks = [];
+  const alike = [];
   for (let at = cell * grid.places; at < (cell + 1) * grid.places; at += 1) {
     const other = data.lookalikes[at];
-    if (other < 0) continue;
-    marks.push(other);
-    const types = city.types("now", other);
-    const towards = ["north", "north-east", "east", "south-east", "south", "south-west", "west",
-      "north-west"][city.eighth(cell, other)];
-    rows.push([`Taken for ${marks.length}`, percent(data.lookalikeChances[at]) + ": "
-      + city.far(cell, other) + " to the " + towards
-      + ", sees " + (types.length > 16 ? `${types.slice(0, 16)}\u2026` : types)]);
+    if (other >= 0) alike.push([other, `taken for it: ${percent(data.lookalikeChances[at])}`]);
   }
   const helpers = [];
   for (let at = cell * grid.helpers; at < (cell + 1) * grid.helpers; at += 1) {
@@ -31,5 +24,5 @@ semsig.cellFacts.lookalikes = (city, cell) => {
     if (gain >= 1) helpers.push(`${grid.classes[data.helpers[at]]} +${Math.round(gain)} %`);
   }
   if (helpers.length) rows.push(["Helped by", helpers.join(", ")]);
-  return {title: "A query from here", rows, marks};
+  return {title: "A query from here", rows, alike};
 };
