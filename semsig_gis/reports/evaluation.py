@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
@@ -186,20 +187,36 @@ def _group_table(groups: pd.DataFrame, title: str, heading: str) -> Table:
 
 def paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
     """Return the paper's P(error <= 50 m) and recall@10 % if it ran these settings."""
-    asked, database = evaluation.asked, evaluation.database
+    if _paper_level(evaluation) != "medium":
+        return None, None
+    database = evaluation.database
+    return paris.ACCURACY.get((database["radius_m"], database["levels"]), (None, None))
+
+
+def paris_points(evaluation: Evaluation) -> tuple[tuple[float, float, str], ...]:
+    """Return what the paper tells of the error curve of these settings, for a plot."""
+    p50, _ = paris_accuracy(evaluation)
+    if p50 is not None:
+        return ((50.0, p50, "Paris, the same settings"),)
+    told = paris.READ_OFF.get(f"{_paper_level(evaluation)}_small_error")
+    return () if told is None else ((10.0, told, "Paris, small errors (text)"),)
+
+
+def _paper_level(evaluation: Evaluation) -> str | None:
+    """Return the level of distortion if the paper ran its recommended method so."""
+    asked = evaluation.asked
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.
     measures = str(evaluation.method)
     same_method = measures in {"edit+edit:5%", "edit+edit:5%:raw"} and evaluation.top == 1
-    medium = DISTORTIONS["medium"]
-    same_noise = asked.seen_from == "cells" and any(
-        asked.distortions == (replace(medium, resort=resort, false_class=false_class),)
-        for resort in (True, False)
-        for false_class in get_args(FalseClass)
-    )
-    if not (same_method and same_noise and database["step_m"] == paris.STEP_M):
-        return None, None
-    key = (database["radius_m"], database["levels"])
-    return paris.ACCURACY.get(key, (None, None))
+    if not (same_method and asked.seen_from == "cells"):
+        return None
+    if evaluation.database["step_m"] != paris.STEP_M:
+        return None
+    for level, resort, false_class in product(paris.ERRORS, (True, False), get_args(FalseClass)):
+        same = replace(DISTORTIONS[level], resort=resort, false_class=false_class)
+        if asked.distortions == (same,):
+            return level
+    return None
 
 
 PERCENTILES = {"error_median": 50, "error_p90": 90}

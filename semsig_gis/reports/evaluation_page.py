@@ -13,6 +13,7 @@ from semsig_gis.reports.evaluation import (
     evaluation_headline,
     evaluation_settings,
     paris_accuracy,
+    paris_points,
 )
 from semsig_gis.reports.outcomes import outcome_map
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
@@ -86,7 +87,7 @@ def evaluation_page(
             *settings.items(),
             ("Seconds a query", f"{evaluation.seconds_per_query:.4f}"),
             *evaluation.versions.items(),
-            *((key.replace("_", " "), str(value)) for key, value in evaluation.machine.items()),
+            *((name.replace("_gb", ", GB"), str(one)) for name, one in evaluation.machine.items()),
         ),
         command=command,
         sections=(
@@ -122,9 +123,9 @@ def _error_section(evaluation: Evaluation, database: SignatureDatabase) -> Secti
             f"Of {evaluation.unlocalized:,} the distortion left nothing to compare: their error is "
             "infinite."
         )
-    if p50 is not None:
-        words.append("The paper's figures are of Paris, with the same settings.")
-    points = () if p50 is None else ((50.0, p50, "Paris, the same settings"),)
+    points = paris_points(evaluation)
+    if points:
+        words.append("The paper's figures are of another city, Paris.")
     best = "" if evaluation.top == 1 else f", best of {evaluation.top:,}"
     curve = curve_of(evaluation, f"{evaluation.method}{best}", "error")
     return Section(

@@ -130,7 +130,7 @@ def failure_pairs(
         pairs.append(
             Pair(
                 title=f"Query {number + 1:,}: off by {length(float(row['error_m']))}",
-                text=f"The spoiled query told {_told(codes, database.taxonomy)}.{alike}",
+                text=f"The spoiled query told: {_told(codes, database.taxonomy)}.{alike}",
                 scenes=(true, other),
             )
         )
@@ -141,7 +141,7 @@ def _told(codes: list[int], taxonomy: Taxonomy) -> str:
     """Return classes in words, each with its symbol and how often it comes."""
     known = {code: taxonomy.by_code(code) for code in codes}
     return ", ".join(
-        f"{known[code].title.lower()} ({known[code].symbol}{f', {count}' * (count > 1)})"
+        f"{known[code].title} ({known[code].symbol}{f', {count}' * (count > 1)})"
         for code, count in Counter(codes).items()
     )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from axe_core_python.selenium import Axe
 from html_pages import HtmlPage
 from map_pages import MapPage, assert_quiet
 from sentences import refused
@@ -17,7 +18,8 @@ from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import named_noise
 from semsig_gis.matching.method import Method
-from semsig_gis.reports.evaluation import evaluation_headline
+from semsig_gis.queries.chain import parse_chain
+from semsig_gis.reports.evaluation import evaluation_headline, paris_points
 from semsig_gis.reports.evaluation_page import evaluation_page
 from semsig_gis.reports.page import write_page
 
@@ -90,6 +92,21 @@ def test_the_paper_stands_beside_the_same_settings() -> None:
     assert sections(BY_LIKELIHOOD)["errors"].plots[0].paper == ()
 
 
+@pytest.mark.parametrize(
+    ("asked", "point"),
+    [
+        ("light:resort=false", [(10.0, 0.70)]),
+        ("strong:false_class=frequency", [(10.0, 0.25)]),
+        ("strong:bearing_sigma=1", []),
+        ("light, view:90", []),
+    ],
+)
+def test_what_the_paper_reads_off_its_plots(asked: str, point: list[tuple[float, float]]) -> None:
+    spec = replace(BY_DISTANCE.asked, distortions=parse_chain(asked))
+    points = paris_points(replace(BY_DISTANCE, asked=spec))
+    assert [one[:2] for one in points] == point
+
+
 def test_chances_are_told_where_a_method_states_them() -> None:
     assert "chances" not in sections(BY_DISTANCE)
     chances = sections(BY_LIKELIHOOD)["chances"]
@@ -140,3 +157,4 @@ def test_the_page_in_a_browser(browser: Chrome, tmp_path: Path, width: int, heig
         names = "return performance.getEntriesByType('resource').map((entry) => entry.name)"
         assert all(name.startswith("data:") for name in browser.execute_script(names))
         assert_quiet(browser)
+        assert Axe().run(browser)["violations"] == []

@@ -79,7 +79,7 @@ def test_the_worst_failures_are_shown_in_pairs() -> None:
         assert bearings == [f"{float(one):.6g}" for one in row["query_bearings"].split(",")]
         assert ("fit it as well" in pair.text) == (row["tied"] > 1)
         for symbol in row["query_types"]:
-            assert CITY.taxonomy.by_symbol(symbol).title.lower() in pair.text
+            assert CITY.taxonomy.by_symbol(symbol).title in pair.text
 
 
 def test_what_a_query_told_stands_around_the_circle() -> None:
