@@ -10,12 +10,13 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 
-from semsig_gis.core.signs import OUTCOMES
+from semsig_gis.core.signs import OUTCOMES, WHITE
 from semsig_gis.reports.parts import OutcomeMap
-from semsig_gis.reports.plots import GROUND, SOFT, blank_figure, draw_legend, label, saved
+from semsig_gis.reports.plots import SOFT, blank_figure, draw_legend, label, saved
 from semsig_gis.reports.scenes import MARKERS, draw_north, draw_scale
 
 if TYPE_CHECKING:
+    from semsig_gis.core.signs import Mark
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.reports.plots import Picture
@@ -63,10 +64,8 @@ def draw_map(shown: OutcomeMap) -> Picture:
     reach = np.array([inside, tall]) / 2 * max(across / inside, up / tall)
     (left, bottom), (right, top) = (low + high) / 2 - reach, (low + high) / 2 + reach
     height = above + tall + LEGEND
-    kinds = {
-        "failed": (~shown.successful, _look("failed", len(shown.places))),
-        "successful": (shown.successful, _look("successful", len(shown.places))),
-    }
+    kinds = dict(zip(OUTCOMES, (shown.successful, ~shown.successful), strict=True))
+    looks = {kind: _look(mark, len(shown.places)) for kind, mark in OUTCOMES.items()}
     with blank_figure(WIDTH, height) as figure:
         place = (MARGIN / WIDTH, LEGEND / height, inside / WIDTH, tall / height)
         axes = figure.add_axes(place)
@@ -76,16 +75,16 @@ def draw_map(shown: OutcomeMap) -> Picture:
         axes.imshow(pixels, origin="lower", extent=ends, interpolation="nearest", aspect="auto")
         axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
         many = len(shown.places) > MANY_PLACES
-        for some, look in kinds.values():
-            axes.plot(*shown.places[some].T, **look, rasterized=many)
+        for kind, some in reversed(kinds.items()):
+            axes.plot(*shown.places[some].T, **looks[kind], rasterized=many)
         draw_north(axes)
         draw_scale(axes, float(reach[0]))
         heading: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5}
         figure.text(MARGIN / WIDTH, 1 - 0.08 / height, "\n".join(titles), **heading)
-        counts = {kind: f"{kind}: {int(some.sum()):,}" for kind, (some, _) in kinds.items()}
+        counts = {kind: f"{kind}: {int(some.sum()):,}" for kind, some in kinds.items()}
         keys = [
-            (Line2D([], [], **{**kinds[kind][1], "markersize": 7}), counts[kind])
-            for kind in ("successful", "failed")
+            (Line2D([], [], **{**looks[kind], "markersize": 7.0}), text)
+            for kind, text in counts.items()
         ]
         place_of_keys = (MARGIN / WIDTH, 0.24 / height, (WIDTH - MARGIN) / WIDTH)
         draw_legend(figure, keys, place=place_of_keys, columns=2, size=9, sign_width=1)
@@ -93,12 +92,15 @@ def draw_map(shown: OutcomeMap) -> Picture:
         return saved(figure, title=shown.title, description=description)
 
 
-def _look(outcome: str, places: int) -> dict[str, Any]:
+def _look(mark: Mark, places: int) -> dict[str, Any]:
+    marker, share = MARKERS[mark.shape]
+    size = 6.0 if places <= MANY_PLACES / 4 else 4.0 if places <= MANY_PLACES else 3.0
     return {
         "linestyle": "",
-        "marker": MARKERS[OUTCOMES[outcome].shape][0],
-        "color": OUTCOMES[outcome].colour,
-        "markersize": 6.0 if places <= MANY_PLACES / 4 else 4.0 if places <= MANY_PLACES else 2.5,
-        "markeredgecolor": GROUND,
-        "markeredgewidth": 0.5 if places <= MANY_PLACES else 0.0,
+        "marker": marker,
+        "color": mark.colour,
+        "markersize": share * size,
+        # White on either ground, so that the dark one is seen in the dark.
+        "markeredgecolor": WHITE,
+        "markeredgewidth": 0.1 * size,
     }

@@ -16,7 +16,7 @@ from matplotlib.path import Path
 from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import ClassSign, class_signs, one_line
+from semsig_gis.core.signs import OUTCOMES, ClassSign, class_signs, one_line
 from semsig_gis.queries.sight import Sight
 from semsig_gis.reports.parts import Pair, Scene, SceneObject
 from semsig_gis.reports.plots import GROUND, INK, SOFT, blank_figure, draw_legend, label, saved
@@ -81,7 +81,7 @@ def example_scenes(
     """Return the first queries from cells of the database that were answered well, or not."""
     queries = evaluation.queries
     examples = queries[(evaluation.successful == successful) & (queries["cell"] >= 0)].head(count)
-    kind = "successful" if successful else "failed"
+    kind = [*OUTCOMES][0 if successful else 1]
     scenes = []
     rows = zip(examples.index, examples.to_dict("records"), strict=True)
     for place, (number, row) in enumerate(rows, start=1):

@@ -38,7 +38,7 @@ def test_outcomes_differ_in_colour_and_shape(places: int) -> None:
     failed, successful = places // 2, places - places // 2
     counts = {f"successful: {successful:,}", f"failed: {failed:,}"}
     assert {*counts, "N", "5 m"} <= set(texts(made.svg))
-    assert f"Queries failed: {failed:,}, successful: {successful:,}." in made.description
+    assert f"Queries successful: {successful:,}, failed: {failed:,}." in made.description
     svg = made.svg.decode()
     assert all(f"fill: {mark.colour}" in svg for mark in OUTCOMES.values())
     # Many are pixels.
