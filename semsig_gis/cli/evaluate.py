@@ -398,7 +398,13 @@ def identify(
     if out is not None and verification is not None:
         from semsig_gis.reports.page import write_report  # it loads what draws
 
-        page = identifiability_page(columns, verification, name=database.name, object_counts=counts)
+        page = identifiability_page(
+            columns,
+            verification,
+            name=database.name,
+            object_counts=counts,
+            command=command_line(),
+        )
         write_report(page, out)
     if as_json:
         more = {} if verification is None else {"check": verification.to_dict()}

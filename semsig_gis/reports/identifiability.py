@@ -10,7 +10,7 @@ from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.evaluation.result import machine
 from semsig_gis.reports.database import class_label
 from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
-from semsig_gis.reports.tables import Table, figure, percent
+from semsig_gis.reports.tables import Table, figure, percent, short_percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -102,11 +102,18 @@ def identifiability_page(
     *,
     name: str,
     object_counts: Mapping[int, int] | None = None,
+    command: str = "",
 ) -> Report:
     """Put together what is known of the cells of a database, and whether fresh queries agree."""
     facts = identifiability.summary(object_counts=object_counts)
     return Report(
         title=f"Where a query can be placed in {name}",
+        headline=(
+            f"From the mean cell, a {shot(facts['view_degrees'])} is placed within "
+            f"{facts['radius_m']:g} m with a chance of {short_percent(facts['chance_found'])}; of "
+            f"{check.queries:,} fresh ones, {short_percent(check.found)} were."
+        ),
+        command=command,
         text=(
             (
                 "Before any query, every cell is told the chance that a "

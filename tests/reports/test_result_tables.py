@@ -333,6 +333,8 @@ def test_the_numbers_of_a_page_are_those_of_the_check(tmp_path: Path) -> None:
     told = identify(index, trials=40, class_trials=5)
     check = check_identifiability(told, index, queries=60)
     page = identifiability_page(told, check, name="<town>", object_counts={3: 5})
+    found = f"{100 * check.found:.0f} % were."
+    assert page.headline.endswith(f"; of 60 fresh ones, {found}")
     parts = {one.name: one for one in page.sections}
     ranks = {one.row: one.ours for one in parts["ranks"].numbers}
     assert ranks["chance to be found"] == check.correlations["found"]
