@@ -126,7 +126,7 @@ OUTCOMES: Mapping[str, Mark] = MappingProxyType(
 """What became of a query."""
 
 ANSWERS: Mapping[str, Mark] = MappingProxyType(
-    {"given": Mark("diamond", "#00c98b"), "withheld": Mark("square", "#ff8a80")}
+    {"given": Mark("diamond", "#aaff66"), "withheld": Mark("square", "#ee3311")}
 )
 """The best place for a query, whether it is given as the answer or not."""
 

@@ -478,7 +478,7 @@ def sign_svg(sign: ClassSign) -> str:
 def mark_svg(mark: Mark) -> str:
     """Return a mark as an element of a page."""
     return (
-        '<svg class="semsig-sign" viewBox="-1.5 -1.5 3 3" aria-hidden="true">'
+        '<svg class="semsig-sign mark" viewBox="-1.5 -1.5 3 3" aria-hidden="true">'
         f'<path d="{OUTLINES[mark.shape]}" fill="{mark.colour}"/></svg>'
     )
 

@@ -88,7 +88,12 @@ def test_everything_on_one_map(done: Done) -> None:
     done("identify city.parquet")
     options = "--evaluation evaluation --ambiguity --identifiability --drift city.parquet"
     page = drawn(done, f"{options} --objects objects.parquet")
-    for name in ("Expected errors", "Same types", "Chance to be found", "What has changed"):
+    for name in (
+        "Share of queries that fail",
+        "Same types",
+        "Chance to be found",
+        "What has changed",
+    ):
         assert page.count(f'"{name}" :') == 1
     assert DRAWN_OBJECTS in page
 

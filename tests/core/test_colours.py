@@ -52,6 +52,7 @@ with warnings.catch_warnings():
 
 APART = 15.0
 MARKS = [mark.colour for mark in OUTCOMES.values()]
+ANSWER_MARKS = [mark.colour for mark in ANSWERS.values()]
 
 
 def rgb(colours: list[str]) -> np.ndarray:
@@ -84,6 +85,7 @@ def script(name: str) -> str:
     return resources.files("semsig_gis.maps").joinpath("js", name).read_text(encoding="utf-8")
 
 
+(POINTED,) = re.findall(r'pointed: "(#\w{6})"', script("layers.js"))
 LIGHT_PAPER, DARK_PAPER = re.findall(r"--paper: (#\w{6})", script("page.css"))
 GROUND = re.findall(r'dark \? "(#\w{6})" : "(#\w{6})"', script("ground.js"))
 FLIPPED, LIFTED = (
@@ -116,8 +118,15 @@ PAIRS = {
             ("outcomes in the dark", rgb(MARKS), lifted(colours)),
             ("light paper", rgb([LIGHT_PAPER]), rgb(colours)),
             ("dark paper", rgb([DARK_PAPER]), lifted(colours)),
+            ("what is pointed at", rgb([POINTED]), np.concatenate([rgb(colours), lifted(colours)])),
         )
     },
+    "what is pointed at": (rgb([POINTED]), np.concatenate([LIGHT, DARK, FIELD, rgb(MARKS)])),
+    "answers": (rgb(ANSWER_MARKS[:1]), rgb(ANSWER_MARKS[1:])),
+    "answers, ground": (rgb(ANSWER_MARKS), np.concatenate([LIGHT, DARK])),
+    "answers, chances": (rgb(ANSWER_MARKS), rgb([*CELL_CHANCES.values()])),
+    "answers, chances in the dark": (rgb(ANSWER_MARKS), flipped([*CELL_CHANCES.values()])),
+    "answers, outcomes": (rgb(ANSWER_MARKS), rgb(MARKS)),
     "outcomes, cells that are the same": (rgb(MARKS), rgb([SAME])),
     "outcomes in the dark, cells that are the same": (rgb(MARKS), flipped([SAME])),
     "changes": (rgb(CHANGES), rgb([SAME])),
@@ -153,7 +162,7 @@ def test_signs_of_classes_are_told_by_outlines_too(sight: str) -> None:
 
 def test_no_two_meanings_share_a_colour() -> None:
     tables = (
-        *(COLOURS, MARKS, [mark.colour for mark in ANSWERS.values()], FAILURES.values()),
+        *([POINTED], COLOURS, MARKS, ANSWER_MARKS, FAILURES.values()),
         *(RANK_RAMP, CANDIDATE_RAMP, FOUND_RAMP, SHADES.values(), CELL_CHANCES.values()),
         *(CHANCES.values(), VERDICTS.values(), GROUP_COLOURS.values(), DRIFT_COLOURS.values()),
         *(OBJECT_COLOURS.values(), [SAME_TYPES, SAME_LEVELS]),

@@ -200,7 +200,7 @@ semsig.cells = (packed, grid, signs, names) => {
     drawn = L.layerGroup();
     const [column, row] = city.placeOf(cell);
     const middle = city.middle(cell);
-    const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3};
+    const look = {pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 3};
     const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(
       ([across, along]) => city.latlng(column + across, row + along));
     drawn.addLayer(L.polygon(corners, {...look, fill: false}));

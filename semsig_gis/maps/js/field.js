@@ -13,20 +13,10 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
   }
   lines.stroke();
   let data = null;
-  // Between the four pixels around, of which 0 is none.
-  const between = (values, x, y) => {
-    const [column, row] = [Math.floor(x), Math.floor(y)];
-    let [sum, told] = [0, 0];
-    for (let corner = 0; corner < 4; corner += 1) {
-      const [across, down] = [column + (corner & 1), row + (corner >> 1)];
-      if (across < 0 || across >= width || down < 0 || down >= height) continue;
-      const value = values[down * width + across];
-      if (!value) continue;
-      const weight = Math.abs(1 - (corner & 1) - x + column) * Math.abs(1 - (corner >> 1) - y + row);
-      sum += weight * value;
-      told += weight;
-    }
-    return told < 0.5 ? 0 : sum / told;
+  // Between the pixels of the field around: the first of two, and the share of the second.
+  const crossing = (place, count) => {
+    const first = Math.min(Math.max(Math.floor(place), 0), count - 2);
+    return [first, Math.min(Math.max(place - first, 0), 1)];
   };
   const paint = (map) => (ctx, min, max) => {
     if (data === null) return;
@@ -40,18 +30,31 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
     const size = [Math.ceil(Math.min(max.x, to.x) / step) - west,
       Math.ceil(Math.min(max.y, to.y) / step) - north];
     if (size[0] <= 0 || size[1] <= 0) return;
-    const layers = [false, true].map(() => new ImageData(...size));
+    const layers = [0, 1].map(() => new ImageData(...size));
     const [sure, unsure] = layers.map((image) => new Uint32Array(image.data.buffer));
+    const columns = Array.from({length: size[0]}, (_, right) =>
+      crossing(((west + right + 0.5) * step - left) / scale / wide - 0.5, width));
+    const {values, speaking} = data;
     for (let down = 0; down < size[1]; down += 1) {
-      const y = ((north + down + 0.5) * step - top) / scale / high - 0.5;
+      const [row, below] = crossing(
+        ((north + down + 0.5) * step - top) / scale / high - 0.5, height);
       for (let right = 0; right < size[0]; right += 1) {
-        const x = ((west + right + 0.5) * step - left) / scale / wide - 0.5;
-        const value = between(data.values, x, y);
-        if (!value) continue;
+        const column = columns[right];
+        const at = row * width + column[0];
+        const weights = [(1 - column[1]) * (1 - below), column[1] * (1 - below),
+          (1 - column[1]) * below, column[1] * below];
+        let [sum, told, said] = [0, 0, 0];
+        for (let corner = 0; corner < 4; corner += 1) {
+          const pixel = at + (corner & 1) + (corner >> 1) * width;
+          if (!values[pixel]) continue;  // nothing is known
+          sum += weights[corner] * values[pixel];
+          told += weights[corner];
+          said += weights[corner] * speaking[pixel];
+        }
+        if (told < 0.5) continue;
         let colour = paints.length - 1;
-        while (value < breaks[colour]) colour -= 1;
-        const told = between(data.speaking, x, y) >= enough ? sure : unsure;
-        told[down * size[0] + right] = paints[colour];
+        while (sum < breaks[colour] * told) colour -= 1;
+        (said >= enough ? sure : unsure)[down * size[0] + right] = paints[colour];
       }
     }
     const draw = (image) => {

@@ -2,6 +2,7 @@ window.semsig = {
   // Fields that say what a thing is called; the search knows it by them, too.
   naming: new Set(["Class", "Class before", "Seen as", "Street object", "Identifier"]),
   layers: 0,  // of points, so far
+  pointed: "#7733ff",  // colour of what is pointed at, on whatever it lies
   points(fields, titles, records, shape) {
     const group = L.featureGroup();
     const markers = [];
@@ -72,7 +73,7 @@ window.semsig = {
   },
   // What joins a sign to the places found for it, the best first.
   hint(place, places) {
-    const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 2};
+    const look = {pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 2};
     return L.layerGroup([
       L.polyline([place, places[0]], {...look, dashArray: "5 5"}),
       ...places.map((one, at) => L.circleMarker(one, {

@@ -114,7 +114,7 @@ semsig.streetObjects = (key, packed, about) => {
       `${place.lat.toFixed(6)}, ${place.lng.toFixed(6)}`,
     ];
     const mark = L.circleMarker(place, {pane: "shadowPane", interactive: false, fill: false,
-      radius: 13, color: "#d55e00", weight: 3});
+      radius: 13, color: semsig.pointed, weight: 3});
     semsig.show(map, semsig.details(title, fields, values, {}), place, {
       key: `object:${keyOf(one)}`, drawn: mark,
     });

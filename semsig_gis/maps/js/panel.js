@@ -186,7 +186,8 @@ semsig.tellPlace = (map, latlng, name = "A place on the map", facts = []) => {
   const known = semsig.whereabouts(area, place, area && semsig.xy(area, place));
   const rows = [...facts, ...known];
   const mark = L.circleMarker(place, {
-    pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3, fill: false, radius: 10,
+    pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 3, fill: false,
+    radius: 10,
   });
   const box = semsig.details(name, rows.map((one) => one[0]), rows.map((one) => one[1]), {});
   semsig.show(map, box, place, {

@@ -49,7 +49,9 @@ semsig.whereabouts = (area, place, xy) => {
   return facts;
 };
 semsig.point = (map, name, place, facts, corners) => {
-  const look = {pane: "shadowPane", interactive: false, color: "#d55e00", weight: 3, fill: false};
+  const look = {
+    pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 3, fill: false,
+  };
   const mark = corners ? L.polygon(corners, look) : L.circleMarker(place, {...look, radius: 10});
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
   semsig.show(

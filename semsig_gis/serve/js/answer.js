@@ -124,7 +124,7 @@ semsig.Answer = class {
     }
     if (session.truth) {
       L.circleMarker(session.truth, {
-        radius: 15, color: "#d55e00", weight: 4, fill: false, interactive: false,
+        radius: 15, color: semsig.pointed, weight: 4, fill: false, interactive: false,
       }).bindTooltip("the true place", {permanent: true, direction: "bottom", offset: [0, 14]})
         .addTo(drawn);
     }
