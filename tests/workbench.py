@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
+import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from semsig_gis.serve import server
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from semsig_gis.serve.workbench import Workbench
 
 TOKEN = "the-token-of-the-tests"  # noqa: S105 - of a server that lives for a test
@@ -55,3 +61,17 @@ class Page:
         assert text.endswith(".")
         assert "\n" not in text
         return code, text
+
+
+@contextlib.contextmanager
+def serving(bench: Workbench) -> Iterator[Page]:
+    """Serve a workbench in a thread for as long as the block runs."""
+    with server.listening(0) as listener:
+        running = server.served(bench, listener, token=TOKEN)
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield Page(bench=bench, port=listener.getsockname()[1])
+        finally:
+            running.should_exit = True
+            thread.join()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import secrets
 import webbrowser
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -50,21 +49,15 @@ def serve(
     city = open_city(database)
     model = read_noise(noise, city.database)
     store = object_store(city, objects, needed=False)
-    name = noise if noise in NOISES else Path(noise).stem
-    noises = {name: model} | {one: spec for one, spec in NOISES.items() if one != name}
-    common = [str(database), *(["--objects", str(objects)] if objects is not None else [])]
-    given = {one: noise if one == name else one for one in noises}
-    options = {
-        one: common if words == "generic" else [*common, "--noise", words]
-        for one, words in given.items()
-    }
+    noises = {noise: model} | {name: one for name, one in NOISES.items() if name != noise}
+    options = [str(database), *(["--objects", str(objects)] if objects is not None else [])]
     bench = Workbench(city=city, store=store, noises=noises, options=options)
     token = secrets.token_urlsafe(32)
     with server.listening(port) as listener:
+        bench.prepare()
         address = server.address(listener, token)
         say(f"The workbench of {city.path.name} is at {address}")
         remark("it runs until you press Ctrl-C")
         if not no_browser:
             webbrowser.open(address)
         server.served(bench, listener, token=token).run(sockets=[listener])
-    remark("the workbench is closed")

@@ -17,7 +17,7 @@ from pyproj import Transformer
 from semsig_gis.core.geometry import across_180, cell_ids
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
     from pyproj import CRS
@@ -61,6 +61,63 @@ def place_lattices(database: SignatureDatabase) -> PlaceLattices:
     )
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellPixels:
+    """Where the cells of a database are in a picture that lies right on a web map.
+
+    Rows and columns are even steps of Web Mercator. ``blocks`` (height, width) has the number of a
+    block for each pixel, or one more than the last where there is none; ``members`` (n,) the block
+    of every cell: itself alone, but in a city wider than 2048 cells. ``corners`` are south-west and
+    north-east, latitude and longitude.
+    """
+
+    blocks: NDArray[np.int32]
+    members: NDArray[np.int64]
+    corners: list[list[float]]
+
+    @classmethod
+    def of(cls, database: SignatureDatabase) -> CellPixels:
+        """Return where the cells of a database are."""
+        columns, rows = database.columns.astype(np.int64), database.rows.astype(np.int64)
+        cells = max(int(np.ptp(columns)), int(np.ptp(rows))) + 1
+        block = math.ceil(cells / _BLOCKS)
+        columns, rows = columns // block, rows // block
+        blocks, members = np.unique(cell_ids(columns, rows), return_inverse=True)
+        side = database.grid.step * block
+        origin = np.array(database.grid.origin)
+        low = origin + side * np.array([columns.min(), rows.min()])
+        high = origin + side * np.array([columns.max() + 1, rows.max() + 1])
+        # At least two pixels a block, because the grid is a little turned against the pixels.
+        zoom = max(2, min(4, _BLOCKS // (cells // block)))
+        width, height = (np.rint((high - low) / side).astype(int) * zoom).tolist()
+        lattice, (west, south, east, north) = _mercator_lattice(database, low, high)
+        across = lattice[:, ::-1] @ _between(width).T
+        pixels = np.empty((height, width), np.int32)
+        for line, weights in enumerate(_between(height)):
+            ids = cell_ids(*np.floor((weights @ across - origin[:, None]) / side).astype(np.int64))
+            nearest = np.minimum(np.searchsorted(blocks, ids), len(blocks) - 1)
+            pixels[line] = np.where(blocks[nearest] == ids, nearest, len(blocks))
+        to_degrees = Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
+        longitudes, latitudes = to_degrees.transform([west, east], [south, north])
+        corners = np.stack([latitudes, across_180(longitudes, database.crs)], axis=1)
+        return cls(blocks=pixels, members=members, corners=corners.tolist())
+
+    def image(
+        self, values: NDArray[np.uint8], colours: Sequence[str], *, effort: int = 9
+    ) -> tuple[bytes, list[list[float]]]:
+        """Draw a value of each block, as a PNG with its corners; 0 is nothing, 1 the first colour.
+
+        ``effort``, 1 to 9, is how hard to try to make it small.
+        """
+        return _png(np.append(values, np.uint8(0))[self.blocks], colours, effort), self.corners
+
+    def levels(self, levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the highest level of the cells of each block."""
+        values = np.zeros(int(self.members.max()) + 1, np.uint8)
+        np.maximum.at(values, self.members, levels)
+        return values
+
+
 def city_image(
     database: SignatureDatabase, shades: Mapping[int, str]
 ) -> tuple[bytes, list[list[float]]]:
@@ -70,12 +127,9 @@ def city_image(
     and columns are even steps of Web Mercator. The corners are south-west and north-east, latitude
     and longitude. A city wider than 2048 cells is drawn in blocks of cells, each with its mean.
     """
-
-    def mean_shades(members: NDArray[np.int64]) -> NDArray[np.uint8]:
-        means = np.bincount(members, weights=database.lengths) / np.bincount(members)
-        return np.digitize(means, list(shades)).astype(np.uint8)
-
-    return _drawn(database, mean_shades, list(shades.values()))
+    pixels = CellPixels.of(database)
+    means = np.bincount(pixels.members, weights=database.lengths) / np.bincount(pixels.members)
+    return pixels.image(np.digitize(means, list(shades)).astype(np.uint8), list(shades.values()))
 
 
 def level_image(
@@ -85,45 +139,8 @@ def level_image(
 
     Levels count from 1 into ``colours``; 0 is nothing. A block has the highest of its cells.
     """
-
-    def highest(members: NDArray[np.int64]) -> NDArray[np.uint8]:
-        values = np.zeros(int(members.max()) + 1, np.uint8)
-        np.maximum.at(values, members, levels)
-        return values
-
-    return _drawn(database, highest, colours)
-
-
-def _drawn(
-    database: SignatureDatabase,
-    values_of: Callable[[NDArray[np.int64]], NDArray[np.uint8]],
-    colours: Sequence[str],
-) -> tuple[bytes, list[list[float]]]:
-    """Draw a value of each block of cells, from the number of the block of every cell."""
-    columns, rows = database.columns.astype(np.int64), database.rows.astype(np.int64)
-    cells = max(int(np.ptp(columns)), int(np.ptp(rows))) + 1
-    block = math.ceil(cells / _BLOCKS)
-    columns, rows = columns // block, rows // block
-    blocks, members = np.unique(cell_ids(columns, rows), return_inverse=True)
-    values = values_of(members)
-    side = database.grid.step * block
-    origin = np.array(database.grid.origin)
-    low = origin + side * np.array([columns.min(), rows.min()])
-    high = origin + side * np.array([columns.max() + 1, rows.max() + 1])
-    # At least two pixels a block, because the grid is a little turned against the pixels.
-    zoom = max(2, min(4, _BLOCKS // (cells // block)))
-    width, height = (np.rint((high - low) / side).astype(int) * zoom).tolist()
-    lattice, (west, south, east, north) = _mercator_lattice(database, low, high)
-    across = lattice[:, ::-1] @ _between(width).T
-    pixels = np.empty((height, width), np.uint8)
-    for line, weights in enumerate(_between(height)):
-        ids = cell_ids(*np.floor((weights @ across - origin[:, None]) / side).astype(np.int64))
-        nearest = np.minimum(np.searchsorted(blocks, ids), len(blocks) - 1)
-        pixels[line] = np.where(blocks[nearest] == ids, values[nearest], 0)
-    to_degrees = Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
-    longitudes, latitudes = to_degrees.transform([west, east], [south, north])
-    corners = np.stack([latitudes, across_180(longitudes, database.crs)], axis=1)
-    return _png(pixels, colours), corners.tolist()
+    pixels = CellPixels.of(database)
+    return pixels.image(pixels.levels(levels), colours)
 
 
 def _mercator_lattice(
@@ -166,7 +183,7 @@ def _between(pixels: int) -> NDArray[np.float64]:
     return np.maximum(weights, 0.0)
 
 
-def _png(pixels: NDArray[np.uint8], colours: Sequence[str]) -> bytes:
+def _png(pixels: NDArray[np.uint8], colours: Sequence[str], effort: int) -> bytes:
     """Return a PNG with a palette: 0 is transparent, 1 the first colour, and so on."""
     height, width = pixels.shape
     lines = np.pad(pixels, ((0, 0), (1, 0)))  # each line begins with its filter: none
@@ -174,7 +191,7 @@ def _png(pixels: NDArray[np.uint8], colours: Sequence[str]) -> bytes:
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)),
         (b"PLTE", bytes(3) + b"".join(bytes.fromhex(colour[1:]) for colour in colours)),
         (b"tRNS", b"\0"),
-        (b"IDAT", zlib.compress(lines.tobytes(), 9)),
+        (b"IDAT", zlib.compress(lines.tobytes(), effort)),
         (b"IEND", b""),
     )
     return b"\x89PNG\r\n\x1a\n" + b"".join(

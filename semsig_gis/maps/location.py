@@ -82,6 +82,7 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
 }
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
 BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
+REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
 ARC_STEPS = 72
@@ -142,7 +143,7 @@ def _colour_chances(map_: folium.Map, location: Location) -> None:
     for name, picture, show in (
         (f"Chance within {radius:g} m", _chances(posterior, around), not near),
         ("Chance of a cell", _chances(posterior, cell), near),
-        ("Regions of 50, 90 and 99 %", regions_image(posterior), False),
+        ("Regions of 50, 90 and 99 %", _regions(posterior), False),
     ):
         image = cell_image(map_, *picture, dark="flip", opacity=0.85)
         colour_cells(map_, name, city, image, show=show)
@@ -154,16 +155,23 @@ def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
     return _image(posterior, levels, list(CELL_CHANCES.values()))
 
 
-def regions_image(posterior: Posterior) -> Image:
-    """Return an image of the fewest cells that hold each share of the chance."""
-    shares = sorted(CHANCES, reverse=True)
-    levels = np.zeros(len(posterior.database), np.int64)
-    for level, share in enumerate(shares, start=1):
+def region_levels(posterior: Posterior) -> NDArray[np.uint8]:
+    """Return which of `CHANCES`, from the largest share on and counted from 1, each cell is in.
+
+    It is in the fewest cells that hold the share; 0 stands for none.
+    """
+    levels = np.zeros(len(posterior.database), np.uint8)
+    for level, share in enumerate(sorted(CHANCES, reverse=True), start=1):
         levels[posterior.credible_cells(share)] = level
-    return _image(posterior, levels, [CHANCES[share] for share in shares])
+    return levels
 
 
-def _image(posterior: Posterior, levels: NDArray[np.int64], colours: list[str]) -> Image:
+def _regions(posterior: Posterior) -> Image:
+    """Return an image of the fewest cells that hold each share of the chance."""
+    return _image(posterior, region_levels(posterior), REGION_COLOURS)
+
+
+def _image(posterior: Posterior, levels: NDArray[np.integer], colours: list[str]) -> Image:
     """Return an image of the cells that have a level above 0, and of the likeliest."""
     cells = np.union1d(np.flatnonzero(levels), [int(posterior.chances.argmax())])
     return level_image(posterior.database.select(cells), levels[cells].astype(np.uint8), colours)

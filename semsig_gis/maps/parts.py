@@ -263,10 +263,14 @@ def layers_of(map_: folium.Map) -> dict[str, Element]:
     return map_._children  # noqa: SLF001 - branca has no public way to look at them
 
 
+@functools.lru_cache(maxsize=8)
+def _to_degrees(crs: CRS) -> Transformer:
+    return Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+
+
 def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[np.float64]:
     """Return latitudes and longitudes, by default to about 0.1 m, shape (n, 2); NaN stays NaN."""
-    to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
-    longitude, latitude = to_degrees.transform(xy[:, 0], xy[:, 1])
+    longitude, latitude = _to_degrees(crs).transform(xy[:, 0], xy[:, 1])
     degrees = np.round(np.stack([latitude, across_180(longitude, crs)], axis=1), digits)
     return np.where(np.isfinite(degrees), degrees, np.nan)
 

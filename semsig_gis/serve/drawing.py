@@ -9,7 +9,7 @@ import numpy as np
 
 from semsig_gis.core.signs import CHANCES
 from semsig_gis.likelihood.explain import UNKNOWN_NAME
-from semsig_gis.maps.location import regions_image
+from semsig_gis.maps.location import REGION_COLOURS, region_levels
 from semsig_gis.maps.parts import cell_signature, data_url, to_latlon
 
 if TYPE_CHECKING:
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.likelihood.explain import Explanation
-    from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.locate import Location
+    from semsig_gis.likelihood.noise.table import NoiseTable
+    from semsig_gis.maps.image import CellPixels
     from semsig_gis.serve.question import MarkNumber, Question
 
 LEAST_SHARE = 1e-6
@@ -37,13 +38,22 @@ def class_shares(database: SignatureDatabase) -> NDArray[np.float64]:
 
 
 def answer_drawing(
-    location: Location, question: Question, *, index: LikelihoodIndex
+    location: Location,
+    question: Question,
+    *,
+    table: NoiseTable,
+    shares: NDArray[np.float64],
+    pixels: CellPixels,
 ) -> dict[str, Any]:
-    """Return what the page draws of an answer."""
+    """Return what the page draws of an answer, the regions in an image of the city.
+
+    `table` is the noise model that was searched with, `shares` are those of `class_shares`.
+    """
     database, estimate = location.posterior.database, location.estimate
-    image, bounds = regions_image(location.posterior)
+    levels = region_levels(location.posterior)
+    image, bounds = pixels.image(pixels.levels(levels), REGION_COLOURS, effort=1)
     entropy = location.posterior.entropy
-    drawer = _Drawer(location, question, index)
+    drawer = _Drawer(location, question, table, shares)
     return {
         "given": location.answer.given,
         "mass": location.answer.mass,
@@ -54,7 +64,8 @@ def answer_drawing(
             "image": data_url(image),
             "bounds": bounds,
             "counts": {
-                f"{share:g}": len(location.posterior.credible_cells(share)) for share in CHANCES
+                f"{share:g}": int((levels >= level).sum())
+                for level, share in enumerate(sorted(CHANCES, reverse=True), start=1)
             },
             "colours": {f"{share:g}": colour for share, colour in CHANCES.items()},
         },
@@ -75,13 +86,18 @@ def answer_drawing(
 class _Drawer:
     """What an answer is drawn by."""
 
-    def __init__(self, location: Location, question: Question, index: LikelihoodIndex) -> None:
-        self.location, self.table = location, index.table
+    def __init__(
+        self,
+        location: Location,
+        question: Question,
+        table: NoiseTable,
+        shares: NDArray[np.float64],
+    ) -> None:
+        self.location, self.table, self.shares = location, table, shares
         self.database = location.posterior.database
         self.marks: tuple[MarkNumber, ...] = question.marks[question.shown]
         self.titles = {item.name: item.title for item in self.database.taxonomy.classes}
         self.codes = {item.name: item.code for item in self.database.taxonomy.classes}
-        self.shares = class_shares(self.database)
 
     def latlon(self, xy: ArrayLike) -> list[list[float]]:
         """Return places in degrees."""

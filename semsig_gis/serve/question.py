@@ -54,7 +54,7 @@ class Question:
     shown: int
     top: int
     seen_from: SeenFrom
-    noise: str | None
+    noise: object
     truth: tuple[float, float] | None
 
     @classmethod

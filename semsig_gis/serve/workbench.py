@@ -18,13 +18,14 @@ from pyproj import Transformer
 from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.signs import SHADES, VERDICTS, class_signs
+from semsig_gis.core.view import Photo
 from semsig_gis.database.north import North
 from semsig_gis.database.views import views_at
 from semsig_gis.exports import export_answer
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
-from semsig_gis.maps.image import city_image
+from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
 from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url
 from semsig_gis.queries.chain import ready_chain
@@ -41,6 +42,8 @@ from semsig_gis.serve.question import Question, camera_of, degrees, number
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
@@ -54,6 +57,8 @@ FORMATS = {
     "geojson": "application/geo+json",
     "kml": "application/vnd.google-earth.kml+xml",
 }
+USUAL = "generic"
+MARKS_TO_PREPARE = 5
 PANORAMA = 2  # times as wide as high
 
 
@@ -67,16 +72,17 @@ class Workbench:
         The city.
     store : ObjectStore or None
         Its street objects, if they are at hand.
-    noises : mapping of str to Noise
-        The noise models that the page may choose from, the default first.
-    options : sequence of str
-        The database and its options, as `semsig localize` takes them, by noise model.
+    noises : mapping of str to Noise, default those that have a name
+        What the page may choose from, as ``--noise`` of `semsig localize` takes it; the first is
+        taken where it chooses none.
+    options : sequence of str, default the file of the city
+        The database and other options, as `semsig localize` takes them.
     """
 
     city: City
     store: ObjectStore | None
-    noises: Mapping[str, Noise] = field(default_factory=lambda: NOISES)
-    options: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    noises: Mapping[str, Noise] = field(default_factory=lambda: {USUAL: NOISES[USUAL], **NOISES})
+    options: Sequence[str] = ()
     _locators: dict[tuple[str, str], LikelihoodLocator] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
 
@@ -90,11 +96,32 @@ class Workbench:
         """The classes of the city, with the heights of the built-in ones."""
         return with_heights(self.database.taxonomy)
 
+    @cached_property
+    def _pixels(self) -> CellPixels:
+        return CellPixels.of(self.database)
+
+    @cached_property
+    def _shares(self) -> NDArray[np.float64]:
+        return class_shares(self.database)
+
+    def prepare(self) -> None:
+        """Load what the first answers need."""
+        self.about()
+        fullest = int(self.database.lengths.argmax())
+        sight = Sight.of_cell(self.database, fullest)
+        marks = self._compass(sight)[:MARKS_TO_PREPARE]
+        for error in (None, "unknown"):
+            self.answer({"views": [{"compass": marks, "heading_error": error}]})
+
     def about(self) -> dict[str, Any]:
         """Return what the page shows of the city before anything is asked."""
+        return self._about
+
+    @cached_property
+    def _about(self) -> dict[str, Any]:
         database = self.database
         image, bounds = city_image(database, SHADES)
-        shares = class_shares(database)
+        shares = self._shares
         signs = class_signs(database.taxonomy)
         ranges = database.taxonomy.ranges(database.spec.radius)
         # A class that half of the cells see tells most, seen or not.
@@ -232,8 +259,13 @@ class Workbench:
         """Return the answer to a question, and all that the page draws of it."""
         start = time.perf_counter()
         question, location = self._located(told)
-        drawing = answer_drawing(location, question, index=self._locator(question).index)
-        options = self.options.get(self._noise(question), [str(self.city.path)])
+        table = self._locator(question).index.table
+        drawing = answer_drawing(
+            location, question, table=table, shares=self._shares, pixels=self._pixels
+        )
+        noise = self._noise(question)
+        options = [*(self.options or [str(self.city.path)])]
+        options += [] if noise == USUAL else ["--noise", noise]
         return drawing | {
             "command": question.command(self.taxonomy, options=options),
             "views": question.rows(self.taxonomy),
@@ -254,7 +286,10 @@ class Workbench:
     def _noise(self, question: Question) -> str:
         """Return the name of the noise model of a question."""
         name = next(iter(self.noises)) if question.noise is None else question.noise
-        if name not in self.noises:
+        return self._known_noise(name)
+
+    def _known_noise(self, name: object) -> str:
+        if not (isinstance(name, str) and name in self.noises):
             hint = nearest_name(str(name), self.noises)
             msg = f"{name!r} is no noise model here; give one of {', '.join(self.noises)}{hint}."
             raise UnknownNameError(msg)
@@ -332,7 +367,7 @@ class Workbench:
         look: dict[str, Any] = {"sectors": None}
         if (fov := told.get("fov")) is not None:
             heading = number(told.get("heading") or 0.0, "a heading", most=FULL_TURN)
-            photo = type(sight.photo).looking(
+            photo = Photo.looking(
                 heading=heading, fov=number(fov, "a field of view", most=FULL_TURN)
             )
             sight = replace(sight, photo=photo)
@@ -340,24 +375,15 @@ class Workbench:
         noise = told.get("noise")
         chain = []
         if noise is not None:
-            if noise not in self.noises:
-                msg = f"{noise!r} is no noise model here; give one of {', '.join(self.noises)}."
-                raise UnknownNameError(msg)
-            chain.append(FailingDetector(noise=self.noises[noise]))
+            chain.append(FailingDetector(noise=self.noises[self._known_noise(noise)]))
         seed = told.get("seed", 0)
         if not isinstance(seed, int) or not 0 <= seed <= 10**18:
             msg = f"a seed was given as {seed!r}; give a whole number from 0 to 10**18."
             raise InputError(msg)
         seen = ready_chain(chain, CitySights.of(database))(sight, seed, 0)
-        names = {item.code: item.name for item in database.taxonomy.classes}
         return {
             "view": {
-                "compass": [
-                    {"class": names[code], "bearing": round(bearing, 2) % FULL_TURN, "range": None}
-                    for code, bearing in zip(
-                        seen.codes.tolist(), seen.bearings.tolist(), strict=True
-                    )
-                ],
+                "compass": self._compass(seen),
                 "heading_error": None,
                 "step": None,
                 **look,
@@ -367,7 +393,15 @@ class Workbench:
             "truth": {"place": [lat, lon]},
         }
 
-    def _sight(self, place: np.ndarray[Any, np.dtype[np.float64]], cell: int) -> Sight:
+    def _compass(self, seen: Sight) -> list[dict[str, Any]]:
+        """Return what is seen as the page composes it."""
+        names = {item.code: item.name for item in self.taxonomy.classes}
+        return [
+            {"class": names[code], "bearing": round(bearing, 2) % FULL_TURN, "range": None}
+            for code, bearing in zip(seen.codes.tolist(), seen.bearings.tolist(), strict=True)
+        ]
+
+    def _sight(self, place: NDArray[np.float64], cell: int) -> Sight:
         """Return what is seen from a place, or from the middle of its cell."""
         if self.store is None:
             return Sight.of_cell(self.database, cell)

@@ -3,16 +3,21 @@ from __future__ import annotations
 import json
 import re
 import socket
-from typing import TYPE_CHECKING
+import threading
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from sentences import refused
+from workbench import serving
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.serve import server
 
 if TYPE_CHECKING:
+    from starlette.requests import Request
     from workbench import Page
+
+    from semsig_gis.serve.workbench import Workbench
 
 
 @pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])
@@ -115,3 +120,38 @@ def test_a_body_that_is_too_long_is_not_read(page: Page, told: bool) -> None:  #
 def test_a_port_that_another_program_has_is_told() -> None:
     with server.listening(0) as taken, refused(InputError, "--port"):
         server.listening(taken.getsockname()[1])
+
+
+def test_a_newer_question_makes_waiting_ones_obsolete(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, go_on, answered = threading.Event(), threading.Event(), list[int]()
+    arrived, read = threading.Semaphore(0), server._json
+
+    class Slow:
+        def answer(self, told: dict[str, int]) -> dict[str, int]:
+            answered.append(told["number"])
+            begun.set()
+            assert go_on.wait(30)
+            return told
+
+    async def reading(request: Request) -> Any:  # noqa: ANN401 - any JSON
+        told = await read(request)
+        arrived.release()
+        return told
+
+    monkeypatch.setattr(server, "_json", reading)
+    codes: dict[int, int] = {}
+
+    def ask(number: int) -> None:
+        codes[number] = page.send("/api/answer", json.dumps({"number": number}).encode())[0]
+
+    with serving(cast("Workbench", Slow())) as page:
+        threads = [threading.Thread(target=ask, args=[number]) for number in range(4)]
+        for number, thread in enumerate(threads):
+            thread.start()
+            assert arrived.acquire(timeout=30)
+            assert number or begun.wait(30)
+        go_on.set()
+        for thread in threads:
+            thread.join()
+    assert codes == {0: 200, 1: 409, 2: 409, 3: 200}
+    assert answered == [0, 3]

@@ -1,0 +1,417 @@
+from __future__ import annotations
+
+import io
+import json
+import math
+import shlex
+import struct
+import sys
+import zlib
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import pytest
+from PIL import Image
+from PIL.ExifTags import GPS, IFD, Base
+from pyproj import Transformer
+from sentences import refused
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.view import View
+from semsig_gis.database.views import views_at
+from semsig_gis.queries.detections.camera import Camera
+from semsig_gis.serve.question import Question
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from workbench import Page
+
+    from semsig_gis.serve.workbench import Workbench
+
+    Done = Callable[..., str]
+
+WIDTH, HEIGHT, FOV = 4000, 3000, 100.0
+SIDE: dict[str, Any] = {
+    "name": "a.jpg",
+    "sha256": "0",
+    "width": WIDTH,
+    "height": HEIGHT,
+    "projection": "pinhole",
+}
+
+
+def longest(bench: Workbench) -> int:
+    return int(bench.database.lengths.argmax())
+
+
+def latlon(bench: Workbench, cell: int) -> list[float]:
+    to_degrees = Transformer.from_crs(bench.database.crs, "EPSG:4326", always_xy=True)
+    lon, lat = to_degrees.transform(*bench.database.xy[cell])
+    return [lat, lon]
+
+
+def photo(bench: Workbench, cell: int, middle: float, **known: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return a photo that was taken in the middle of a cell, with all that it shows marked."""
+    assert bench.store is not None
+    spec, place = bench.database.spec, bench.database.xy[cell : cell + 1]
+    seen = views_at(bench.store.objects, place, index=bench.store.index, radius=spec.radius)
+    camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
+    angles = np.radians(seen.bearings - middle)
+    pixels = camera.pixels(np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1))
+    names = {item.code: item.name for item in bench.taxonomy.classes}
+    marks = [
+        {"x": x, "y": y, "class": names[code], "range": round(metres, 1)}
+        for (x, y), code, metres in zip(
+            pixels.tolist(), seen.codes.tolist(), seen.distances.tolist(), strict=True
+        )
+        if 0 <= x <= WIDTH
+    ]
+    return {**SIDE, "fov": FOV, "heading": middle, "heading_error": None, "marks": marks, **known}
+
+
+def test_the_page_is_told_of_the_city(page: Page) -> None:
+    city, database = page.ask("/api/city"), page.bench.database
+    assert (city["name"], city["cells"], city["radius"]) == ("town", len(database), 30.0)
+    assert city["noise"][0] == "generic"
+    assert set(city["noise"]) == {"generic", "light", "medium", "strong"}
+    assert any(line.startswith("Town") for line in city["licences"])
+    assert city["image"]["url"].startswith("data:image/png;base64,")
+    codes = [item["code"] for item in city["classes"]]
+    assert sorted(codes) == database.present_codes.tolist()
+    off = [abs(item["share"] - 0.5) for item in city["classes"]]
+    assert off == sorted(off)  # what tells most first
+
+
+def picture(form: str = "JPEG", **told: dict[int, Any]) -> bytes:
+    exif = Image.Exif()
+    exif.update(told.get("image", {}))
+    exif.get_ifd(IFD.Exif).update(told.get("exif", {}))
+    exif.get_ifd(IFD.GPSInfo).update(told.get("gps", {}))
+    content = io.BytesIO()
+    Image.new("RGB", (400, 300)).save(content, form, exif=exif)
+    return content.getvalue()
+
+
+def test_a_photo_tells_of_its_camera(page: Page) -> None:
+    content = picture(
+        image={Base.Orientation: 6},
+        exif={Base.FocalLengthIn35mmFilm: 26},
+        gps={
+            GPS.GPSImgDirection: 90.0,
+            GPS.GPSImgDirectionRef: "T",
+            GPS.GPSLatitude: (48.0, 30.0, 0.0),
+            GPS.GPSLatitudeRef: "N",
+            GPS.GPSLongitude: (3.0, 0.0, 0.0),
+            GPS.GPSLongitudeRef: "E",
+        },
+    )
+    code, _, answer = page.send("/api/photo?name=a%20%3Cb%3E.jpg", content)
+    told = json.loads(answer)
+    assert (code, told["name"], told["width"], told["height"]) == (200, "a <b>.jpg", 300, 400)
+    assert told["place"] == [48.5, 3.0]
+    assert 50 < told["fov"] < 56
+    assert abs(told["heading"] - 90.0) < 3.0  # of grid north
+    assert (told["heading_error"], len(told["sha256"])) == (10.0, 64)
+
+
+def test_a_panorama_is_known_by_its_form(page: Page) -> None:
+    content = io.BytesIO()
+    Image.new("L", (400, 200)).save(content, "PNG")
+    told = json.loads(page.send("/api/photo?name=p.png", content.getvalue())[2])
+    assert (told["projection"], told["fov"], told["heading"]) == ("equirectangular", 360.0, None)
+    assert len(told["notes"]) == 1
+
+
+def bomb() -> bytes:
+    """Return a PNG that says to be 30,000 pixels wide and high."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        check = struct.pack(">I", zlib.crc32(kind + body))
+        return struct.pack(">I", len(body)) + kind + body + check
+
+    header = struct.pack(">IIBBBBB", 30_000, 30_000, 8, 0, 0, 0, 0)
+    data = zlib.compress(bytes(1_000_000))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        (b"just a text", "no picture"),
+        (b"", "no picture"),
+        (b"<svg xmlns='http://www.w3.org/2000/svg'><script>alert(1)</script></svg>", "no picture"),
+        (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic" + bytes(100), "HEIC"),
+        (bomb(), "pixels"),
+        (picture()[:-400], "no picture"),
+        (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n", "no picture"),
+    ],
+    ids=["text", "nothing", "svg", "heic", "bomb", "cut", "postscript"],
+)
+def test_what_is_no_picture_gets_one_sentence(page: Page, content: bytes, word: str) -> None:
+    code, text = page.refused("/api/photo?name=x.jpg", content)
+    assert (code, word in text, "x.jpg" in text) == (422, True, True)
+
+
+@pytest.mark.parametrize("heading", [None, 80.0])
+def test_marks_of_photos_give_the_place(page: Page, heading: float | None) -> None:
+    cell = longest(page.bench)
+    views: list[dict[str, Any]] = [
+        {"photos": [photo(page.bench, cell, 80.0, heading=heading)]},
+        {"photos": [photo(page.bench, cell, 200.0, name="b.jpg")], "step": None},
+    ]
+    asked = {"views": views, "truth": latlon(page.bench, cell), "noise": "light", "top": 3}
+    told = page.ask("/api/answer", asked)
+    assert told["given"]
+    assert told["truth"]["found"]
+    assert told["truth"]["metres"] < 10
+    assert told["truth"]["rank"] <= 3
+    assert math.isclose(told["places_left"], 2 ** told["entropy"])
+    assert list(told["region"]["counts"]) == ["0.99", "0.9", "0.5"]
+    first, *others = told["candidates"]
+    assert len(others) == 2
+    assert first["place"] == pytest.approx(asked["truth"], abs=1e-4)
+    # Every mark has one ray, which says as what it was marked.
+    rays = {tuple(ray["mark"]): ray for ray in first["rays"] if ray["mark"] is not None}
+    marks = {
+        (view, 0, number): mark["class"]
+        for view, one in enumerate(views)
+        for number, mark in enumerate(one["photos"][0]["marks"])
+    }
+    assert {key: ray["seen_class"] for key, ray in rays.items()} == marks
+    assert {ray["verdict"] for ray in rays.values()} == {"matched"}
+    assert first["for_against"]
+    weights = [abs(reason["weight"]) for reason in first["for_against"]]
+    assert weights == sorted(weights, reverse=True)
+
+
+def asked_in_several_ways(bench: Workbench) -> dict[str, dict[str, Any]]:
+    cell = longest(bench)
+    one = photo(bench, cell, 80.0)
+    vague = {**one, "marks": [{**mark, "range": "near"} for mark in one["marks"]]}
+    step = {"bearing": 90.0, "metres": 10.0}
+    compass = [{"class": "street_light", "bearing": at, "range": None} for at in (10, 200)]
+    return {
+        "photo": {"views": [{"photos": [one]}]},
+        "heading unknown": {"views": [{"photos": [{**one, "heading": None}]}], "noise": "light"},
+        "rough": {"views": [{"photos": [vague]}], "top": 5},
+        "two photos": {"views": [{"photos": [one, photo(bench, cell, 200.0)]}]},
+        "compass": {"views": [{"compass": compass, "heading_error": 10}], "seen_from": "cells"},
+        "route": {
+            "views": [{"photos": [one]}, {"photos": [photo(bench, cell, 90.0)], "step": step}]
+        },
+    }
+
+
+@pytest.mark.parametrize(
+    "way", ["photo", "heading unknown", "rough", "two photos", "compass", "route"]
+)
+def test_the_command_line_gives_the_same_answer(
+    page: Page, way: str, done: Done, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = page.ask("/api/answer", asked_in_several_ways(page.bench)[way])
+    before, _, command = told["command"].rpartition(" | ")
+    lines = shlex.split(before)[2:]  # printf, and how each is printed
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
+    _, *words = shlex.split(command)
+    out = done("", *words, *([] if lines else ["--json"]))
+    result = json.loads(out.splitlines()[-1] if lines else out)
+    listed = [(row["cell_id"], row["chance"]) for row in result["candidates"]]
+    shown = [(row["cell"], row["chance"]) for row in told["candidates"]]
+    assert listed == [(cell, pytest.approx(chance)) for cell, chance in shown]
+    place = [result["place"]["lat"], result["place"]["lon"]]
+    assert told["estimate"]["place"] == pytest.approx(place, abs=1e-6)
+
+
+def test_a_box_of_known_height_tells_a_range(page: Page) -> None:
+    camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
+    tall = next(item for item in page.bench.taxonomy.classes if item.name == "street_light")
+    assert tall.height_m is not None
+    pixels = camera.focal * tall.height_m / 15.0
+    box = [1900, 2500, 2100, 2500 - pixels]  # drawn from below
+    one = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [{"box": box, "class": tall.name}]}
+    (view,) = page.ask("/api/answer", {"views": [{"photos": [one]}]})["views"]
+    assert view["ranges"] == [pytest.approx(15.0, rel=0.01)]
+    # Unless the range is told, or the class is not known.
+    for more in ({"range": 20.0}, {"class": "?"}):
+        told = {**one, "marks": [{**one["marks"][0], **more}]}
+        (view,) = page.ask("/api/answer", {"views": [{"photos": [told]}]})["views"]
+        assert view.get("ranges") == ([20.0] if "range" in more else None)
+
+
+def test_marks_keep_their_numbers_when_views_sort_them(bench: Workbench) -> None:
+    rng = np.random.default_rng(3)
+    photos: list[dict[str, Any]] = []
+    for number, heading in enumerate((300.0, 20.0, None)):
+        marks = [{"x": float(x), "y": 10, "class": "?"} for x in rng.uniform(0, WIDTH, 6)]
+        photos.append({**SIDE, "name": str(number), "fov": FOV, "heading": heading, "marks": marks})
+    # Two marks on one bearing.
+    photos[0]["marks"].append(dict(photos[0]["marks"][2]))
+    question = Question.parse({"views": [{"photos": photos}]}, taxonomy=bench.taxonomy, radius=30.0)
+    (view,), (numbers,) = question.views, question.marks
+    assert isinstance(view, View)
+    assert sorted(numbers) == [(0, n, m) for n in range(3) for m in range(len(photos[n]["marks"]))]
+    camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
+    assert view.bearings is not None
+    for bearing, (_, row, mark) in zip(view.bearings.tolist(), numbers, strict=True):
+        x = photos[row]["marks"][mark]["x"]
+        away = math.degrees(math.atan((x - WIDTH / 2) / camera.focal))
+        expected = ((photos[row]["heading"] or 0.0) + away) % 360
+        assert bearing == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"views": []}, "nothing is marked"),
+        ({"views": [{"photos": []}]}, "nothing is marked"),
+        ({"views": [{"compass": []}]}, "nothing is marked"),
+        ({"views": 3}, "views"),
+        ({"views": [3]}, "mapping"),
+        ({"views": [{"photos": [{"marks": [{}]}]}]}, "width"),
+        ({"view": 7}, "view"),
+        ({"top": 0}, "top"),
+        ({"top": True}, "top"),
+        ({"seen_from": "space"}, "space"),
+        ({"noise": "loud"}, "loud"),
+        ({"noise": []}, "noise model"),
+        ({"truth": [1]}, "place"),
+        ({"truth": [100, 3]}, "latitude"),
+        ({"fov": 300}, "field of view"),
+        ({"fov": None}, "field of view"),
+        ({"projection": "flat"}, "flat"),
+        ({"heading": "north"}, "heading"),
+        ({"heading_error": "huge"}, "heading_error"),
+        ({"mark": {"class": "unicorn"}}, "unicorn"),
+        ({"mark": {"class": 3}}, "class"),
+        ({"mark": {"x": None}}, "mark"),
+        ({"mark": {"box": [1, 2]}}, "box"),
+        ({"mark": {"range": "afar"}}, "afar"),
+    ],
+)
+def test_a_question_that_cannot_be_answered_gets_one_sentence(
+    page: Page, change: dict[str, Any], word: str
+) -> None:
+    mark = {"x": 10, "y": 10, "class": "street_light"} | change.get("mark", {})
+    inner = {
+        key: value
+        for key, value in change.items()
+        if key in SIDE or key.startswith(("fov", "head"))
+    }
+    one = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [mark], **inner}
+    outer = {key: value for key, value in change.items() if key not in {"mark", *inner}}
+    code, text = page.refused("/api/answer", {"views": [{"photos": [one]}], **outer})
+    assert (code, word in text) == (422, True), text
+
+
+def test_boxes_of_a_detector_become_marks(page: Page) -> None:
+    document = {
+        "images": [{"id": 1, "file_name": "a.jpg", "width": WIDTH, "height": HEIGHT}],
+        "categories": [{"id": 1, "name": "bench"}, {"id": 2, "name": "dog"}],
+        "annotations": [
+            {"image_id": 1, "category_id": 1, "bbox": [1900, 1500, 200, 100], "score": 0.9},
+            {"image_id": 1, "category_id": 2, "bbox": [100, 100, 50, 50], "score": 0.9},
+            {"image_id": 1, "category_id": 1, "bbox": [100, 100, 50, 50], "score": 0.1},
+        ],
+    }
+    asked = {
+        "text": json.dumps(document),
+        "name": "../../boxes.json",
+        "photos": [{**SIDE, "fov": FOV, "heading": 90.0}],
+    }
+    told = page.ask("/api/boxes", asked)
+    (mark,) = told["photos"]["a.jpg"]
+    assert (mark["box"], mark["score"]) == ([1900, 1500, 2100, 1600], 0.9)
+    assert mark["class"] == "bench"
+    assert mark["bearing"] == pytest.approx(90.0, abs=0.1)
+    assert mark["range"] > 0
+    assert len(told["notes"]) == 2
+    for change, word in (
+        ({"text": "{"}, "boxes.json"),
+        ({"text": ""}, "boxes.json"),
+        ({"name": "boxes.exe"}, "format"),
+        ({"labels": ["nowhere"]}, "nowhere"),
+        ({"photos": [{**SIDE, "name": "z.jpg", "fov": FOV}]}, "a.jpg"),
+        ({"photos": [SIDE]}, "field of view"),
+    ):
+        code, text = page.refused("/api/boxes", asked | change)
+        assert (code, word in text, "/tmp" in text) == (422, True, False), text  # noqa: S108
+
+
+def test_what_to_look_for_next_is_a_question(page: Page) -> None:
+    compass = [{"class": "street_light", "bearing": at, "range": None} for at in (10, 200)]
+    told = page.ask("/api/suggest", {"views": [{"compass": compass}]})
+    gains = [one["gain"] for one in told]
+    assert gains == sorted(gains, reverse=True)
+    assert 0 < gains[0] <= 1
+    by_name = {one["class"]: one["question"] for one in told}
+    assert by_name["street_light"] == "Is there another street light within 30 m?"
+    assert by_name["indicator"] == "Is there an indicator within 30 m?"
+    assert len(by_name) == len(page.bench.database.present_codes)
+
+
+@pytest.mark.parametrize("fov", [None, 120.0])
+def test_a_view_is_simulated_and_found(page: Page, fov: float | None) -> None:
+    cell = longest(page.bench)
+    place = latlon(page.bench, cell)
+    asked = {"place": place, "fov": fov, "heading": 350.0, "noise": None, "seed": 1}
+    told = page.ask("/api/simulate", asked)
+    assert told == page.ask("/api/simulate", asked)
+    assert told["cell"] == page.bench.database.cell_ids[cell]
+    if fov is None:
+        assert len(told["view"]["compass"]) == told["objects"]
+    else:
+        assert told["view"]["sectors"] == [[290.0, 50.0]]
+        assert 0 < len(told["view"]["compass"]) < told["objects"]
+    answer = page.ask("/api/answer", {"views": [told["view"]], "truth": told["truth"]["place"]})
+    assert answer["truth"]["found"] == (answer["truth"]["metres"] <= answer["radius"])
+    assert answer["truth"]["rank"] >= 1
+    spoiled = page.ask("/api/simulate", asked | {"noise": "strong"})
+    assert spoiled["view"]["compass"] != told["view"]["compass"]
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"place": [0.0, 0.0]}, "no cell"),
+        ({"place": "here"}, "place"),
+        ({"noise": "loud"}, "loud"),
+        ({"seed": -1}, "seed"),
+        ({"fov": 0}, "field of view"),
+        ({"heading": 1e9, "fov": 90}, "heading"),
+    ],
+)
+def test_what_cannot_be_simulated_gets_one_sentence(
+    page: Page, change: dict[str, Any], word: str
+) -> None:
+    asked = {"place": latlon(page.bench, longest(page.bench)), **change}
+    code, text = page.refused("/api/simulate", asked)
+    assert (code, word in text) == (422, True), text
+
+
+@pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml"])
+def test_the_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None:
+    cell = longest(page.bench)
+    asked = {"views": [{"photos": [photo(page.bench, cell, 80.0)]}]}
+    code, headers, content = page.send(f"/api/export?format={suffix}", json.dumps(asked).encode())
+    assert code == 200
+    assert headers["content-disposition"] == f'attachment; filename="answer.{suffix}"'
+    file = tmp_path / f"answer.{suffix}"
+    file.write_bytes(content)
+    layers = {"gpkg": ["regions", "candidates"]}.get(suffix, [None])
+    tables = [gpd.read_file(file, layer=layer).to_crs("EPSG:4326") for layer in layers]
+    kinds = {kind for table in tables for kind in table.geom_type}
+    assert kinds == {"Polygon", "Point"}
+    if suffix != "gpkg":
+        assert tables[0]["Name"].tolist()[0] == "region 1"
+    lat, lon = latlon(page.bench, cell)
+    bounds = np.array([table.total_bounds for table in tables])
+    assert (bounds[:, :2].min(axis=0) <= (lon, lat)).all()
+    assert (bounds[:, 2:].max(axis=0) >= (lon, lat)).all()
+
+
+def test_a_question_is_read_without_a_server(bench: Workbench) -> None:
+    with refused(InputError, "list"):
+        Question.parse({"views": [{"photos": 1}]}, taxonomy=bench.taxonomy, radius=30.0)
