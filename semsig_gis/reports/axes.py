@@ -414,7 +414,7 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     verdict = "The answer" if location.answer.given else "Cannot tell; the best guess"
     chance = f"{100 * location.answer.mass:.1f} %"
-    axes.set_title(f"{verdict}: within {location.rule.radius:g} m with a chance of {chance}")
+    axes.set_title(f"{verdict}\nwithin {location.rule.radius:g} m with a chance of {chance}")
     _frame(axes)
     return axes
 

@@ -177,6 +177,13 @@ def test_only_what_draws_itself_asks_for_public_names() -> None:
                 assert not public & {one.name for one in node.names}, path
 
 
+def test_results_load_no_pictures_before_they_are_drawn() -> None:
+    modules = ("database.database", "objects.table", "likelihood.locate", "evaluation.result")
+    lines = [*(f"import semsig_gis.{module}" for module in modules), "import sys"]
+    lines += ["sys.exit(bool({'matplotlib', 'folium'} & sys.modules.keys()))"]
+    assert subprocess.run([sys.executable, "-c", "; ".join(lines)], check=False).returncode == 0
+
+
 def test_no_test_reaches_the_network() -> None:
     refused = pytest.raises(RuntimeError, match=r"tried to reach \('192\.0\.2\.1', 80\)")
     with socket.socket() as outward, refused:
