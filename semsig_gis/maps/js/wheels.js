@@ -215,7 +215,7 @@ semsig.scenes = (first, others, signs, kind) => {
       drawn = shown.map(([, [types, bearings, look = {}]], side) => bearings.map((angle, one) => {
         if (!look.place || !map.semsigArea) return null;
         const known = look.metres?.[one] ?? null;
-        const end = semsig.away(
+        const end = semsig.offset(
           map, look.place, angle + (look.turn ?? 0), known ?? look.reach);
         const sign = types && (signs.classes?.[types[one]] || semsig.anySign);
         const icon = known === null || !sign ? null : semsig.svg(
@@ -244,7 +244,7 @@ semsig.scenes = (first, others, signs, kind) => {
   return box;
 };
 // A place so many metres from another, by a bearing from grid north.
-semsig.away = (map, place, bearing, metres) => {
+semsig.offset = (map, place, bearing, metres) => {
   const area = map.semsigArea;
   const [x, y] = semsig.xy(area, place);
   const angle = bearing * Math.PI / 180;

@@ -173,6 +173,8 @@ semsig.Answer = class {
     const view = session.answer?.views?.[at];
     if (!view || !candidate) return;
     const {reach} = session.city;
+    const signs = {
+      classes: Object.fromEntries(session.city.classes.map((one) => [one.symbol, one]))};
     const whole = (metres) => (metres === null ? null : Math.round(metres));
     const photos = view.photos || [view];
     const marked = session.views[at].photos?.filter((one) => one.marks.length);
@@ -184,13 +186,13 @@ semsig.Answer = class {
       const turned = (degrees) => (degrees + turn + 720) % 360;
       const sectors = (photos[own].sectors || []).map(([from, to]) => [
         turned(from), turned(from) + ((to - from + 360) % 360 || 360)]);
-      box.append(semsig.wheel(9, "Marked", rows.map((row) => view.types[row]).join(""),
+      box.append(semsig.wheel("Marked", [rows.map((row) => view.types[row]).join(""),
         rows.map((row) => Math.round(turned(view.bearings[row])) % 360),
-        {reach, sectors, metres: rows.map((row) => whole(view.ranges?.[row] ?? null))}));
+        {reach, sectors, metres: rows.map((row) => whole(view.ranges?.[row] ?? null))}], signs));
     }
     const [types, bearings, metres] = candidate.signature;
-    box.append(semsig.wheel(9, `At candidate ${candidate.rank}`, types,
+    box.append(semsig.wheel(`At candidate ${candidate.rank}`, [types,
       bearings.map((degrees) => Math.round(degrees) % 360),
-      {reach, metres: metres ? metres.map(whole) : null}));
+      {reach, metres: metres ? metres.map(whole) : null}], signs));
   }
 };
