@@ -124,7 +124,8 @@ def export_database(
     or ``failed``.
 
     Raster ``field``: what became of the queries around every place, in three bands: ``failed`` (the
-    share that failed), ``error`` (their mean error in metres) and ``queries`` (how many speak).
+    share that failed), ``error`` (their mean error in metres) and ``queries`` (how many speak). A
+    file beside it that ends in ``.qml`` has QGIS draw it as on the map.
 
     Examples
     --------
@@ -144,7 +145,7 @@ def export_database(
         "identifiability": identifiability,
         "evaluation": evaluation,
         "geometry": geometry,
-        "smooth": smooth,
+        "smoothing": smooth,
     }
     names = _content(
         path,
@@ -225,7 +226,7 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     # Identifiability is part of a database, wherever it is not asked for.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
     used |= {"geometry"} if "cells" in content else set()
-    used |= {"smooth"} if "field" in content else set()
+    used |= {"smoothing"} if "field" in content else set()
     unused = sorted(given - used)
     if unused:
         msg = (

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from pyarrow import csv
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GEOMETRY
-from semsig_gis.exports.layers import GEOMETRY_TYPES
+from semsig_gis.exports.layers import GEOMETRY_TYPES, by_failures
 from semsig_gis.storage.geoparquet import (
     BBOX,
     COVERING,
@@ -33,7 +34,6 @@ from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
 
     import geopandas as gpd
     from numpy.typing import ArrayLike, NDArray
@@ -219,7 +219,8 @@ def export_field(field: ErrorField, database: SignatureDatabase, path: str | Pat
     """Write an error field as a GeoTIFF of three bands; NaN where no query is near.
 
     ``failed`` is the share of the queries around a pixel that failed, ``error`` their mean error in
-    metres, and ``queries`` how many speak; the radius is in the tags.
+    metres, and ``queries`` how many speak; the radius is in the tags. A file beside it, ``.qml``,
+    has QGIS draw it as on the map.
     """
     columns, rows = np.nonzero(np.isfinite(field.failed.T))
     unit = {"failed": "", "error": "m", "queries": "queries"}
@@ -233,6 +234,8 @@ def export_field(field: ErrorField, database: SignatureDatabase, path: str | Pat
         crs=database.crs,
         notes=_notes(database, {"radius_m": field.radius}),
     )
+    with whole_file(Path(path).with_suffix(".qml")) as partial:
+        partial.write_text(by_failures(), encoding="utf-8")
 
 
 def cell_errors(evaluation: Evaluation, database: SignatureDatabase) -> NDArray[np.float64]:

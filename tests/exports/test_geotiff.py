@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import subprocess
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,14 +17,13 @@ from small_city import chances_of, small_city, small_evaluation, small_location
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.signs import FAILURES
 from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.files import cell_errors, export_geotiff
 from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from semsig_gis.database.database import SignatureDatabase
 
 
@@ -93,11 +94,33 @@ def test_the_field_of_a_map(radius: float | None, tmp_path: Path) -> None:
     assert np.isfinite(whole).sum() == np.isfinite(field.failed).sum()
 
 
+def test_qgis_draws_the_field_as_the_map_does(
+    qgis_python: str, qgis_environment: dict[str, str], tmp_path: Path
+) -> None:
+    database, evaluation, file = small_city()[0], small_evaluation("medium"), tmp_path / "field.tif"
+    export_database(database, file, layers="field", evaluation=evaluation, smooth=60.0)
+    program = Path(__file__).parents[1] / "qgis_pixels.py"
+    said = subprocess.run(
+        [qgis_python, program, file],
+        check=True, capture_output=True, timeout=120, env=qgis_environment,
+    )  # fmt: skip
+    told = json.loads(said.stdout)
+    assert told["labels"][:2] == ["failed: 0% to 10%", "failed: 10% to 25%"]
+    assert told["colours"] == list(FAILURES.values())
+    with rasterio.open(file) as read:
+        failed = read.read(1)
+    levels = np.digitize(failed, list(FAILURES)) - 1
+    sure = np.isfinite(failed) & ~np.isin(failed, list(FAILURES))  # a border is of either class
+    drawn = np.array(told["pixels"])
+    assert (drawn[sure] == np.array(told["colours"])[levels[sure]]).all()
+    assert (drawn[np.isnan(failed)] == None).all()  # noqa: E711 - element by element
+
+
 def test_what_is_not_of_the_field_is_refused(tmp_path: Path) -> None:
     database, _ = small_city()
     with refused(InputError, "no evaluation"):
         export_database(database, tmp_path / "a.tif", layers="field")
-    with refused(InputError, "no smooth"):
+    with refused(InputError, "no smoothing"):
         export_database(database, tmp_path / "a.tif", smooth=250.0)
 
 
