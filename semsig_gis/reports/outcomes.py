@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 MOST_SQUARES = 400  # along a side
 MANY_PLACES = 2000  # which are drawn as pixels
 # Inches.
-WIDTH, MARGIN = 6.2, 0.1
-LEAST_HEIGHT, MOST_HEIGHT = 2.4, 4.0
-TITLE_LETTERS, TITLE_LINE, LEGEND = 70, 0.22, 0.34
+WIDTH, MARGIN = 5.0, 0.1
+LEAST_HEIGHT, MOST_HEIGHT = 2.0, 3.4
+TITLE_LETTERS, TITLE_LINE, LEGEND = 55, 0.22, 0.34
 
 
 def outcome_map(
@@ -94,7 +94,7 @@ def draw_map(shown: OutcomeMap) -> Picture:
 
 def _look(mark: Mark, places: int) -> dict[str, Any]:
     marker, share = MARKERS[mark.shape]
-    size = 6.0 if places <= MANY_PLACES / 4 else 4.0 if places <= MANY_PLACES else 3.0
+    size = 5.0 if places <= MANY_PLACES / 4 else 3.5 if places <= MANY_PLACES else 2.5
     return {
         "linestyle": "",
         "marker": marker,

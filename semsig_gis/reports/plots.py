@@ -178,19 +178,21 @@ DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
 MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
 BAND_SHADE, MANY_BANDS = 0.16, 4
 FEW_POINTS = 12
-FEW_TICKS, MANY_TICKS = 6, 12
+FEW_TICKS, MANY_TICKS = 6, 9
+# Of a logarithmic axis, in every decade: as many as there is room for.
+STEPS = ((1, 2, 5), (1, 5), (1,))
 RIGHT_END = 0.9  # share of the width
 MARKERS_APART = 0.14  # share of the diagonal
-# Inches.
-WIDTH = 6.2
-LEFT, RIGHT = 0.72, 0.2
-AXES_HEIGHT = 3.3
+# Inches: so small that letters can be read where a page is as wide as a phone.
+WIDTH = 5.0
+LEFT, RIGHT = 0.66, 0.2
+AXES_HEIGHT = 2.8
 TITLE_LINE, LEGEND_LINE = 0.22, 0.2
 BELOW_AXES = 0.52
-TITLE_LETTERS = 70
+TITLE_LETTERS = 55
 # How many columns a legend has by the letters of its longest label.
-COLUMNS = ((9, 4), (16, 3), (30, 2))
-LONGEST_LABEL = 64
+COLUMNS = ((9, 4), (14, 3), (25, 2))
+LONGEST_LABEL = 54
 
 
 def draw_plot(plot: Plot) -> Picture:
@@ -249,7 +251,7 @@ def draw_frame(axes: Axes, plot: Plot) -> None:
     low, high = plot.y_range
     margin = 0.02 * (high - low) or 0.5
     axes.set_ylim(low - margin, high + margin)
-    axes.set_xlabel(label(plot.x_label, 70))
+    axes.set_xlabel(label(plot.x_label, 60))
     axes.set_ylabel(label(plot.y_label, 40))
     axes.grid(visible=True)
     axes.set_axisbelow(True)
@@ -274,11 +276,11 @@ def _draw_log_axis(axes: Axes, values: Sequence[float]) -> None:
     else:
         axes.set_xscale("log")
     decades = range(math.floor(math.log10(least)), math.ceil(math.log10(most)) + 1)
-    ticks = [step * 10.0**power for power in decades for step in (1, 2, 5)]
-    ticks = [tick for tick in ticks if least * 0.999 <= tick <= most * 1.001]
-    if len(ticks) > MANY_TICKS:
-        ticks = [tick for tick in ticks if round(math.log10(tick), 9).is_integer()]
-    ticks = [*([0.0] if with_zero else []), *ticks]
+    for steps in STEPS:
+        some = [step * 10.0**power for power in decades for step in steps]
+        ticks = [0.0] * with_zero + [one for one in some if least <= 1.001 * one <= 1.002 * most]
+        if len(ticks) < MANY_TICKS:
+            break
     axes.set_xticks(ticks, [f"{tick:,g}" for tick in ticks])
     axes.set_xticks([], minor=True)
     margin = max((most / least) ** 0.015, 1.05)
