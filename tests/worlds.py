@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import numpy as np
@@ -202,7 +202,7 @@ def lamps() -> StreetObjects:
     return random_town(5, side=100.0, codes=CODES[:1]).street_objects
 
 
-def surroundings(*shapes: shapely.Geometry, **columns: list[float]) -> gpd.GeoDataFrame:
+def surroundings(*shapes: shapely.Geometry, **columns: list[Any]) -> gpd.GeoDataFrame:
     # In degrees, so that they have to be moved.
     return gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:2154").to_crs("EPSG:4326")
 

@@ -118,6 +118,13 @@ def map_(
             "such as OpenStreetMap.Mapnik."
         ),
     ] = None,
+    title: Annotated[
+        str | None,
+        typer.Option(
+            help="Write a title on the map, such as the city and the date of its data; default: "
+            "the name of the database's file."
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
     """Draw an evaluation, cells, changes and street objects on one map."""
@@ -174,6 +181,6 @@ def map_(
                 seen, database=opened if drawn is None else None, **_below(drawn, tiles)
             )
         draw_ground(drawn, city, buildings=buildings, streets=streets)
-        offline = save_map(drawn, out)
+        offline = save_map(drawn, out, title=title or database.stem.replace("_", " ").capitalize())
     say(f"map: {out}")
     tell_if_online(offline, tiles=tiles)

@@ -48,6 +48,7 @@ COUNT = "count"
 MERGED = "merged"
 GEOMETRY = "geometry"
 HALF_WIDTH = "half_width"
+NAME = "name"
 
 NOTES = "notes"
 """Key of the warnings in the metadata of a file."""

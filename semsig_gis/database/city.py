@@ -21,7 +21,7 @@ import pyarrow as pa
 from semsig_gis import __version__
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, crs_label
+from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, NAME, crs_label
 from semsig_gis.database.file import (
     KIND,
     Manifest,
@@ -114,7 +114,7 @@ class ObjectStore(Displayed):
         return cls(
             objects=objects,
             footprints=None if footprints is None else _stored(footprints, objects.crs),
-            streets=None if streets is None else _stored(streets, objects.crs),
+            streets=None if streets is None else _stored(streets, objects.crs, HALF_WIDTH, NAME),
         )
 
     @cached_property
@@ -140,15 +140,15 @@ class ObjectStore(Displayed):
         return Footprints(polygons[near]) if len(near) else None
 
 
-def _stored(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
-    """Return what the building of a database takes of a table, in a CRS."""
+def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
+    """Return the shapes of a table and the columns of these names, in a CRS."""
     import geopandas as gpd  # noqa: PLC0415 - it loads slowly
 
     from semsig_gis.database.build import moved  # noqa: PLC0415 - it loads slowly
 
     geometry = table.geometry
     kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
-    columns = {HALF_WIDTH: kept[HALF_WIDTH].to_numpy(float)} if HALF_WIDTH in kept else {}
+    columns = {name: kept[name].to_numpy() for name in names if name in kept}
     stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=kept.crs)
     stored.attrs[LICENSES] = list(licenses_of(table))
     return stored

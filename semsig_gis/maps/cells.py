@@ -28,10 +28,13 @@ from semsig_gis.maps.parts import (
     colour_cells,
     corners_of,
     finished_map,
+    folded,
     free_name,
     isolated,
     layers_of,
+    made_by,
     panel_signs,
+    part_of,
     prepared_map,
     ramp_bar,
     sources,
@@ -316,22 +319,23 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
         np.bincount(np.digitize(size, starts), minlength=len(starts) + 1)[1:] / len(size)
         for size in sizes.values()
     ]
-    rows = "".join(
-        f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
-        + "".join(f"<td>{share:.1%}</td>" for share in line)
-        + "</tr>"
-        for colour, label, *line in zip(
-            GROUP_COLOURS.values(), group_labels(), *shares, strict=True
+    scales = []
+    for (name, size), line in zip(sizes.items(), shares, strict=True):
+        rows = "".join(
+            f"<tr><td>{swatch(colour, LIFTING)}{label}</td><td class='count'>{share:.1%}</td></tr>"
+            for colour, label, share in zip(
+                GROUP_COLOURS.values(), group_labels(), line, strict=True
+            )
         )
-    )
-    head = "".join(f"<td><small>{escape(name)}</small></td>" for name in sizes)
-    cells = len(next(iter(sizes.values())))
+        scale = (
+            f"<p><b>{line[0]:.1%}</b> of {len(size):,} cells look like no other<br>"
+            f"How many cells have the {escape(name.lower())}</p><table>{rows}</table>"
+        )
+        scales.append(part_of(name, scale))
     return (
-        "<summary>Cells that look the same</summary>"
-        f"<p>{cells:,} cells, by how many look the same</p>"
-        f"<table><tr><td></td>{head}</tr>{rows}</table>"
-        "<p>Click a cell to see its signature, and to go to cells that look the same:<br>"
-        f"{swatch(SAME_TYPES)}same types &ensp;{swatch(SAME_LEVELS)}and angle levels</p>"
+        f"<summary>Cells that look the same</summary>{''.join(scales)}"
+        f"<p>Click a cell for those like it: {swatch(SAME_TYPES)}same types "
+        f"{swatch(SAME_LEVELS)}and angle levels</p>"
         f"{sources(licenses)}"
     )
 
@@ -350,13 +354,18 @@ def identifiability_legend(identifiability: Identifiability) -> str:
         f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
         for item in facts["classes"][:NAMED_CLASSES]
     )
+    scale = (
+        f"<p>Chance to be found{ramp_bar(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
+    )
+    figures = (
+        f"<p>{bands}</p><p>What each class adds to the chance {within}</p><table>{classes}</table>"
+    )
     return (
         "<summary>Where a query can be placed</summary>"
-        f"<p>{facts['cells']:,} cells, {isolated(facts['noise'])} noise</p>"
-        f"<p>Chance that the answer to a {asked} is {within}; {facts['chance_found']:.1%} for the "
-        f"mean cell{ramp_bar(FOUND_RAMP, '0 %', '100 %', sign='ramp semsig-lift')}</p>"
-        f"<p>{bands}</p>"
-        f"<p>What each class adds to the chance {within}</p><table>{classes}</table>"
-        "<p>Click a cell to see what it is taken for.</p>"
-        f"{sources(identifiability.database.licenses)}"
+        f"<p><b>{facts['chance_found']:.1%}</b> chance to answer a {asked} {within}<br>"
+        f"Mean of {facts['cells']:,} cells, "
+        f"{made_by(isolated(facts['noise']) + ' noise')}<br>"
+        "Click a cell to see what it is taken for</p>"
+        f"{part_of('Chance to be found', scale)}"
+        f"{folded('Figures', figures)}{sources(identifiability.database.licenses)}"
     )

@@ -23,7 +23,9 @@ from semsig_gis.maps.parts import (
     colour_cells,
     draw,
     finished_map,
+    folded,
     isolated,
+    part_of,
     prepared_map,
     sources,
     swatch,
@@ -227,11 +229,13 @@ def drift_legend(
         f"<td>{len(kinds[kind][0]):,}</td><td>{len(kinds[kind][0]) / total:.1%}</td></tr>"
         for kind, colour in DRIFT_COLOURS.items()
     )
+    changed = 1.0 - len(cells.same) / total
     return (
         "<summary>What has changed</summary>"
-        f"<p>Cells, of {total:,} before or after</p><table>{lines}</table>"
+        f"<p><b>{changed:.1%}</b> of {total:,} cells see something else<br>"
+        "Click a cell to see what it saw before</p>"
+        f"{part_of('What has changed', f'<table>{lines}</table>')}"
         f"{'' if objects is None else _object_changes(objects, taxonomy)}"
-        "<p>Click a cell to see its signature before and after.</p>"
         f"{sources(licenses)}"
     )
 
@@ -244,8 +248,10 @@ def _object_changes(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
         "moved": objects.moved,
         "of another class": objects.changed,
     }
-    counts = "<br>".join(
-        f"{swatch(OBJECT_COLOURS[kind])}{len(rows):,} {kind}" for kind, rows in kinds.items()
+    counts = "".join(
+        part_of(f"Objects {kind}", f"{swatch(OBJECT_COLOURS[kind])}{len(rows):,} {kind}")
+        for kind, rows in kinds.items()
+        if len(rows)
     )
     changes = {
         item: item.added + item.removed + item.moved + item.gained + item.lost
@@ -259,4 +265,4 @@ def _object_changes(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
     )
     head = "".join(f"<td><small>{name}</small></td>" for name in ("added", "removed", "moved"))
     table = f"<table><tr><td></td>{head}</tr>{rows}</table>" if most else ""
-    return f"<p>Street objects<br>{counts}</p>{table}"
+    return f"<p>Street objects</p>{counts}{folded('By class', table) if table else ''}"

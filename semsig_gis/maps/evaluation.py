@@ -24,10 +24,13 @@ from semsig_gis.maps.parts import (
     corners_of,
     draw,
     finished_map,
+    folded,
     isolated,
+    made_by,
     mark_svg,
     panel_signature,
     panel_signs,
+    part_of,
     prepared_map,
     query_signature,
     ranks_text,
@@ -58,6 +61,7 @@ QUERY_FIELDS = (
     ),
     *("True cell", "Best cell", "Next best cells", "Best cell sees"),
 )
+FIELD_NAME = "Share of queries that fail"
 MANY = 2000  # queries, whose circles are smaller
 KILOMETRE = 1000
 THRESHOLDS = ERROR_BREAKS[:4]  # metres of error that the legend tells of
@@ -124,7 +128,7 @@ def evaluation_map(
     city = add_city(page, database)
     around = Drawing(None, "field", *_field(field, database), group="cells")
     around.add_to(page)
-    colour_cells(page, "Share of queries that fail", city, around)
+    colour_cells(page, FIELD_NAME, city, around)
     outcomes = dict(zip(OUTCOMES, (evaluation.successful, ~evaluation.successful), strict=True))
     pairs = np.stack([places, best_places], axis=1)
     located = np.isfinite(best_places).all(axis=1)
@@ -262,17 +266,24 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
         for threshold, share in zip(THRESHOLDS, evaluation.cdf(THRESHOLDS), strict=True)
     )
     limits = [f"{least:.0%}" for least in FAILURES if least]
-    return (
-        "<summary>Localization errors</summary>"
-        f"<p>{mark_svg(OUTCOMES['successful'])} {successes:,} successful: within "
-        f"{Evaluation.success_metres} m with probability {Evaluation.success_probability:g} or more"
-        f"<br>{mark_svg(OUTCOMES['failed'])} {count - successes:,} failed</p>"
+    within = f"within {Evaluation.success_metres} m"
+    successful = (
+        f"{mark_svg(OUTCOMES['successful'])} {successes:,} successful: {within} with probability "
+        f"{Evaluation.success_probability:g} or more<br>"
+    )
+    failed = f"{mark_svg(OUTCOMES['failed'])} {count - successes:,} failed"
+    field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
         f"{class_bar(list(FAILURES.values()), limits)}"
         f'<i class="hatched"></i>fewer than {ENOUGH:g} queries speak</p>'
-        f"<p>{count:,} queries among {evaluation.database['cells']:,} cells<br>"
-        f"Method: {escape(str(evaluation.method))}, {best}<br>"
+    )
+    return (
+        "<summary>Localization errors</summary>"
+        f"<p><b>{evaluation.cdf([Evaluation.success_metres])[0]:.1%}</b> of {count:,} queries "
+        f"{within}<br>{made_by(f'{escape(str(evaluation.method))}, {best}')}<br>"
         f"Distortion: {isolated(distortions or 'none')}</p>"
-        f"<table>{shares}</table>"
-        f"{shades()}{sources(licenses)}"
+        f"{part_of('Successful queries', successful)}"
+        f"{part_of('Failed queries', failed)}"
+        f"{part_of(FIELD_NAME, field)}"
+        f"{shades()}{folded('Figures', f'<table>{shares}</table>')}{sources(licenses)}"
     )

@@ -29,9 +29,12 @@ from semsig_gis.maps.parts import (
     colour_cells,
     draw,
     finished_map,
+    folded,
     isolated,
+    made_by,
     mark_svg,
     panel_signs,
+    part_of,
     prepared_map,
     query_signature,
     query_text,
@@ -80,6 +83,7 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
         {"weight": 1, "opacity": 0.5, "dashArray": "1 5"},
     ),
 }
+CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
 BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
 REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
@@ -245,7 +249,7 @@ class _Drawings:
                 _position(place),
             ]
             name = f"Rank {row['rank']:,} of {len(self.database):,}"
-            records.append([place, "#ffffff", 8, None, name, details, str(row["rank"])])
+            records.append([place, CANDIDATE, 8, None, name, details, str(row["rank"])])
         return records
 
     def explanation(self, explanation: Explanation) -> list[list[Any]]:
@@ -346,18 +350,18 @@ def location_legend(location: Location) -> str:
         if verdict in told
     )
     rays = f"<p>Objects of the query, as rays where they were seen{kinds}</p>"
+    method = f"Likelihood, {isolated(location.noise)} noise, {len(posterior.database):,} cells"
+    asked = f"<p>{query_text(location.query, posterior.database.taxonomy)}</p>"
     return (
         "<summary>Where it was seen</summary>"
-        f"<p>{query_text(location.query, posterior.database.taxonomy)}"
-        f"Method: likelihood, {isolated(location.noise)} noise, {len(posterior.database):,} cells"
-        f"</p><p>{mark_svg(mark)} <b>{verdict}</b>: within {location.rule.radius:g} m with a "
-        f"chance of {answer.mass:.1%}; if there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
-        f"(ellipse: 90 %)</p>{note}{_notes(location)}"
-        f"<p>Chance of a cell, or around it, in percent<br>{chances}</p>"
-        f"<p>Regions, the fewest cells that hold<br>{regions}</p>"
-        f"<p>{swatch('#ffffff')}Candidates by rank</p>"
-        f"{rays if location.explanations else ''}"
-        f"{shades()}{sources(posterior.database.licenses)}"
+        f"<p>{mark_svg(mark)} <b>{verdict}</b>: {answer.mass:.1%} within "
+        f"{location.rule.radius:g} m<br>If there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
+        f"(ellipse: 90 %)<br>{made_by(method)}</p>{note}{_notes(location)}"
+        f"{part_of('Chance ', f'<p>Chance in percent<br>{chances}</p>')}"
+        f"{part_of('Regions ', f'<p>Regions, the fewest cells that hold<br>{regions}</p>')}"
+        f"{part_of('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
+        f"{part_of('Objects from rank ', rays) if location.explanations else ''}"
+        f"{shades()}{folded('The query', asked)}{sources(posterior.database.licenses)}"
     )
 
 
@@ -448,13 +452,13 @@ def localization_legend(localization: Localization) -> str:
     cells = "1 more cell is" if more == 1 else f"{more:,} more cells are"
     beyond = f"<br>{cells} as good as the last one" if more else ""
     distances = candidates["distance"]
+    method = f"{escape(str(localization.method))}, by {escape(localization.used)}"
+    asked = f"<p>{query_text(localization.query, localization.taxonomy)}</p>"
+    ramp = ramp_bar(CANDIDATE_RAMP, f"{distances.min():.3f}", f"{distances.max():.3f}")
     return (
         "<summary>Candidate places</summary>"
-        f"<p>{query_text(localization.query, localization.taxonomy)}"
-        f"Method: {escape(str(localization.method))}, by {escape(localization.used)}</p>"
-        f"<p>The best {len(candidates):,} of {localization.cells:,} cells{beyond}</p>"
-        f"{_notes(localization)}"
-        "<p>Distance to the query (large sign: rank 1)"
-        f"{ramp_bar(CANDIDATE_RAMP, f'{distances.min():.3f}', f'{distances.max():.3f}')}</p>"
-        f"{shades()}{sources(localization.licenses)}"
+        f"<p>The best <b>{len(candidates):,}</b> of {localization.cells:,} cells{beyond}<br>"
+        f"{made_by(method)}</p>{_notes(localization)}"
+        f"{part_of('Candidates', f'<p>Distance to the query (large sign: rank 1){ramp}</p>')}"
+        f"{shades()}{folded('The query', asked)}{sources(localization.licenses)}"
     )

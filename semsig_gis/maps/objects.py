@@ -9,7 +9,7 @@ import pandas as pd
 import shapely
 
 from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.core.geometry import COUNT, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core.geometry import COUNT, MERGED, NAME, SOURCE, SOURCE_ID
 from semsig_gis.core.signs import class_signs
 from semsig_gis.maps.image import mercator, packed, steps
 from semsig_gis.maps.parts import (
@@ -59,7 +59,7 @@ def ground_map(
     buildings : GeoDataFrame, optional
         Polygons in a metric CRS.
     streets : GeoDataFrame, optional
-        Centre lines in the same CRS.
+        Centre lines in the same CRS; those with a ``name`` can be searched.
     box : tuple of float, optional
         ``xmin, ymin, xmax, ymax`` in that CRS: only what meets it. Everything by default.
     map_ : folium.Map, optional
@@ -96,13 +96,16 @@ def ground_map(
         names = " and ".join("no CRS" if crs is None else crs.name for crs in systems)
         msg = f"the streets and buildings have {names}; give both in one CRS."
         raise CrsError(msg)
-    shapes = {kind: _simple(table, box) for kind, table in tables.items()}
-    shapes = {kind: parts for kind, parts in shapes.items() if len(parts)}
+    simple = {kind: _simple(table, box) for kind, table in tables.items()}
+    shapes = {kind: parts for kind, (parts, _) in simple.items() if len(parts)}
     if not shapes:
         msg = "there are no streets or buildings to show; give some that are in the city."
         raise EmptyResultError(msg)
     page = prepared_map(map_, None, title="Streets and buildings")
-    draw(page, "Streets and buildings", "ground", *_ground(shapes, systems[0]), group="ground")
+    arrays, about = _ground(shapes, systems[0])
+    if streets is not None and NAME in streets and "streets" in shapes:
+        arrays["streets"] |= _named(streets[NAME].iloc[simple["streets"][1]])
+    draw(page, "Streets and buildings", "ground", arrays, about, group="ground")
     legend, view = "", None
     if map_ is None:
         bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
@@ -114,17 +117,32 @@ def ground_map(
 
 def _simple(
     table: gpd.GeoDataFrame, box: tuple[float, float, float, float] | None
-) -> NDArray[np.object_]:
-    """Return the lines or polygons of a table without small details, neighbours together."""
+) -> tuple[NDArray[np.object_], NDArray[np.int64]]:
+    """Return the lines or polygons of a table without small details, neighbours together.
+
+    The second array holds the row of each.
+    """
     shapes = table.geometry.to_numpy()
+    kept = ~(shapely.is_missing(shapes) | shapely.is_empty(shapes))
     if box is not None:
-        shapes = shapes[shapely.intersects(shapes, shapely.box(*box))]
-    parts = shapely.get_parts(shapes[~(shapely.is_missing(shapes) | shapely.is_empty(shapes))])
+        kept &= shapely.intersects(shapes, shapely.box(*box))
+    rows = np.flatnonzero(kept)
+    parts, owner = shapely.get_parts(shapes[rows], return_index=True)
     parts = shapely.simplify(parts, DETAIL_M, preserve_topology=False)
-    parts = parts[~shapely.is_empty(parts)]
+    whole = ~shapely.is_empty(parts)
+    rows = rows[owner][whole]
+    parts, owner = shapely.get_parts(parts[whole], return_index=True)
     # Outlines one way round and courtyards the other, as a canvas wants them.
-    parts = shapely.normalize(shapely.get_parts(parts))
-    return parts[hilbert_order(parts)] if len(parts) else parts
+    rows, parts = rows[owner], shapely.normalize(parts)
+    order = hilbert_order(parts) if len(parts) else slice(None)
+    return parts[order], rows[order]
+
+
+def _named(names: pd.Series) -> dict[str, list[str]]:
+    """Return the names of streets for the script: each once, and the number of that of a line."""
+    known = names.where(names.notna() & (names != ""))
+    numbers, titles = pd.factorize(known, sort=True)
+    return {"names": packed(titles.astype(str).tolist()), "called": steps(numbers.astype(np.int32))}
 
 
 def _ground(
@@ -264,7 +282,7 @@ def objects_legend(objects: StreetObjects) -> str:
     )
     return (
         "<summary>Street objects</summary>"
-        f"<p>{len(objects):,} objects of {len(counts)} classes; shapes show from near, letters "
-        f"from nearer, and a click tells what is known of one.</p><table>{rows}</table>"
+        f"<p><b>{len(objects):,}</b> objects of {len(counts)} classes<br>"
+        f"Click one to see what is known of it</p><table>{rows}</table>"
         f"{sources(map(str, objects.licenses))}"
     )

@@ -16,7 +16,7 @@ import tomllib
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 from urllib.parse import urlsplit
 
 import folium
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from importlib.resources.abc import Traversable
     from pathlib import Path
+
+    from branca.element import Figure
 
 # Files that every folium page links and that our maps do without: they only serve
 # `folium.Icon`, Font Awesome and Bootstrap widgets.
@@ -191,8 +193,12 @@ class MapFrame:
         )
 
 
-def page_of_map(map_: folium.Map, *, self_contained: bool | None = None) -> str:
+def page_of_map(
+    map_: folium.Map, *, title: str | None = None, self_contained: bool | None = None
+) -> str:
     """Return a map as one HTML page (see `save_map`)."""
+    if title is not None:
+        cast("Figure", map_.get_root()).title = html.escape(title)
     page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
     page = _RIGID.sub("", page, count=1)
     if self_contained or (self_contained is None and available()):
@@ -230,7 +236,13 @@ def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
     return MapFrame(page_of_map(map_), height)
 
 
-def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None = None) -> bool:
+def save_map(
+    map_: folium.Map,
+    path: str | Path,
+    *,
+    title: str | None = None,
+    self_contained: bool | None = None,
+) -> bool:
     """Write a map as one HTML page.
 
     Parameters
@@ -239,6 +251,9 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
         The map.
     path : str or Path
         File to write; it appears whole, by rename.
+    title : str, optional
+        What stands on the map, such as the city and the date of its data; by default, what the map
+        shows.
     self_contained : bool, optional
         True to put Leaflet and all else into the page, False to link them; by default they are
         put into it where the package carries them and the map needs no others.
@@ -260,7 +275,7 @@ def save_map(map_: folium.Map, path: str | Path, *, self_contained: bool | None 
     ...     save_map(folium.Map(tiles=None), f"{folder}/map.html", self_contained=False)
     False
     """
-    page = page_of_map(map_, self_contained=self_contained)
+    page = page_of_map(map_, title=title, self_contained=self_contained)
     write_whole(path, page)
     tiled = any(
         isinstance(child, folium.TileLayer | WmsTileLayer) for child in layers_of(map_).values()

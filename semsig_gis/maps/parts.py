@@ -46,7 +46,7 @@ CLOSE_ZOOM = 17  # the closest that a new map shows by itself
 # Files of the folder ``js`` that every page has, in this order.
 PAGE_FILES = (
     *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "wheels.js", "search.js"),
-    *("controls.js", "arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
+    *("controls.js", "picture.js", "arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
 )
 WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
 POWERS = 4  # of x and y, which tell a place within millimetres in a city
@@ -546,10 +546,30 @@ def shades() -> str:
         f"{swatch(colour, FLIPPING)}{label}"
         for colour, label in zip(SHADES.values(), labels, strict=True)
     )
-    return f"<p>Objects seen from a cell<br>{signs}</p>"
+    name = "Objects seen from a cell"
+    return part_of(name, f"<p>{name}<br>{signs}</p>")
+
+
+def part_of(layer: str, text: str) -> str:
+    """Return a part of a legend that is shown while a layer of that name is on.
+
+    A name that ends with a space is the beginning of one.
+    """
+    return f'<div data-layer="{escape(layer)}">{text}</div>'
+
+
+def made_by(method: str) -> str:
+    """Return the method of a result, which the title of the map tells as well."""
+    return f'<span class="semsig-method">{method}</span>'
+
+
+def folded(title: str, text: str) -> str:
+    """Return a part of a legend that opens when it is clicked."""
+    return f"<details><summary>{title}</summary>{text}</details>"
 
 
 def sources(licenses: Iterable[str]) -> str:
-    """Return who is to be named for the data, and under which licence."""
-    lines = [f"Data: {isolated(line)}<br>" for line in licenses]
-    return f"<p><small>{''.join(lines)}Made with semsig_gis {escape(__version__)}</small></p>"
+    """Return who is to be named for the data, and under which licence, folded."""
+    lines = [f"{isolated(line)}<br>" for line in licenses]
+    made = f"Made with semsig_gis {escape(__version__)}"
+    return folded("About the data", f"<p><small>{''.join(lines)}{made}</small></p>")

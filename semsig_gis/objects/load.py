@@ -281,7 +281,7 @@ class Loaded(Displayed):
         What became of every row, and what was merged between layers.
     buildings, streets : GeoDataFrame, optional
         Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
-        of streets whose widths a layer knows, ``half_width`` in metres.
+        of streets whose widths a layer knows, ``half_width`` in metres, and whose names, ``name``.
     notes : tuple of str
         Warnings about all of it; those about a layer are in its report. The objects bear both.
 

@@ -79,7 +79,8 @@ class RawLayer(Displayed):
     table : GeoDataFrame
         One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
         None), in the CRS of the source; ``half_width`` (metres from the centre line, or NaN)
-        where the catalogue says something about the widths of streets.
+        where the catalogue says something about the widths of streets, and ``name``, empty where
+        there is none, where it says which field holds the names of streets.
     counts : RowCounts
         Features in the source, and those that are not in the table; ``counts.kept == len(table)``.
     errors : tuple of str

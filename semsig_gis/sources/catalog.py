@@ -89,6 +89,8 @@ class LayerSpec:
     width_by, width_field : WidthBy, str, optional
         Of streets: the field that says how wide they are by its class of street, and the one that
         holds their width in metres, which goes first.
+    name_field : str, optional
+        Of streets: the field that holds their name.
     id_field, unique_id : str, bool, optional
         Field that identifies a row in its source (else the feature's number does), and whether rows
         of the same id are the same object, also across several files.
@@ -128,6 +130,7 @@ class LayerSpec:
     class_by: ClassBy | None = None
     width_by: WidthBy | None = None
     width_field: str | None = None
+    name_field: str | None = None
     id_field: str | None = None
     geometry: GeometryKind = "point"
     crs: str | None = None
@@ -175,6 +178,7 @@ class LayerSpec:
         uses += [("class_by", self.class_by.field)] if self.class_by else []
         uses += [("width_by", self.width_by.field)] if self.width_by else []
         uses += [("width_field", self.width_field)] if self.width_field else []
+        uses += [("name_field", self.name_field)] if self.name_field else []
         uses += [("id_field", self.id_field)] if self.id_field else []
         return tuple(uses)
 
@@ -189,6 +193,7 @@ LAYER_KEYS = {
     "class_by": dict,
     "width_by": dict,
     "width_field": str,
+    "name_field": str,
     "aliases": dict,
     "id_field": str,
     "unique_id": bool,
@@ -240,8 +245,8 @@ def layer_of(
                 "write a code such as 'EPSG:4326'."
             )
             raise CatalogError(msg) from error
-    if role != "streets" and (width := {"width_by", "width_field"} & set(item)):
-        msg = f"{where} has {min(width)}, which only streets have; remove it or add its role."
+    if role != "streets" and (of_streets := {"width_by", "width_field", "name_field"} & set(item)):
+        msg = f"{where} has {min(of_streets)}, which only streets have; remove it or add its role."
         raise CatalogError(msg)
     if item.get("unique_id", False) and "id_field" not in item:
         msg = f"{where} has unique_id = true without an id_field; name the field of the ids."

@@ -18,7 +18,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
-from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, SOURCE_ID, crs_label
+from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, NAME, SOURCE_ID, crs_label
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.conditions import Condition, as_text, matches, pattern_of
@@ -341,11 +341,11 @@ class RowRules:
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
 
     def sift(self, rows: Rows) -> Sifted:
-        """Return class, identifier, half-width in metres and position of the rows that pass.
+        """Return class, identifier, half-width in metres, name and position of rows that pass.
 
-        The index has their numbers. The half-width is NaN where nobody knows it; the identifier is
-        the row's name where it has none, or empty where ids are unique, because the name could be
-        another row's id.
+        The index has their numbers. The half-width is NaN where nobody knows it, and the name
+        empty; the identifier is the row's number where it has none, or empty where ids are unique,
+        because the number could be another row's id.
         """
         spec = self.spec
         size = len(rows.numbers)
@@ -363,15 +363,17 @@ class RowRules:
         unlisted = kept & np.array([name is None for name in classes], bool)
         ids = columns.get(spec.id_field or "", [None] * size)
         names = [""] * size if spec.unique_id else rows.names
+        titles = columns.get(spec.name_field or "", [None] * size)
         table = pd.DataFrame(
             {
                 CLASS_NAME: pd.Series(classes, dtype="str"),
                 SOURCE_ID: pd.Series(map(_identifier, ids, names), dtype="str"),
                 HALF_WIDTH: pd.Series(self._half_widths(columns, size), dtype="float64"),
+                NAME: pd.Series([_identifier(title, "") for title in titles], dtype="str"),
                 GEOMETRY: pd.Series(rows.positions, dtype=object),
             }
         ).set_index(pd.Index(rows.numbers, dtype=int))
-        unused = [] if spec.has_width else [HALF_WIDTH]
+        unused = [HALF_WIDTH] * (not spec.has_width) + [NAME] * (spec.name_field is None)
         notes = []
         if any(excluded.values()):
             told = (f"{field} {number}" for field, number in excluded.items() if number)

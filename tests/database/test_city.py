@@ -227,7 +227,9 @@ def test_parts_that_do_not_agree_are_told(
 TOWN = random_town().street_objects
 HOUSES = surroundings(shapely.box(*CORNER, *(CORNER + 9)), shapely.Polygon())
 HOUSES.attrs["licenses"] = ["City (CC0): houses"]
-STREETS = surroundings(shapely.LineString([CORNER, CORNER + 50]), half_width=[7.5])
+STREETS = surroundings(
+    shapely.LineString([CORNER, CORNER + 50]), half_width=[7.5], name=["Rue É"], lanes=[2]
+)
 
 
 def fewer(number: int) -> StreetObjects:
@@ -282,7 +284,10 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     assert again.footprints.attrs["licenses"] == ["City (CC0): houses"]
     licenses = open_database(tmp_path / "city.parquet").licenses
     assert licenses == (*map(str, TOWN.licenses), "City (CC0): houses")
-    assert again.streets["half_width"].tolist() == [7.5]
+    assert again.streets.drop(columns="geometry").to_dict("list") == {
+        "half_width": [7.5],
+        "name": ["Rue É"],
+    }
     with refused(CrsError, "no coordinate reference system"):
         ObjectStore.of(TOWN, footprints=houses.set_crs(None, allow_override=True))
 

@@ -105,7 +105,7 @@ def test_the_numbers_are_those_of_the_results() -> None:
         ("evaluation", f"P(error ≤ 50 m) {EVALUATION.cdf([50])[0]:.1%}"),
         ("evaluation", f"{int(EVALUATION.successful.sum())} successful"),
         ("localization", f"{distances.max():.3f}"),
-        ("identifiability", f"{facts['chance_found']:.1%} for the mean cell"),
+        ("identifiability", f"{facts['chance_found']:.1%} chance to answer"),
         ("identifiability", f"90% to 100%: {facts['bands'][-1]['share']:.1%} of the cells"),
     ):
         assert words in LEGENDS[name].text

@@ -55,8 +55,8 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     assert len(page.all(IMAGES)) == 2
     numbers = [str(one.get_property("textContent")) for one in page.all(".semsig-number")]
     assert sorted(numbers) == ["1", "2", "3", "4", "5"]
-    legend = page.one(LEGEND).text
-    assert "The answer: within 50 m" in legend
+    legend = page.text(LEGEND)
+    assert "The answer: 100.0% within 50 m" in legend
     assert "90% in" in legend
     assert "matched: a street object" in legend
     assert page.circles(ANSWERS["given"].colour) == 1
@@ -115,7 +115,7 @@ def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
     outside = ~photo.sees(seen.bearings)
     assert 0 < outside.sum() < len(view)
     page.open(localization_map(localize(CITY, view, top=1), CITY))
-    assert "Looked at: " in page.one(LEGEND).text
+    assert "Looked at: " in page.text(LEGEND)
     page.ask("shown((one) => one instanceof L.CircleMarker)[0].fire('click')")
     assert page.panel()
     asked, cell = page.all(".semsig-wheels figure")
@@ -156,7 +156,7 @@ def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
     location = locate(index, query, top=7)
     assert not location.answer.given
     page.open(location_map(location))
-    legend = page.one(LEGEND).text
+    legend = page.text(LEGEND)
     assert "Cannot tell; the best place" in legend
     assert "matched" not in legend
     assert page.circles(ANSWERS["withheld"].colour) == 1
@@ -185,6 +185,6 @@ def test_a_localization_in_a_browser(page: MapPage) -> None:
     captions = [one.get_property("innerText") for one in page.all("figcaption")]
     assert captions == ["Query", "Signature, to 30 m"]
     page.ask("semsig.hide(map)")
-    assert f"Types: {CITY.types(LONGEST)}" in page.one(LEGEND).text
+    assert f"Types: {CITY.types(LONGEST)}" in page.text(LEGEND)
     page.switch("Candidates")
     assert page.ask(texts) == []

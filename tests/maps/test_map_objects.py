@@ -314,3 +314,26 @@ def test_only_what_is_in_the_box() -> None:
     box = (765_300.0, 6_275_100.0, 765_600.0, 6_275_200.0)
     every, some = (ground_map(buildings=many, box=one).get_root().render() for one in (None, box))
     assert len(some) < len(every)
+
+
+def test_streets_are_found_by_their_names(page: MapPage) -> None:
+    lines = [[(0, 0), (90, 5)], [(200, 0), (300, 0)], [(95, 5), (95, 60)], [(0, 90), (50, 90)]]
+    streets = gpd.GeoDataFrame(
+        {"name": ["Rue de l'Église", None, "Rue de l'Église", HOSTILE]},
+        geometry=[shapely.LineString(np.add(line, (565_000, 4_830_000))) for line in lines],
+        crs="EPSG:32631",
+    )
+    map_ = ground_map(streets=streets)
+    page.open(map_)
+    page.ask_later(
+        "const look = () => semsig.openers.street ? arguments[0]() : setTimeout(look); look()"
+    )
+    assert page.search("eglise") == ["Rue de l'Église\nstreet"]
+    page.search("EGLISE", Keys.ENTER)
+    assert page.told()["title"] == "Rue de l'Église"
+    marked = page.ask("return lines((one) => one.options.weight === 6)[0].getLatLngs().length")
+    assert marked == 2
+    assert page.ask("return semsig.openers.street(map, 'Rue X')") is False
+    assert page.ask("return semsig.openers.street(map, arguments[0])", HOSTILE) is True
+    assert page.text(".semsig-panel h2") == HOSTILE
+    page.assert_text_stays_text()

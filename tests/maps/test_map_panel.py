@@ -135,7 +135,7 @@ def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
         wait_for(page, None)
         assert page.ask(focused) == "folium-map"
         page.click(CITY, 0)
-        button = page.one(".semsig-panel-head button")
+        button = page.one(".semsig-hide")
         assert min(button.size.values()) >= 44
         button.click()
         wait_for(page, None)

@@ -93,7 +93,7 @@ def test_heights_go_into_the_taxonomy(town: Town) -> None:
 def test_streets_say_how_wide_they_are(town: Town) -> None:
     old = 'name = "posts"\nclass = "street_light"'
     new = (
-        'name = "posts"\nrole = "streets"\nwidth_field = "WIDTH"\n'
+        'name = "posts"\nrole = "streets"\nwidth_field = "WIDTH"\nname_field = "NAME"\n'
         'width_by = { field = "TYPE", values = { Avenue = 24, "/R.*/" = 12.5 }, default = 16 }'
     )
     spec = load_catalog(town(old, new)).layer("posts")
@@ -107,6 +107,7 @@ def test_streets_say_how_wide_they_are(town: Town) -> None:
         ("class_by", "KIND"),
         ("width_by", "TYPE"),
         ("width_field", "WIDTH"),
+        ("name_field", "NAME"),
         ("id_field", "ID"),
     )
     assert not load_catalog(town()).layer("posts").has_width

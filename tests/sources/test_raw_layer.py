@@ -208,6 +208,20 @@ def test_every_reader_gives_the_widths(name: str, file: str) -> None:
     assert "half_width" not in none.table
 
 
+@pytest.mark.parametrize(
+    ("name", "file"), [("vector_file", "streets.geojson"), ("osm_file", "streets.osm")]
+)
+def test_streets_keep_the_names_of_their_field(name: str, file: str) -> None:
+    bare = street(geometry="line", tags=((("highway", ("*",)),),))
+    named, plain = (
+        reader(name)(DATA / file, [s])[0] for s in (replace(bare, name_field="highway"), bare)
+    )
+    assert [bool(one) for one in named.table["name"]] == [True, True]
+    assert "name" not in plain.table
+    missing = table(replace(bare, name_field="name"), name=["Rue É", None, " "], highway=[""] * 3)
+    assert missing["name"].tolist() == ["Rue É", "", ""]
+
+
 def test_a_portal_may_spell_the_fields_otherwise(tmp_path: Path) -> None:
     path = tmp_path / "voies.csv"
     path.write_text(

@@ -2,11 +2,7 @@ semsig.colours = (map) => {
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const control = L.control({position: "topleft"});
   control.onAdd = () => {
-    const bar = L.DomUtil.create("div", "leaflet-bar");
-    const button = L.DomUtil.create("a", "semsig-colours", bar);
-    button.href = "#";
-    button.textContent = "\u25d0";
-    button.setAttribute("role", "button");
+    const bar = L.DomUtil.create("div", "leaflet-bar semsig-bar");
     // What is chosen is kept for the next time, where a page may keep something.
     const remembered = (choice) => {
       try {
@@ -17,6 +13,11 @@ semsig.colours = (map) => {
       }
     };
     let choice = remembered();
+    const button = semsig.mapButton(bar, "semsig-colours", "\u25d0", "", () => {
+      choice = remembered(semsig.isDark(map) ? "light" : "dark");
+      show();
+      map.fire("semsig-state");
+    });
     const show = () => {
       const is = choice ? choice === "dark" : dark.matches;
       map.getContainer().classList.toggle("semsig-dark", is);
@@ -24,26 +25,73 @@ semsig.colours = (map) => {
       button.setAttribute("aria-label", button.title);
       map.fire("semsig-colours");
     };
-    L.DomEvent.on(button, "click", (event) => {
-      L.DomEvent.stop(event);
-      choice = remembered(semsig.isDark(map) ? "light" : "dark");
-      show();
-      map.fire("semsig-state");
-    });
-    L.DomEvent.on(button, "keydown", (event) => {
-      if (event.key !== " ") return;
-      L.DomEvent.stop(event);
-      button.click();
-    });
     dark.addEventListener("change", show);
     semsig.remember(map, "colours", () => choice, (text) => {
       choice = text === "dark" ? "dark" : "light";
       show();
     });
     show();
+    for (const [name, sign, title, act] of [
+      ["semsig-save", "M10 3v9M6 8l4 4 4-4M3 13v4h14v-4", "Save this view as a picture",
+        semsig.savePicture],
+      ["semsig-print", "M6 7V3h8v4M6 14H3V7h14v7h-3M6 11h8v6H6z", "Print this view", semsig.print],
+    ]) semsig.mapButton(bar, name, "", title, () => act(map)).append(semsig.icon(sign));
     return bar;
   };
   control.addTo(map);
+};
+semsig.icon = (lines) => {
+  const [icon, path] = ["svg", "path"].map((name) => L.SVG.create(name));
+  icon.setAttribute("class", "semsig-icon");
+  icon.setAttribute("viewBox", "0 0 20 20");
+  icon.setAttribute("aria-hidden", "true");
+  path.setAttribute("d", lines);
+  icon.append(path);
+  return icon;
+};
+semsig.mapButton = (parent, name, sign, title, act) => {
+  const button = L.DomUtil.create("button", name, parent);
+  Object.assign(button, {type: "button", textContent: sign, title});
+  button.setAttribute("aria-label", title);
+  L.DomEvent.on(button, "click", (event) => {
+    L.DomEvent.stop(event);
+    act();
+  });
+  return button;
+};
+// What the map is of, how it was made, and its name for who cannot see it.
+semsig.title = (map) => {
+  const container = map.getContainer();
+  const texts = (selector) => [...new Set(
+    [...container.querySelectorAll(selector)].map((one) => one.textContent))];
+  const stories = texts(".semsig-legend > summary");
+  const title = document.title || stories[0] || "Map";
+  const box = L.DomUtil.create("div", "semsig-title", container);
+  semsig.text(box, "h1", title);
+  const more = [...stories.filter((one) => one !== title), ...texts(".semsig-method")];
+  if (more.length) semsig.text(box, "p", more.join(" \u00b7 "));
+  container.setAttribute("role", "main");
+  container.setAttribute("aria-roledescription", "map");
+  container.setAttribute("aria-label", title);
+  container.setAttribute("aria-keyshortcuts", "c");
+  L.DomUtil.create("p", "semsig-said", container).setAttribute("role", "status");
+  L.DomEvent.on(container, "keydown", (event) => {
+    const {key, target, ctrlKey, metaKey, altKey} = event;
+    if (key === "c" && !(ctrlKey || metaKey || altKey) && !target.matches("input")) semsig.copy(map);
+  });
+};
+// What is switched off is not explained.
+semsig.explain = (map, control) => {
+  const plain = (name) => name.replace(/( \([\d,]+\))?(, \d+)?$/, "");
+  const show = () => {
+    const on = control._layers.filter(({layer}) => map.hasLayer(layer)).map(({name}) => plain(name));
+    for (const part of map.getContainer().querySelectorAll("[data-layer]")) {
+      const {layer} = part.dataset;
+      part.hidden = !on.some((name) => (layer.endsWith(" ") ? name.startsWith(layer) : name === layer));
+    }
+  };
+  map.on("overlayadd overlayremove", show);
+  show();
 };
 semsig.isDark = (map) => map.getContainer().classList.contains("semsig-dark");
 // On light and on dark, what sets a sign off from what is below it.
@@ -87,6 +135,8 @@ semsig.furnish = (map, layers, area, credits) => {
   semsig.answers(map, 2, (event) => semsig.tellPlace(map, event.latlng));
   semsig.colours(map);
   semsig.search(map, area);
+  semsig.title(map);
+  semsig.explain(map, layers);
   semsig.folding(map, layers);
   if (map.semsigView) {
     const {view, zoom} = map.semsigView;

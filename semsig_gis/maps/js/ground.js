@@ -3,6 +3,50 @@ semsig.ground = (packed, about) => {
   const chunk = 64;
   const kinds = {};
   let layer = null;
+  // Streets by their names: a line runs on from each of its points.
+  const nameStreets = (data) => {
+    const plain = data.names.map(semsig.plain);
+    const placeOf = (at) => L.CRS.EPSG3857.unproject(L.point(
+      about.origin[0] + data.x[at] * about.quantum, about.origin[1] + data.y[at] * about.quantum));
+    const linesOf = (street) => {
+      const lines = [];
+      data.called.forEach((one, shape) => {
+        if (one !== street) return;
+        const line = [];
+        for (let at = data.firsts[shape]; at < data.firsts[shape + 1]; at += 1) {
+          line.push(placeOf(at));
+        }
+        lines.push(line);
+      });
+      return lines;
+    };
+    const show = (map, street) => {
+      const lines = linesOf(street);
+      const bounds = L.latLngBounds(lines.flat());
+      const longest = lines.reduce((one, other) => (other.length > one.length ? other : one));
+      const place = longest[longest.length >> 1];
+      map.fitBounds(bounds, {maxZoom: 17, animate: false});
+      const at = [place.lat, place.lng];
+      const area = map.semsigArea;
+      const facts = semsig.whereabouts(area, at, area && semsig.xy(area, at));
+      const box = semsig.details(data.names[street], facts.map((one) => one[0]),
+        facts.map((one) => one[1]), {});
+      semsig.show(map, box, place, {
+        corners: [bounds.getSouthWest(), bounds.getNorthEast()],
+        key: `street:${data.names[street]}`,
+        drawn: L.polyline(lines, {
+          pane: "shadowPane", interactive: false, color: "#d55e00", weight: 6, opacity: 0.7}),
+      });
+    };
+    semsig.finders.push((words, limit) => semsig.matches(plain, words, limit).map(
+      ({rank, at}) => ({
+        rank, name: data.names[at], hint: "street", show: (map) => show(map, at)})));
+    semsig.addOpener("street", (map, name) => {
+      const at = data.names.indexOf(name);
+      if (at >= 0) show(map, at);
+      return at >= 0;
+    });
+  };
   for (const [kind, arrays] of Object.entries(packed)) {
     semsig.arrays(arrays).then((data) => {
       const firsts = new Int32Array(data.rings.length + 1);  // point of each shape
@@ -14,7 +58,9 @@ semsig.ground = (packed, about) => {
       starts.push(firsts[data.rings.length]);
       data.shapes = semsig.blocks(data.x, data.y, firsts);
       data.boxes = semsig.blocks(data.x, data.y, starts);
+      data.firsts = firsts;
       kinds[kind] = data;
+      if (data.names) nameStreets(data);
       layer.redraw();
     });
   }

@@ -31,17 +31,14 @@ semsig.panel = (map) => {
 semsig.panelHead = (map, panel, title) => {
   const head = L.DomUtil.create("div", "semsig-panel-head");
   head.append(title);
-  const button = L.DomUtil.create("button", "", head);
-  button.type = "button";
-  button.title = "Close";
-  button.setAttribute("aria-label", "Close");
-  L.DomEvent.on(button, "click", () => semsig.hide(map));
+  semsig.mapButton(head, "semsig-copy", "", "Copy latitude and longitude (C)", () => semsig.copy(map));
+  semsig.mapButton(head, "semsig-hide", "", "Close", () => semsig.hide(map));
   // A swipe: down where the panel is below the map, to the right where it is beside it.
   let from = null;
   const moved = (event) => Math.max(0, semsig.isSheet(map, panel)
     ? event.clientY - from.clientY : event.clientX - from.clientX);
   L.DomEvent.on(head, "pointerdown", (event) => {
-    if (event.target === button) return;
+    if (event.target.closest("button")) return;
     from = event;
     head.setPointerCapture(event.pointerId);
   });

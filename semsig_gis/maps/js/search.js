@@ -1,5 +1,6 @@
 semsig.finders = [];  // of each layer with named things: what is called so, with how to show it
-semsig.plain = (text) => String(text).toLowerCase().replace(/(\d),(?=\d{3})/g, "$1").trim();
+semsig.plain = (text) => String(text).normalize("NFD").replace(/\p{M}/gu, "").toLowerCase()
+  .replace(/(\d),(?=\d{3})/g, "$1").trim();
 // Which of the names hold the words, best first: one of their lines is the words (rank 0), has
 // them as whole words (1) or within others (2).
 semsig.matches = (names, words, limit) => {

@@ -69,6 +69,7 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
         spec,
         id_field=spec.id_field and own(spec.id_field),
         width_field=spec.width_field and own(spec.width_field),
+        name_field=spec.name_field and own(spec.name_field),
         width_by=width_by and dataclasses.replace(width_by, field=own(width_by.field)),
         where=tuple((own(field), accepted) for field, accepted in spec.where),
         exclusions=tuple((own(field), accepted) for field, accepted in spec.exclusions),

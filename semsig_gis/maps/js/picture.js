@@ -1,0 +1,114 @@
+// The places of the map, as they are copied.
+semsig.copy = (map) => {
+  const {lat, lng} = map.semsigPanel?.told?.place || map.getCenter();
+  const text = `${lat.toFixed(6)}, ${lng.toFixed(6)}`;
+  return navigator.clipboard.writeText(text).then(
+    () => semsig.say(map, `Copied: ${text}`), () => semsig.say(map, `Copy by hand: ${text}`));
+};
+// A line for people that goes by itself, and is read out.
+semsig.say = (map, text) => {
+  const box = map.getContainer().querySelector(".semsig-said");
+  box.textContent = text;
+  clearTimeout(map.semsigSaid);
+  map.semsigSaid = setTimeout(() => box.replaceChildren(), 5000);
+};
+// What stands around the map on a picture or on paper: title, legend, scale, credits.
+semsig.about = ".semsig-title, .semsig-legend, .leaflet-control-scale, .leaflet-control-attribution";
+// Draws the elements of some classes as the page shows them.
+semsig.drawBoxes = async (ctx, map) => {
+  const container = map.getContainer();
+  const frame = container.getBoundingClientRect();
+  const sheet = document.createElement("div");
+  sheet.className = container.className;
+  sheet.style.cssText = `position:relative;background:none;width:${frame.width}px;height:${frame.height}px`;
+  for (const style of document.querySelectorAll("style")) sheet.append(style.cloneNode(true));
+  for (const box of container.querySelectorAll(semsig.about)) {
+    const {left, top, width, height} = box.getBoundingClientRect();
+    if (!width) continue;
+    const copy = box.cloneNode(true);
+    copy.style.cssText += `;position:absolute;margin:0;transform:none;left:${left - frame.left}px;`
+      + `top:${top - frame.top}px;width:${width + 1}px;height:${height}px;max-width:none;right:auto`;
+    sheet.append(copy);
+  }
+  const [drawing, inside] = ["svg", "foreignObject"].map((name) => {
+    const part = L.SVG.create(name);
+    part.setAttribute("width", frame.width);
+    part.setAttribute("height", frame.height);
+    return part;
+  });
+  inside.append(sheet);
+  drawing.append(inside);
+  const image = new Image();
+  image.src = `data:image/svg+xml,${encodeURIComponent(
+    new XMLSerializer().serializeToString(drawing))}`;
+  await image.decode();
+  ctx.drawImage(image, 0, 0);
+};
+// The map as it is seen, with what stands around it, as a canvas; online tiles, which a page must
+// not read, are left out.
+semsig.picture = async (map) => {
+  const container = map.getContainer();
+  const frame = container.getBoundingClientRect();
+  const dots = window.devicePixelRatio;
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [frame.width * dots, frame.height * dots];
+  const ctx = canvas.getContext("2d");
+  ctx.scale(dots, dots);
+  ctx.fillStyle = getComputedStyle(container).backgroundColor;
+  ctx.fillRect(0, 0, frame.width, frame.height);
+  const panes = [...container.querySelectorAll(".leaflet-map-pane > .leaflet-pane")]
+    .sort((one, other) => getComputedStyle(one).zIndex - getComputedStyle(other).zIndex);
+  for (const part of panes.flatMap((pane) => [...pane.querySelectorAll(
+    "img:not(.leaflet-tile), canvas, .semsig-number")])) {
+    const {left, top, width, height} = part.getBoundingClientRect();
+    if (!width || !height) continue;
+    const look = getComputedStyle(part);
+    const blend = look.mixBlendMode;
+    ctx.save();
+    ctx.globalAlpha = look.opacity;
+    ctx.filter = look.filter;
+    ctx.globalCompositeOperation = blend === "normal" ? "source-over" : blend;
+    ctx.imageSmoothingEnabled = look.imageRendering !== "pixelated";
+    const [x, y] = [left - frame.left, top - frame.top];
+    if (part.matches(".semsig-number")) {
+      ctx.font = `bold 11px ${look.fontFamily}`;
+      ctx.fillStyle = look.color;
+      [ctx.textAlign, ctx.textBaseline] = ["center", "middle"];
+      ctx.fillText(part.textContent, x + width / 2, y + height / 2);
+    } else ctx.drawImage(part, x, y, width, height);
+    ctx.restore();
+  }
+  await semsig.drawBoxes(ctx, map);
+  return canvas;
+};
+semsig.savePicture = async (map) => {
+  const canvas = await semsig.picture(map);
+  const blob = await new Promise((done) => { canvas.toBlob(done); });
+  const link = document.createElement("a");
+  link.download = `${(document.title.match(/[\p{L}\p{N}]+/gu) || ["map"]).join("-")}.png`;
+  link.href = URL.createObjectURL(blob);
+  link.click();
+  URL.revokeObjectURL(link.href);
+  semsig.say(map, `Saved: ${link.download}`);
+};
+// On a page of paper the map is as large as that, and light.
+semsig.print = async (map) => {
+  const container = map.getContainer();
+  const dark = semsig.isDark(map);
+  const legends = [...container.querySelectorAll(".semsig-legend")];
+  const open = legends.map((one) => one.open);
+  const set = (is) => {
+    container.classList.toggle("semsig-paper", is);
+    container.classList.toggle("semsig-dark", dark && !is);
+    legends.forEach((one, at) => { one.open = is ? at === 0 : open[at]; });
+    map.fire("semsig-colours");
+    map.invalidateSize({animate: false});
+  };
+  const {lat, lng} = map.getCenter();
+  set(true);
+  map.setView([lat, lng], map.getZoom(), {animate: false});
+  for (let frame = 0; frame < 2; frame += 1) await new Promise(requestAnimationFrame);
+  window.print();
+  set(false);
+  map.setView([lat, lng], map.getZoom(), {animate: false});
+};

@@ -1,0 +1,121 @@
+"""Maps for whoever uses a keyboard, a screen reader or a finger."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import pytest
+import shapely
+from axe_core_python.selenium import Axe
+from selenium.webdriver.common.keys import Keys
+from small_city import (
+    chances_of,
+    small_city,
+    small_evaluation,
+    small_localization,
+    small_location,
+)
+
+from semsig_gis.database.build import build_database
+from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+from semsig_gis.maps.drift import drift_map
+from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.maps.location import localization_map, location_map
+from semsig_gis.maps.objects import ground_map, objects_map
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import folium
+    from map_pages import MapPage
+
+CITY, OBJECTS = small_city()
+
+
+def drift() -> folium.Map:
+    later = dataclasses.replace(OBJECTS, table=OBJECTS.table[3:])
+    return drift_map(CITY, build_database(later), objects_before=OBJECTS, objects_after=later)
+
+
+def ground() -> folium.Map:
+    house = shapely.box(*CITY.xy[0], *(CITY.xy[0] + 20))
+    return ground_map(buildings=gpd.GeoDataFrame(geometry=[house], crs=CITY.crs))
+
+
+MAPS: dict[str, Callable[[], folium.Map]] = {
+    "evaluation": lambda: evaluation_map(small_evaluation("medium"), CITY),
+    "localization": lambda: localization_map(small_localization(), CITY),
+    "location": lambda: location_map(small_location()),
+    "ambiguity": lambda: ambiguity_map(CITY, identifiability=chances_of(CITY)),
+    "identifiability": lambda: identifiability_map(chances_of(CITY)),
+    "drift": drift,
+    "objects": lambda: objects_map(OBJECTS, database=CITY),
+    "ground": ground,
+}
+
+
+def violations(page: MapPage) -> list[tuple[str, list[Any]]]:
+    """Return the rules of axe that a page breaks, and where."""
+    found = Axe().run(page.browser)["violations"]
+    return [(one["id"], [node["target"] for node in one["nodes"]]) for one in found]
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_axe_finds_nothing_in_light_and_dark_on_desk_and_phone(name: str, page: MapPage) -> None:
+    broken = {}
+    page.open(MAPS[name]())
+    for screen in ((1440, 900), (390, 844)):
+        with page.screen(*screen, mobile=screen[0] < 800):
+            for colours in ("light", "dark"):
+                page.ask("map.fire('click', {latlng: map.getCenter()})")
+                page.told()
+                broken[(screen, colours, "told")] = violations(page)
+                page.ask("semsig.hide(map)")
+                page.ask("document.querySelectorAll('details').forEach((one) => one.open = true)")
+                broken[(screen, colours, "")] = violations(page)
+                page.ask("document.querySelector('.semsig-colours').click()")
+    assert {key: rules for key, rules in broken.items() if rules} == {}
+
+
+def test_what_can_be_pressed_is_as_large_as_a_finger(page: MapPage) -> None:
+    sizes = """
+    const parts = "button, .leaflet-bar a, .semsig-search input, summary, .leaflet-control-layers "
+      + "label, .leaflet-control-layers-toggle";
+    return [...document.querySelectorAll(parts)].map((one) => {
+      const {width, height} = one.getBoundingClientRect();
+      return [one.className || one.textContent, width, height];
+    }).filter(([, width, height]) => width && Math.min(width, height) < 44);
+    """
+    with page.screen(390, 844):
+        page.open(MAPS["ambiguity"]())
+        page.ask("map.fire('click', {latlng: map.getCenter()})")
+        page.told()
+        small = page.ask(sizes)
+        page.ask("semsig.hide(map)")
+        page.ask("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+        page.ask("document.querySelector('.leaflet-control-layers-toggle').click()")
+        assert small + page.ask(sizes) == []
+
+
+def test_a_map_is_named_and_used_by_keys_alone(page: MapPage) -> None:
+    page.browser.execute_cdp_cmd(
+        "Browser.grantPermissions",
+        {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]},
+    )
+    page.open(MAPS["ambiguity"]())
+    map_ = page.one("[role=main]")
+    assert map_.get_attribute("aria-roledescription") == "map"
+    assert map_.accessible_name == "Cells that look the same"
+    order = []
+    for _ in range(9):
+        page.browser.switch_to.active_element.send_keys(Keys.TAB)
+        order.append(page.browser.switch_to.active_element.accessible_name)
+    assert order[0] == "Cells that look the same"
+    assert order[1].startswith("Search")
+    assert [one for one in order if one in {"Zoom in", "Dark colours", "Print this view"}] == [
+        *("Zoom in", "Dark colours", "Print this view")
+    ]
+    map_.send_keys("c")
+    assert page.one("[role=status].semsig-said").text.startswith("Copied: ")
