@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import http.client
+import os
+import re
+import signal
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from sentences import sentence
+from worlds import save_town
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Run
+
+START = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's jobs may ignore it
+from semsig_gis.cli import main
+sys.argv = ["semsig", *sys.argv[1:]]
+main()
+"""
+
+
+@pytest.fixture
+def town(tmp_path: Path) -> Path:
+    return save_town(tmp_path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="interrupts are sent in another way")
+def test_the_workbench_opens_and_ends_with_the_interrupt_key(town: Path, carried: None) -> None:  # noqa: ARG001
+    command = [sys.executable, "-c", START, "serve", str(town), "--no-browser"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        address = re.search(r"http://127\.0\.0\.1:(\d+)(/\?token=[\w-]{43})$", line.strip())
+        assert address
+        server = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=60)
+        server.request("GET", address[2])
+        assert b"workbench" in server.getresponse().read()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        server.close()  # which the browser keeps open
+    assert (process.returncode, out) == (130, "")
+    assert err.splitlines() == ["semsig: it runs until you press Ctrl-C", "semsig: interrupted"]
+
+
+def test_without_its_libraries_it_says_what_to_install(
+    town: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "semsig_gis.serve.server", raising=False)
+    monkeypatch.delattr("semsig_gis.serve.server", raising=False)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    sentence(run("serve", town, "--no-browser"), "semsig_gis[serve]")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--port", "70000"), ("--port", "65,535")),
+        (("--noise", "loud"), ("loud", "generic")),
+        (("--objects", "nowhere.parquet"), ("nowhere.parquet",)),
+    ],
+)
+def test_what_cannot_be_served_gets_one_sentence(
+    town: Path, run: Run, options: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    sentence(run("serve", town, "--no-browser", *options), *words)
+    sentence(run("serve", "nowhere.parquet"), "nowhere.parquet")
