@@ -31,11 +31,7 @@ semsig.colours = (map) => {
       show();
     });
     show();
-    for (const [name, sign, title, act] of [
-      ["semsig-save", "M10 3v9M6 8l4 4 4-4M3 13v4h14v-4", "Save this view as a picture",
-        semsig.savePicture],
-      ["semsig-print", "M6 7V3h8v4M6 14H3V7h14v7h-3M6 11h8v6H6z", "Print this view", semsig.print],
-    ]) semsig.mapButton(bar, name, "", title, () => act(map)).append(semsig.icon(sign));
+    map.semsigBar = bar;
     return bar;
   };
   control.addTo(map);
@@ -134,6 +130,7 @@ semsig.furnish = (map, layers, area, credits) => {
   semsig.panel(map);
   semsig.answers(map, 2, (event) => semsig.tellPlace(map, event.latlng));
   semsig.colours(map);
+  semsig.pictureButtons(map);
   semsig.search(map, area);
   semsig.title(map);
   semsig.explain(map, layers);

@@ -41,14 +41,13 @@ semsig.ground = (packed, about) => {
     semsig.finders.push((words, limit) => semsig.matches(plain, words, limit).map(
       ({rank, at}) => ({
         rank, name: data.names[at], hint: "street", show: (map) => show(map, at)})));
-    semsig.addOpener("street", (map, name) => {
+    return (map, name) => {
       const at = data.names.indexOf(name);
       if (at >= 0) show(map, at);
-      return at >= 0;
-    });
+    };
   };
   for (const [kind, arrays] of Object.entries(packed)) {
-    semsig.arrays(arrays).then((data) => {
+    const ready = semsig.arrays(arrays).then((data) => {
       const firsts = new Int32Array(data.rings.length + 1);  // point of each shape
       for (let shape = 0; shape < data.rings.length; shape += 1) {
         firsts[shape + 1] = data.ends[data.rings[shape] - 1];
@@ -60,8 +59,14 @@ semsig.ground = (packed, about) => {
       data.boxes = semsig.blocks(data.x, data.y, starts);
       data.firsts = firsts;
       kinds[kind] = data;
-      if (data.names) nameStreets(data);
       layer.redraw();
+      return data;
+    });
+    if (!arrays.names) continue;
+    const named = ready.then(nameStreets);
+    semsig.addOpener("street", (map, name) => {
+      named.then((tell) => tell(map, name));
+      return true;
     });
   }
   const draw = (ctx, data, frame, min, max, closed) => {

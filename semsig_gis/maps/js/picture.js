@@ -112,3 +112,11 @@ semsig.print = async (map) => {
   set(false);
   map.setView([lat, lng], map.getZoom(), {animate: false});
 };
+// Beside light and dark.
+semsig.pictureButtons = (map) => {
+  for (const [name, sign, title, act] of [
+    ["semsig-save", "M10 3v9M6 8l4 4 4-4M3 13v4h14v-4", "Save this view as a picture",
+      semsig.savePicture],
+    ["semsig-print", "M6 7V3h8v4M6 14H3V7h14v7h-3M6 11h8v6H6z", "Print this view", semsig.print],
+  ]) semsig.mapButton(map.semsigBar, name, "", title, () => act(map)).append(semsig.icon(sign));
+};
