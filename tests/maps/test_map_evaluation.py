@@ -207,11 +207,10 @@ def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
     )
     assert asked["misnamed"] == cell["misnamed"]
     assert (asked["missed"], cell["false"]) == (0, 0)
-    words = {"matched": "matched", "misnamed": "of another class"}
     key = [one.text for one in evaluated.all(".semsig-key span")]
     both = asked | {"missed": cell["missed"]}
-    told_of = {**words, "missed": "missed", "false": "extra"}
-    assert key == [f"{both[one]} {word}" for one, word in told_of.items() if both[one]]
+    words = {one: one for one in ("matched", "misnamed", "missed")} | {"false": "extra"}
+    assert key == [f"{both[one]} {word}" for one, word in words.items() if both[one]]
     # Beside it, what the best cell sees.
     evaluated.all(".semsig-choices button")[1].click()
     assert evaluated.all("figcaption")[1].text.startswith("Best cell sees")

@@ -192,6 +192,7 @@ def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
         page.open(ambiguity_map(CITY))
         page.ask("map.setView(arguments[0], 19, {animate: false})", PLACES[cell].tolist())
         page.click(CITY, cell)
+        key = f"cell:{CITY.cell_ids[cell]}"
         first = page.all(".semsig-wheels figure")[0]
         objects = first.find_elements(By.CSS_SELECTOR, ".object")
         hint = "Point at an object to see it on the map."
@@ -212,6 +213,13 @@ def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
         # From the map to the wheel.
         page.ask("shown((one) => one.getElement?.()?.matches?.('.semsig-object'))[2].fire('click')")
         assert lit(page)[0].index(True) == 2
+        # A click of a mouse asks for what is below.
+        sign = page.all(".semsig-object")[0]
+        ActionChains(page.browser).move_to_element(sign).click().perform()
+        told = "return map.semsigPanel.told.key"
+        WebDriverWait(page.browser, 10.0).until(lambda _: page.ask(told) != key)
+        page.click(CITY, cell)
+        objects = page.all(".semsig-wheels figure:first-child .object")
         # By keyboard, round and back.
         page.ask("arguments[0].focus()", objects[0])
         page.browser.switch_to.active_element.send_keys(Keys.ARROW_LEFT)

@@ -25,13 +25,13 @@ semsig.entries = (types, bearings, look = {}) => bearings.map((degrees, one) => 
 });
 // What became of the objects of two signatures: by kind of what is compared, in words.
 semsig.comparisons = {
-  query: {matched: "matched", misnamed: "of another class", missed: "missed", false: "extra"},
+  query: {matched: "matched", misnamed: "misnamed", missed: "missed", false: "extra"},
   cells: {matched: "in both", misnamed: "of another class", missed: "only here",
     false: "only there"},
   dates: {matched: "still there", misnamed: "of another class", missed: "gone", false: "new"},
 };
 // Which objects of two signatures are the same, and which have no partner: for each object of
-// both, `partner` (or -1) and `verdict`. One may know better (`look.partners`, of the second).
+// both, `partner` (or -1) and `verdict`; `lone` has the verdicts of those without, by side.
 semsig.compare = ([types, bearings, look = {}], [others, degrees, otherLook = {}], lone) => {
   const sides = [[types, bearings, look], [others, degrees, otherLook]];
   const partner = sides.map(([, angles]) => angles.map(() => -1));
@@ -39,7 +39,7 @@ semsig.compare = ([types, bearings, look = {}], [others, degrees, otherLook = {}
   const pairs = [];
   const same = (one, other) => !types || !others || types[one] === others[other];
   bearings.forEach((angle, one) => {
-    if (look.partners || look.outside?.includes(one)) return;
+    if (look.outside?.includes(one)) return;
     degrees.forEach((otherAngle, other) => {
       if (otherLook.outside?.includes(other)) return;
       const off = Math.abs(((otherAngle + turn - angle) % 360 + 540) % 360 - 180);
@@ -49,9 +49,8 @@ semsig.compare = ([types, bearings, look = {}], [others, degrees, otherLook = {}
       if (off <= (alike ? 25 : 12)) pairs.push([off + apart + (alike ? 0 : 20), one, other]);
     });
   });
-  for (const [one, other] of (look.partners ?? []).entries()) pairs.push([0, one, other]);
   for (const [, one, other] of pairs.sort((a, b) => a[0] - b[0])) {
-    if (other < 0 || partner[0][one] >= 0 || partner[1][other] >= 0) continue;
+    if (partner[0][one] >= 0 || partner[1][other] >= 0) continue;
     [partner[0][one], partner[1][other]] = [other, one];
   }
   return sides.map(([, angles, {outside}], side) => angles.map((_, one) => {
@@ -225,7 +224,13 @@ semsig.scenes = (first, others, signs, kind) => {
           ? L.marker(end, {keyboard: false, zIndexOffset: 1000, icon: L.divIcon(
             {className: "semsig-object", iconSize: [22, 22], html: icon})})
           : L.polyline([look.place, end], {color: "#808080", weight: 2, dashArray: "3 5"});
-        marker.on("mouseover click", () => light(side, one));
+        marker.on("mouseover", () => light(side, one));
+        // A finger cannot point; a mouse does, and its click asks for what is below.
+        marker.on("click", ({originalEvent}) => {
+          if (originalEvent?.pointerType === "mouse") {
+            map.fire("click", {latlng: map.mouseEventToLatLng(originalEvent), originalEvent});
+          } else light(side, one);
+        });
         marker.on("mouseout", () => light(side, -1));
         return marker.addTo(group);
       }));
