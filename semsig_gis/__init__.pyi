@@ -75,6 +75,7 @@ from .matching.search import Localization as Localization, localize as localize
 from .likelihood.posterior import (
     AnswerRule as AnswerRule,
     calibrate as calibrate,
+    open_posterior as open_posterior,
     open_rule as open_rule,
     save_rule as save_rule,
 )
@@ -140,10 +141,11 @@ from .evaluation.spec import (
     open_experiment_spec as open_experiment_spec,
 )
 from .maps.cells import ambiguity_map as ambiguity_map, identifiability_map as identifiability_map
+from .maps.city import city_map as city_map
 from .maps.drift import drift_map as drift_map
 from .maps.evaluation import evaluation_map as evaluation_map
 from .maps.location import localization_map as localization_map
-from .maps.location import location_map as location_map
+from .maps.location import location_map as location_map, posterior_map as posterior_map
 from .maps.objects import ground_map as ground_map, objects_map as objects_map
 from .maps.page import save_map as save_map, show_map as show_map
 from .exports import export_answer as export_answer, export_database as export_database

@@ -11,6 +11,20 @@ const shown = (test) => {
 const circles = (colour) =>
   shown((layer) => layer instanceof L.CircleMarker && layer.options.fillColor === colour);
 
+// The queries that are drawn and became this, as signs.
+const queries = (outcome) => {
+  const { about, data, placeOf, selection } = semsig.held.queries;
+  return selection()
+    .filter((one) => about.outcomes[data.outcome[one]].name === outcome)
+    .map((one) => ({
+      getLatLng: () => L.latLng(placeOf(one)),
+      fire: () => semsig.openers.query(map, String(one + 1)),
+    }));
+};
+
+// Signs by their colour, or queries by what became of them.
+const signs = (kind) => (kind.startsWith("#") ? circles(kind) : queries(kind));
+
 const lines = (test) => shown((layer) => layer.getLatLngs && test(layer));
 
 // What the panel says.
@@ -81,22 +95,15 @@ const fieldCover = (size, done) =>
     done(data.filter((value, at) => at % 4 === 3 && value > 127).length / size ** 2);
   });
 
-// Which share of its box a sign of a colour covers.
-const signArea = (colour) => {
-  const [{ options }] = circles(colour);
-  const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = 100;
-  const ctx = canvas.getContext("2d");
-  const sign = new semsig.Sign([0, 0], { ...options, weight: 0.01 });
-  Object.assign(sign, {
-    _point: L.point(50, 50),
-    _radius: options.outline.includes("A") ? 50 : 50 / 1.2,
-    _renderer: { _ctx: ctx, _drawing: true, _bounds: L.bounds([0, 0], [100, 100]) },
-    _pxBounds: L.bounds([0, 0], [100, 100]),
+// Which share of its box the sign of an outcome covers.
+const signArea = (outcome) => {
+  const { outline } = semsig.held.queries.about.outcomes.find(({ name }) => name === outcome);
+  const size = outline.includes("A") ? 50 : 50 / 1.2;
+  const { colour } = semsig.sprite(60, (ctx) => {
+    ctx.scale(size, size);
+    ctx.fill(new Path2D(outline));
   });
-  sign._updatePath();
-  const { data } = ctx.getImageData(0, 0, 100, 100);
-  return data.filter((value, at) => at % 4 === 3 && value > 127).length / 100 ** 2;
+  return colour.length / 100 ** 2;
 };
 
 // Where the first objects are that are called by their numbers.

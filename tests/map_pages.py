@@ -33,6 +33,11 @@ IMAGES = "img.leaflet-image-layer"
 LEGEND = ".semsig-legend"
 
 # What the script of a page can be asked about its one map.
+# Numbers are unpacked when the page is there.
+READY = """
+const parts = Object.values(window.semsig?.held ?? {}).map((one) => one.ready);
+Promise.all(parts).then(() => requestAnimationFrame(() => arguments[0]()));
+"""
 ASK = Path(__file__).with_name("map_pages.js").read_text(encoding="utf-8")
 
 
@@ -47,7 +52,12 @@ class MapPage:
         """Save a map as a self-contained page and open it; an alert fails the next command."""
         file = self.folder / "map.html"
         assert save_map(map_, file, self_contained=True)
-        self.browser.get(file.as_uri())
+        self.visit(file.as_uri())
+
+    def visit(self, address: str) -> None:
+        """Open an address, and wait until the page has unpacked its numbers."""
+        self.browser.get(address)
+        self.browser.execute_async_script(READY)
 
     def ask_later(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
         """Return what a script hands to the last of its arguments."""
@@ -56,9 +66,9 @@ class MapPage:
     def ask(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
         return self.browser.execute_script(ASK + script, *arguments)
 
-    def circles(self, colour: str) -> int:
-        """Return the number of circles of a colour."""
-        return int(self.ask("return circles(arguments[0]).length", colour))
+    def circles(self, kind: str) -> int:
+        """Return the number of circles of a colour, or of queries that became something."""
+        return int(self.ask("return signs(arguments[0]).length", kind))
 
     def drawn(self, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
         """Return the number of pixels of about this colour on a canvas, by default the circles'."""
@@ -116,9 +126,9 @@ class MapPage:
     def click_at(self, latlon: Sequence[float]) -> None:
         self.ask("map.fire('click', {latlng: L.latLng(...arguments)})", *latlon)
 
-    def panel_of(self, colour: str) -> str:
-        """Click the first circle of a colour; return what the panel says."""
-        self.ask("circles(arguments[0])[0].fire('click')", colour)
+    def panel_of(self, kind: str) -> str:
+        """Click the first circle of a colour, or query; return what the panel says."""
+        self.ask("signs(arguments[0])[0].fire('click')", kind)
         return self.panel()
 
     def point_at(self, circle: str, *arguments: object) -> None:

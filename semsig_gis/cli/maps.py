@@ -56,16 +56,20 @@ def draw_ground(
             raise
 
 
-def _below(drawn: folium.Map | None, tiles: str | None) -> dict[str, Any]:
-    """Return what a map is drawn on: what was drawn before, or online tiles, if any."""
-    return {"tiles": tiles} if drawn is None else {"map_": drawn}
+def _dates(city: City, newer: City) -> dict[str, Any]:
+    """Return the later database, and the street objects of both where there are."""
+    objects = {"objects_before": city.objects, "objects_after": newer.objects}
+    if None in objects.values():
+        remark("street objects of both databases were not found; drawing cells only")
+        objects = {}
+    return {"newer": newer.database, **objects}
 
 
 def _require_content(evaluation: Path | None, smooth: float | None, *, other: bool) -> None:
     if evaluation is None and not other:
         msg = (
             "there is nothing to show on the map; give --evaluation, --ambiguity, "
-            "--identifiability, --drift or --objects, or several of them."
+            "--identifiability, --drift, --location or --objects, or several of them."
         )
         raise InputError(msg)
     if smooth is not None and evaluation is None:
@@ -100,6 +104,13 @@ def map_(
     drift: Annotated[
         Path | None, typer.Option(help="Draw the changes up to this newer database.")
     ] = None,
+    location: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw an answer: the .tif file that `semsig localize --method likelihood --out` "
+            "wrote."
+        ),
+    ] = None,
     objects: Annotated[
         Path | None, typer.Option(help="Draw street objects written by `semsig load`.")
     ] = None,
@@ -127,59 +138,54 @@ def map_(
     ] = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw an evaluation, cells, changes and street objects on one map."""
-    import numpy as np
+    """Draw an evaluation, cells, changes, an answer and street objects on one map."""
+    import shapely
 
     from semsig_gis.database.city import open_city
     from semsig_gis.database.database import require_same_place
     from semsig_gis.evaluation.file import open_evaluation
-    from semsig_gis.maps.cells import ambiguity_map, identifiability_map
-    from semsig_gis.maps.drift import drift_map
-    from semsig_gis.maps.evaluation import evaluation_map
-    from semsig_gis.maps.objects import objects_map
+    from semsig_gis.likelihood.posterior import open_posterior
+    from semsig_gis.maps.city import city_map
     from semsig_gis.maps.page import save_map
     from semsig_gis.objects.table import open_objects
 
-    cells = identifiability or ambiguity or drift is not None
-    _require_content(evaluation, smooth, other=cells or objects is not None)
-    keep_inputs(out, read=(database, drift, objects, buildings, streets))
+    others = (drift, location, objects)
+    cells = identifiability or ambiguity
+    _require_content(evaluation, smooth, other=cells or others != (None, None, None))
+    keep_inputs(out, read=(database, drift, location, objects, buildings, streets))
     require_suffix(".html", out)
+    if location is not None and location.suffix.lower() not in {".tif", ".tiff"}:
+        msg = (
+            f"{location} does not hold the chance of every cell; give the .tif file that semsig "
+            "localize --method likelihood --out wrote."
+        )
+        raise InputError(msg)
     results = None if evaluation is None else open_evaluation(evaluation)
     city = open_city(database)
     opened = city.database
-    columns = known_identifiability(city) if identifiability or ambiguity else None
-    if identifiability and columns is None:
+    known = known_identifiability(city) if identifiability or ambiguity else None
+    if identifiability and known is None:
         msg = f"{database} does not tell where a query can be placed; run semsig identify first."
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_city(drift)
+    dates = {} if newer is None else _dates(city, newer)
+    chances = None if location is None else open_posterior(location, opened)
     if seen is not None:
-        places = seen.table.geometry.to_crs(opened.crs)
-        require_same_place(opened, np.stack([places.x, places.y], axis=1), "street objects")
+        places = shapely.get_coordinates(seen.table.geometry.to_crs(opened.crs).array)
+        require_same_place(opened, places, "street objects")
     with progress("drawing the map"):
-        drawn: Any = None  # a map of folium, which the command line does not know
-        if results is not None:
-            drawn = evaluation_map(results, opened, smooth=smooth, **_below(drawn, tiles))
-        if ambiguity:
-            drawn = ambiguity_map(opened, identifiability=columns, **_below(drawn, tiles))
-        if columns is not None and identifiability:
-            drawn = identifiability_map(columns, **_below(drawn, tiles))
-        if newer is not None:
-            before, after = city.objects, newer.objects
-            if before is None or after is None:
-                remark("street objects of both databases were not found; drawing cells only")
-                before = after = None
-            drawn = drift_map(
-                opened,
-                newer.database,
-                objects_before=before,
-                objects_after=after,
-                **_below(drawn, tiles),
-            )
-        if seen is not None:
-            drawn = objects_map(
-                seen, database=opened if drawn is None else None, **_below(drawn, tiles)
-            )
+        drawn = city_map(
+            opened,
+            evaluation=results,
+            smooth=smooth,
+            ambiguity=ambiguity,
+            identifiability=known,
+            posterior=chances,
+            objects=seen,
+            tiles=tiles,
+            **dates,
+        )
         draw_ground(drawn, city, buildings=buildings, streets=streets)
         offline = save_map(drawn, out, title=title or database.stem.replace("_", " ").capitalize())
     say(f"map: {out}")

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
 LEAST_LOG = -700.0  # whose exponential is a number
 LEAST_MASS = 1e-9  # of the chance, in cells that need not be sorted
+ROUNDING = 1e-3  # of a sum of chances that were written as float32
 PLACES = 1000
 """Likeliest cells among which the best place is looked for."""
 
@@ -153,6 +154,61 @@ class Posterior(Displayed):
         mass = np.round(self.mass_within(radius, cells), 9)
         best = np.lexsort((-self.chances[cells], -mass))[0]
         return int(cells[best]), float(mass[best])
+
+
+def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
+    """Read the chances of all cells from a raster that `export_answer` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        GeoTIFF with the chances.
+    database : SignatureDatabase
+        The database that was searched.
+
+    Returns
+    -------
+    Posterior
+        The chances, to the precision of the file.
+
+    Raises
+    ------
+    SourceError
+        If the file cannot be read as a raster.
+    CrsError
+        If its CRS is missing or does not fit that of the database.
+    InputError
+        If it does not hold the chances of the cells of the database.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import build_index, export_answer, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location = locate(index, demo_database.signature(0))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = export_answer(location, demo_database, f"{folder}/chances.tif")
+    ...     again = open_posterior(f"{folder}/chances.tif", demo_database)
+    >>> bool(np.allclose(again.chances, location.chances, atol=1e-6))
+    True
+    """
+    from semsig_gis.storage.raster import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+
+    chances = raster_at_cells(
+        path,
+        grid=database.grid,
+        columns=database.columns,
+        rows=database.rows,
+        crs=database.crs,
+    )
+    total = chances.sum()
+    if not (chances >= 0).all() or not math.isclose(total, 1.0, abs_tol=ROUNDING):
+        msg = (
+            f"{path} does not hold the chances of the cells of this database, which add up to 1; "
+            "give a .tif file that semsig localize --method likelihood --out wrote for it."
+        )
+        raise InputError(msg)
+    return Posterior(database=database, chances=chances / total)
 
 
 def _likeliest_first(chances: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -191,7 +191,7 @@ def _object_drawings(
             drawings = [["lines", [[{"color": "#808080", "weight": 2, "opacity": 0.9}, lines]]]]
         places, details = (facts[columns].to_numpy().tolist() for columns in (PLACE, POPUP))
         records = [
-            [place, OBJECT_COLOURS[kind], 5, None, f"Object {kind}", values]
+            [place, OBJECT_COLOURS[kind], 5, f"Object {kind}", values]
             for place, values in zip(places, details, strict=True)
         ]
         drawings.append(["points", OBJECT_FIELDS, {}, records])

@@ -8,6 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from semsig_gis.core.signs import ERROR_BREAKS, FAILURES, OUTCOMES
 from semsig_gis.database.observation import parse_view
@@ -16,6 +17,8 @@ from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.parts import (
     OUTLINES,
+    PAGE_FILES,
+    Call,
     Drawing,
     add_city,
     cell_signature,
@@ -26,6 +29,7 @@ from semsig_gis.maps.parts import (
     finished_map,
     folded,
     isolated,
+    layers_of,
     made_by,
     mark_svg,
     panel_signature,
@@ -62,7 +66,6 @@ QUERY_FIELDS = (
     *("True cell", "Best cell", "Next best cells", "Best cell sees"),
 )
 FIELD_NAME = "Share of queries that fail"
-MANY = 2000  # queries, whose circles are smaller
 KILOMETRE = 1000
 THRESHOLDS = ERROR_BREAKS[:4]  # metres of error that the legend tells of
 SHARES = 250  # steps of a share in a byte, of which 0 is none
@@ -122,50 +125,93 @@ def evaluation_map(
     xy = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
     places = to_latlon(xy, database.crs)
     best_places = to_latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
-    records = _query_records(evaluation, database, places, best_places)
     field = error_field(evaluation, database, radius=smooth)
     page = prepared_map(map_, tiles, title="Localization errors")
     city = add_city(page, database)
     around = Drawing(None, "field", *_field(field, database), group="cells")
     around.add_to(page)
     colour_cells(page, FIELD_NAME, city, around)
-    outcomes = dict(zip(OUTCOMES, (evaluation.successful, ~evaluation.successful), strict=True))
-    pairs = np.stack([places, best_places], axis=1)
-    located = np.isfinite(best_places).all(axis=1)
-    lines = [
-        [{"color": OUTCOMES[outcome].colour}, pairs[some & located].tolist()]
-        for outcome, some in outcomes.items()
-    ]
-    draw(page, "Lines from true to estimated places", "lines", lines, group="queries", show=False)
-    # The rarer last, so that they lie on top.
-    for outcome, some in sorted(outcomes.items(), key=lambda one: -one[1].sum()):
-        name = f"{outcome.capitalize()} queries ({int(some.sum()):,})"
-        points = list(itertools.compress(records, some))
-        look = (QUERY_FIELDS, panel_signs(database), points, OUTLINES[OUTCOMES[outcome].shape])
-        draw(page, name, "points", *look, group="queries")
+    _add_queries(page, evaluation, database, places, best_places)
     legend = evaluation_legend(evaluation, radius=field.radius, licenses=database.licenses)
     view = corners_of(database) if map_ is None else None
     return finished_map(page, database, legend=legend, view=view)
 
 
-def _query_records(
+def _add_queries(
+    map_: folium.Map,
     evaluation: Evaluation,
     database: SignatureDatabase,
     places: NDArray[np.float64],
     best_places: NDArray[np.float64],
-) -> list[list[Any]]:
-    """Return what the script draws of each query: place, look, best places, heading, details."""
+) -> None:
+    """Add layers of the queries by outcome and of the lines to their best places, and filters."""
     queries = evaluation.queries
-    radius = 5 if len(queries) <= MANY else 3
+    failed = ~evaluation.successful
+    stated = evaluation.method.noise is not None
+    chances = queries["chance" if stated else f"p{Evaluation.success_metres}"].fillna(0.0)
+    next_places, details = _query_details(evaluation, database, places)
+    best = queries["best_cell_id"]
+    arrays = {
+        "places": packed(_microdegrees(places)),
+        "best": packed(_microdegrees(best_places)),
+        "located": packed(np.isfinite(best_places[:, 0]).astype(np.uint8)),
+        "outcome": packed(failed.astype(np.uint8)),
+        "error": packed(queries["error_m"].to_numpy(np.float64)),
+        "chance": packed(np.rint(100.0 * chances.to_numpy(np.float64)).astype(np.uint8)),
+        "length": packed(queries["length"].to_numpy(np.int32)),
+        "types": packed(queries["types"].tolist()),
+        "asked": packed(queries["query_types"].tolist()),
+        "cells": packed(queries["cell_id"].astype(str).tolist()),
+        "bestCells": packed([None if cell is pd.NA else str(cell) for cell in best]),
+        "next": packed(next_places),
+        "details": packed(details),
+    }
+    metres = Evaluation.success_metres
+    about = {
+        "count": len(queries),
+        "order": np.argsort(-np.bincount(failed, minlength=2), kind="stable").tolist(),
+        "outcomes": [
+            {"name": name, "colour": mark.colour, "outline": OUTLINES[mark.shape]}
+            for name, mark in OUTCOMES.items()
+        ],
+        "fields": QUERY_FIELDS,
+        "signs": panel_signs(database),
+        "chance": {"column": "chance", "label": "Chance given"}
+        if stated
+        else {"column": f"p{metres}", "label": f"P(error ≤ {metres} m)"},
+    }
+    others = sum(isinstance(child, _Queries) for child in layers_of(map_).values())
+    key = f"queries{others + 1}" if others else "queries"
+    _Queries("queries", map_, key, arrays, about).add_to(map_)
+    for at, name in enumerate(OUTCOMES):
+        title = f"{name.capitalize()} queries ({int((failed == at).sum()):,})"
+        draw(map_, title, "queryLayer", key, at, group="queries")
+    title = "Lines from true to estimated places"
+    draw(map_, title, "queryLayer", key, len(OUTCOMES), group="queries", show=False)
+
+
+class _Queries(Call):
+    files = (*PAGE_FILES, "filters.css", "queries.js", "filters.js")
+
+
+def _microdegrees(places: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return millionths of degrees, as many as `to_latlon` has; 0 where there is no place."""
+    return np.rint(1e6 * np.nan_to_num(places)).astype(np.int32)
+
+
+def _query_details(
+    evaluation: Evaluation, database: SignatureDatabase, places: NDArray[np.float64]
+) -> tuple[list[list[list[float]]], list[list[Any]]]:
+    """Return the places of the next best cells of each query, and the values of its fields."""
     rows = evaluation.rows_in(database).tolist()
-    best_ids = queries["best_cell_id"].fillna(0).to_numpy(np.int64)
+    best_ids = evaluation.queries["best_cell_id"].fillna(0).to_numpy(np.int64)
     best_rows = np.searchsorted(database.cell_ids, best_ids).tolist()
     next_places, next_errors = _next_cells(evaluation, database)
     cell_places = to_latlon(database.xy, database.crs).tolist()
     radius_m = database.spec.radius
-    bearings, successful = evaluation.query_bearings, evaluation.successful.tolist()
-    records = []
-    for number, query in enumerate(queries.itertuples(index=False)):
+    bearings = evaluation.query_bearings
+    details = []
+    for number, query in enumerate(evaluation.queries.itertuples(index=False)):
         located = query.tied > 0
         view = _view(query, database) if query.query_ranges or query.query_sectors else None
         look = {"place": places[number].tolist(), "turn": query.heading}
@@ -177,7 +223,7 @@ def _query_records(
             else query_signature(view, database.taxonomy, radius=radius_m, **look)
         )
         true_row, best_row = rows[number], best_rows[number]
-        details = [
+        values = [
             asked if query.query_length else "nothing left of it",
             cell_signature(database, true_row, view, query.heading, place=cell_places[true_row])
             if true_row >= 0
@@ -192,13 +238,8 @@ def _query_records(
             ", ".join(f"{_metres(error)} off" for error in next_errors[number]) or None,
             cell_signature(database, best_row, place=cell_places[best_row]) if located else None,
         ]
-        outcome = "successful" if successful[number] else "failed"
-        best = [best_places[number].tolist(), *next_places[number]] if located else None
-        name = f"Query {number + 1:,}: {outcome}"
-        records.append(
-            [places[number].tolist(), OUTCOMES[outcome].colour, radius, best, name, details]
-        )
-    return records
+        details.append(values)
+    return next_places, details
 
 
 def _view(query: Any, database: SignatureDatabase) -> View:  # noqa: ANN401 - a named row

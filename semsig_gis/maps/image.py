@@ -217,8 +217,8 @@ def script_json(value: object) -> str:
     return text
 
 
-def packed(values: NDArray[Any] | Sequence[str]) -> list[str]:
-    """Return an array of u1, u2, i4 or f8, or a list of text, for `semsig.arrays`."""
+def packed(values: NDArray[Any] | Sequence[object]) -> list[str]:
+    """Return an array of u1, u2, i4 or f8, or a list for JSON, for `semsig.arrays`."""
     if not isinstance(values, np.ndarray):
         return ["json", _text(json.dumps(values).encode())]
     kind = values.dtype.newbyteorder("<")

@@ -19,6 +19,7 @@ from semsig_gis.core.view import View
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.explain import VERDICTS as COUNTED
+from semsig_gis.likelihood.posterior import DEFAULT_RULE
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.parts import (
     FLIPPING,
@@ -27,6 +28,7 @@ from semsig_gis.maps.parts import (
     cell_image,
     cell_signature,
     colour_cells,
+    corners_of,
     draw,
     finished_map,
     folded,
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
 
 Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners
 PLACE_FIELDS = ("Chance", "Place", "Give or take", "North of the query", "Cell")
+BEST_FIELDS = ("Chance", "Cell sees", "Cell", "Place")
 CANDIDATE_FIELDS = (
     *("Query", "Cell sees", "Chance", "Log-likelihood"),
     *("North of the query", "Cell", "Place"),
@@ -123,7 +126,8 @@ def location_map(
     database = location.posterior.database
     drawings = _Drawings(location)
     page = prepared_map(map_, tiles, title="Where it was seen")
-    _colour_chances(page, location)
+    near = location.answer.given
+    _colour_chances(page, location.posterior, radius=location.rule.radius, near=near)
     for number, explanation in enumerate(location.explanations, start=1):
         parts = drawings.explanation(explanation)
         draw(
@@ -139,10 +143,61 @@ def location_map(
     return finished_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
 
 
-def _colour_chances(map_: folium.Map, location: Location) -> None:
+def posterior_map(
+    posterior: Posterior,
+    *,
+    radius: float = DEFAULT_RULE.radius,
+    map_: folium.Map | None = None,
+    tiles: str | None = None,
+) -> folium.Map:
+    """Show the chance of every cell, as what is left of an answer that was written to a raster.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        What to show (see `open_posterior`).
+    radius : float, default 50
+        Metres around a cell in which the chance is summed up, too.
+    map_, tiles : optional
+        As in `evaluation_map`.
+
+    Returns
+    -------
+    folium.Map
+        The map: the cells coloured as in `location_map`, and the cell around which most of the
+        chance is.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location = locate(index, demo_database.signature(0))
+    >>> posterior_map(location.posterior).options["maxZoom"]
+    20
+    """
+    database = posterior.database
+    page = prepared_map(map_, tiles, title="Where it was seen")
+    _colour_chances(page, posterior, radius=radius, near=False)
+    cell, mass = posterior.best_place(radius)
+    (place,) = to_latlon(database.xy[[cell]], database.crs, digits=7).tolist()
+    told = f"{mass:.1%} within {radius:g} m"
+    seen = cell_signature(database, cell, place=place)
+    details = [told, seen, str(database.cell_ids[cell]), _position(place)]
+    record = [place, CANDIDATE, 8, "Best place", details, "1"]
+    signs = panel_signs(database)
+    draw(page, "Best place", "points", BEST_FIELDS, signs, [record], group="answer")
+    legend = (
+        "<summary>Where it was seen</summary>"
+        f"<p>{len(database):,} cells; most of the chance is around one: {told}</p>"
+        f"{_chances_legend(posterior)}{shades()}{sources(database.licenses)}"
+    )
+    view = corners_of(database) if map_ is None else None
+    return finished_map(page, database, legend=legend, view=view)
+
+
+def _colour_chances(map_: folium.Map, posterior: Posterior, *, radius: float, near: bool) -> None:
     """Colour cells by their chances: from near those of the cells, from afar those around them."""
-    city = add_city(map_, location.posterior.database)
-    posterior, radius, near = location.posterior, location.rule.radius, location.answer.given
+    city = add_city(map_, posterior.database)
     around, cell = posterior.mass_within(radius), posterior.chances
     for name, picture, show in (
         (f"Chance within {radius:g} m", _chances(posterior, around), not near),
@@ -223,7 +278,7 @@ class _Drawings:
             _north(place.heading, place.heading_sigma),
             str(location.cell_id),
         ]
-        record = [centre, mark.colour, 6, None, name, details]
+        record = [centre, mark.colour, 6, name, details]
         outline = {"color": mark.colour, "weight": 3, "opacity": 0.9}
         return [
             ["lines", [[outline, [self.latlon(place.outline())]]]],
@@ -249,7 +304,7 @@ class _Drawings:
                 _position(place),
             ]
             name = f"Rank {row['rank']:,} of {len(self.database):,}"
-            records.append([place, CANDIDATE, 8, None, name, details, str(row["rank"])])
+            records.append([place, CANDIDATE, 8, name, details, str(row["rank"])])
         return records
 
     def explanation(self, explanation: Explanation) -> list[list[Any]]:
@@ -275,7 +330,7 @@ class _Drawings:
                 row["source_id"],
             ]
             name = verdict.capitalize()
-            records.append([*self.latlon(place), VERDICTS[verdict], 6, None, name, details])
+            records.append([*self.latlon(place), VERDICTS[verdict], 6, name, details])
         lines: list[list[Any]] = [
             [{"color": VERDICTS[verdict], **look}, rays[verdict]]
             for verdict, (_, look) in RAYS.items()
@@ -334,15 +389,6 @@ def location_legend(location: Location) -> str:
         if answer.given
         else (ANSWERS["withheld"], "Cannot tell; the best place", f"<p>{BEST_PLACE}</p>")
     )
-    counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
-    regions = "<br>".join(
-        f"{swatch(CHANCES[share], FLIPPING)}{share:.0%} in {count:,} cell{'s' * (count != 1)}"
-        for share, count in counts.items()
-    )
-    chances = " ".join(
-        f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
-        for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
-    )
     told = {row["verdict"] for one in location.explanations for row in one.rows} | set(COUNTED)
     kinds = "".join(
         f"<br>{swatch(VERDICTS[verdict])}{verdict}: {text}"
@@ -357,11 +403,26 @@ def location_legend(location: Location) -> str:
         f"<p>{mark_svg(mark)} <b>{verdict}</b>: {answer.mass:.1%} within "
         f"{location.rule.radius:g} m<br>If there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         f"(ellipse: 90 %)<br>{made_by(method)}</p>{note}{_notes(location)}"
-        f"{part_of('Chance ', f'<p>Chance in percent<br>{chances}</p>')}"
-        f"{part_of('Regions ', f'<p>Regions, the fewest cells that hold<br>{regions}</p>')}"
+        f"{_chances_legend(posterior)}"
         f"{part_of('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
         f"{part_of('Objects from rank ', rays) if location.explanations else ''}"
         f"{shades()}{folded('The query', asked)}{sources(posterior.database.licenses)}"
+    )
+
+
+def _chances_legend(posterior: Posterior) -> str:
+    """Return what the colours of chances mean."""
+    counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
+    regions = "<br>".join(
+        f"{swatch(CHANCES[share], FLIPPING)}{share:.0%} in {count:,} cell{'s' * (count != 1)}"
+        for share, count in counts.items()
+    )
+    chances = " ".join(
+        f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
+        for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
+    )
+    return part_of("Chance ", f"<p>Chance in percent<br>{chances}</p>") + part_of(
+        "Regions ", f"<p>Regions, the fewest cells that hold<br>{regions}</p>"
     )
 
 
@@ -441,7 +502,7 @@ def _candidate_records(
             _position(place),
         ]
         radius = 9 if candidate["rank_low"] == 1 else 6
-        records.append([place, colours[number], radius, None, f"Rank {rank}", details])
+        records.append([place, colours[number], radius, f"Rank {rank}", details])
     return records
 
 

@@ -11,6 +11,7 @@ import pytest
 import shapely
 from osm_xml import node, way, write_osm
 from pyproj import Transformer
+from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
 from semsig_gis.database.build import build_database
@@ -86,22 +87,22 @@ def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, done: Done) ->
 def test_everything_on_one_map(done: Done) -> None:
     done("evaluate city.parquet --queries 5 --out evaluation")
     done("identify city.parquet")
+    done("localize city.parquet --types DD --method likelihood --out answer.tif")
     options = "--evaluation evaluation --ambiguity --identifiability --drift city.parquet"
-    page = drawn(done, f"{options} --objects objects.parquet")
+    page = drawn(done, f"{options} --location answer.tif --objects objects.parquet")
     for name in (
+        *("Same types", "Chance to be found", "What has changed", "Chance within 50 m"),
         "Share of queries that fail",
-        "Same types",
-        "Chance to be found",
-        "What has changed",
+        *("Lines from true to estimated places", "Best place"),
     ):
         assert page.count(f'"{name}" :') == 1
     assert DRAWN_OBJECTS in page
 
 
-def test_online_tiles_are_drawn_and_told_of(run: Run) -> None:
-    code, _, err = run("map city.parquet --ambiguity --tiles openstreetmap.mapnik --out tiled.html")
-    assert (code, "takes its tiles from the web" in err) == (0, True)
-    assert "tile.openstreetmap.org" in Path("tiled.html").read_text(encoding="utf-8")
+def test_a_raster_of_something_else_is_no_answer(done: Done, run: Run) -> None:
+    done("export city.parquet --out cells.tif")
+    outcome = run("map city.parquet --location cells.tif --out map.html")
+    sentence(outcome, "cells.tif does not hold the chances of the cells", "give a .tif file")
 
 
 def test_a_map_of_what_has_changed(run: Run) -> None:

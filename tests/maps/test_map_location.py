@@ -6,6 +6,7 @@ import math
 import time
 from typing import TYPE_CHECKING
 
+import folium
 import numpy as np
 import pytest
 from map_pages import IMAGES, LEGEND
@@ -20,6 +21,7 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.maps.location import SECTOR, localization_map, location_map
+from semsig_gis.maps.parts import OUTLINES
 from semsig_gis.matching.search import localize
 
 if TYPE_CHECKING:
@@ -188,3 +190,9 @@ def test_a_localization_in_a_browser(page: MapPage) -> None:
     assert f"Types: {CITY.types(LONGEST)}" in page.text(LEGEND)
     page.switch("Candidates")
     assert page.ask(texts) == []
+
+
+def test_signs_on_a_map_of_vectors(page: MapPage) -> None:
+    page.open(location_map(found(), map_=folium.Map(tiles=None)))
+    outline = OUTLINES[ANSWERS["given"].shape]
+    assert len(page.all(f'.leaflet-marker-pane path[d="{outline}"]')) == 1

@@ -61,7 +61,8 @@ def test_objects_in_a_browser(page: MapPage) -> None:
     names = page.layers()
     # The letter of the sign, then the title.
     assert any(name.endswith(f"{TITLE} ({COUNT:,})") for name in names)
-    assert len(names) == len(OBJECTS.class_counts) + 2  # cells, or nothing
+    assert names[:2] == ["Objects seen from a cell", "Nothing"]
+    assert len(names) == len(OBJECTS.class_counts) + 2
     legend = page.one(LEGEND).text
     assert f"{len(OBJECTS):,} objects of {len(OBJECTS.class_counts)} classes" in legend
     for signs in (".semsig-legend", ".leaflet-control-layers-overlays"):

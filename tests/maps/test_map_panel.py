@@ -15,7 +15,6 @@ from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_evaluation
 from worlds import random_town
 
-from semsig_gis.core.signs import OUTCOMES
 from semsig_gis.maps.cells import ambiguity_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.objects import objects_map
@@ -89,13 +88,9 @@ def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int
 def test_what_is_told_of_is_never_covered(page: MapPage, screen: tuple[int, int]) -> None:
     with still(page, *screen):
         page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
-        count = page.ask("return circles(arguments[0]).length", OUTCOMES["failed"].colour)
+        count = page.ask("return signs('failed').length")
         for query in range(0, count, max(1, count // 12)):
-            page.ask(
-                "circles(arguments[1])[arguments[0]].fire('click')",
-                query,
-                OUTCOMES["failed"].colour,
-            )
+            page.ask("signs('failed')[arguments[0]].fire('click')", query)
             assert is_beside_the_panel(page)
 
 
@@ -165,7 +160,10 @@ def test_what_a_key_names_is_told_again(page: MapPage) -> None:
         assert known
         assert said.startswith(title)
         wait_for(page, {"place": "place:48.100000,2.100000"}.get(kind, f"{kind}:{rest}"))
-    layers = page.ask("return Object.keys(semsig.held).map((name) => name.slice(7))")
+    layers = page.ask(
+        "return Object.keys(semsig.held).filter("
+        "(name) => /^objects/.test(name)).map((name) => name.slice(7))"
+    )
     assert len(layers) == 2
     for layer in layers:
         assert page.ask("return semsig.openers.object(map, arguments[0])", f"{layer}/3")

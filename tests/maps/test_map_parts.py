@@ -27,7 +27,7 @@ from worlds import TAXONOMY, random_town
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.signs import CANDIDATE_RAMP, OBJECT_COLOURS, OUTCOMES, VERDICTS
+from semsig_gis.core.signs import CANDIDATE_RAMP, OBJECT_COLOURS, VERDICTS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
@@ -57,7 +57,6 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise
 
 WORLD = random_town()
-SUCCESSFUL, FAILED = (mark.colour for mark in OUTCOMES.values())
 CITY, OBJECTS = WORLD.database, WORLD.street_objects
 HOUSE = gpd.GeoDataFrame(geometry=[shapely.box(765_300, 6_275_100, 765_320, 6_275_120)], crs=2154)
 NO_PLACE = gpd.GeoDataFrame(geometry=[None], crs=2154)
@@ -210,7 +209,7 @@ HELPED = int(np.flatnonzero((chances_of(CITY).gains > 0.1).any(axis=1))[0])
 @pytest.mark.parametrize(
     ("name", "subject", "counts"),
     [
-        ("evaluation", FAILED, (3, 5)),
+        ("evaluation", "failed", (3, 5)),
         ("localization", CANDIDATE_RAMP[0], (2, 1)),
         ("location", VERDICTS["matched"], (3, 4)),
         ("drift", OBJECT_COLOURS["removed"], (6, 3)),
@@ -258,7 +257,7 @@ def test_boxes_fold_when_the_window_becomes_small(evaluated: MapPage) -> None:
         wait.until(lambda _: evaluated.all(boxes) == [])
     wait.until(lambda _: len(evaluated.all(boxes)) == 1)
     evaluated.switch("Failed")  # the layers are there again
-    assert evaluated.circles(FAILED) == 0
+    assert evaluated.circles("failed") == 0
 
 
 def test_nothing_lies_below_the_boxes(evaluated: MapPage) -> None:
@@ -266,13 +265,13 @@ def test_nothing_lies_below_the_boxes(evaluated: MapPage) -> None:
     layers = evaluated.one(".leaflet-control-layers").rect
     left, right = legend["x"] + legend["width"], layers["x"]
     places = """
-    return [...circles(arguments[0]), ...circles(arguments[1])].map(
+    return [...signs("successful"), ...signs("failed")].map(
       (one) => map.latLngToContainerPoint(one.getLatLng()).x);
     """
-    across = evaluated.ask(places, SUCCESSFUL, FAILED)
+    across = evaluated.ask(places)
     assert left <= min(across) <= max(across) <= right
     for side in (-0.95, 0.95):
-        evaluated.ask("clickAt(circles(arguments[0])[0], arguments[1])", FAILED, side)
+        evaluated.ask("clickAt(signs('failed')[0], arguments[0])", side)
         where = evaluated.ask("return map.latLngToContainerPoint(toldPlace()).x")
         assert left <= where <= evaluated.one(".semsig-panel").rect["x"]
         rows = [line.split("\t") for line in evaluated.panel().splitlines() if "\t" in line]

@@ -55,6 +55,8 @@ def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
         assert checked(page) == [name]
         seen[name] = tuple(one.get_attribute("src") for one in page.all(IMAGES))
         assert len(page.all(".semsig-field")) == (name == "Share of queries that fail")
+        orders = [one.value_of_css_property("z-index") for one in page.all(IMAGES)]
+        assert orders == sorted(orders)  # the first is below
     (city,) = seen["Objects seen from a cell"]
     assert seen["Share of queries that fail"] == (city,)
     assert seen["Regions of 50, 90 and 99 %"][0] == city

@@ -44,6 +44,44 @@ semsig.boardLayer = (pane, name, paint) => {
   layer.redraw = () => { if (board) board.redraw(); };
   return layer;
 };
+// A sign as those of its pixels that are not clear: how far right and down, and colour.
+semsig.sprite = (radius, draw) => {
+  const half = Math.ceil(radius);
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 2 * half;
+  const ctx = canvas.getContext("2d");
+  ctx.translate(half, half);
+  draw(ctx);
+  const colours = new Uint32Array(ctx.getImageData(0, 0, 2 * half, 2 * half).data.buffer);
+  const solid = [...colours.keys()].filter((at) => colours[at] >>> 24 > 40);
+  return {
+    right: Int16Array.from(solid, (at) => at % (2 * half) - half),
+    down: Int16Array.from(solid, (at) => Math.floor(at / (2 * half)) - half),
+    colour: Uint32Array.from(solid, (at) => colours[at]),
+  };
+};
+// Half of one colour and half of another.
+semsig.halved = (one, other) => (((one ^ other) & 0xfefefefe) >>> 1) + (one & other) >>> 0;
+// Signs are copied pixel by pixel, many times faster than a canvas draws so many images: `fill` is
+// given the pixels to a point of the screen, and what stamps a sign at a place.
+semsig.stamped = (ctx, min, max, fill) => {
+  const {width, height} = ctx.canvas;
+  if (!width || !height) return;  // a page that is not shown has no size
+  const image = ctx.createImageData(width, height);
+  const pixels = new Uint32Array(image.data.buffer);
+  const dots = width / (max.x - min.x);
+  fill(dots, ({right, down, colour}, x, y) => {
+    const [left, top] = [Math.round((x - min.x) * dots), Math.round((y - min.y) * dots)];
+    for (let at = 0; at < colour.length; at += 1) {
+      const [across, along] = [left + right[at], top + down[at]];
+      if (across < 0 || across >= width || along < 0 || along >= height) continue;
+      const place = along * width + across;
+      const whole = colour[at] >>> 24 > 200 || !pixels[place];
+      pixels[place] = whole ? colour[at] : semsig.halved(colour[at], pixels[place]);
+    }
+  });
+  ctx.putImageData(image, 0, 0);
+};
 // Boxes around so many points at a time, to leave out what is not in view.
 semsig.blocks = (x, y, starts) => {
   const boxes = new Int32Array(4 * (starts.length - 1));

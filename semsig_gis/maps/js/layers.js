@@ -9,10 +9,10 @@ window.semsig = {
     const layer = semsig.layers++;
     // By its number, where it has one.
     const keyOf = (at) => {
-      const [, kind, number] = /^(\w+) (\d[\d,]*)/.exec(records[at][4]) || [];
+      const [, kind, number] = /^(\w+) (\d[\d,]*)/.exec(records[at][3]) || [];
       return kind ? `${kind.toLowerCase()}:${number.replaceAll(",", "")}` : `sign:${layer}/${at}`;
     };
-    for (const [place, colour, radius, places, name, values, label] of records) {
+    for (const [place, colour, radius, name, values, label] of records) {
       const look = {
         pane: "markerPane", radius: radius, color: "#222", weight: 1,
         fillColor: colour, fillOpacity: 1,
@@ -25,12 +25,10 @@ window.semsig = {
         marker.bindTooltip(
           text, {permanent: true, direction: "center", className: "semsig-number"});
       }
-      const hint = places === null ? null : semsig.hint(place, places);
       marker.on("click", (event) => {
         L.DomEvent.stop(event);
-        semsig.show(marker._map, semsig.details(name, fields, values, titles), place, {
-          corners: places ?? [], key: keyOf(markers.indexOf(marker)), drawn: hint,
-        });
+        const box = semsig.details(name, fields, values, titles);
+        semsig.show(marker._map, box, place, {key: keyOf(markers.indexOf(marker))});
       });
       marker.addTo(group);
       markers.push(marker);
@@ -60,12 +58,12 @@ window.semsig = {
     let names = null;
     semsig.finders.push((words, limit) => {
       // What has a number is called by it alone, too.
-      names = names || records.map(([, , , , name, values]) => semsig.plain(
+      names = names || records.map(([, , , name, values]) => semsig.plain(
         [name, /\d[\d,]*/.exec(name), ...named.map((at) => values[at])].join("\n")));
       return semsig.matches(names, words, limit).map(({rank, at}) => ({
         rank,
-        name: records[at][4],
-        hint: hint(records[at][5]),
+        name: records[at][3],
+        hint: hint(records[at][4]),
         show: (map) => tell(map, at),
       }));
     });
@@ -86,7 +84,12 @@ window.semsig = {
       pane: "shadowPane", interactive: false, weight: 1, opacity: 0.6, ...look,
     })));
   },
-  together: (...layers) => L.layerGroup(layers),
+  // One of the layers may be in several groups: the first is below in each.
+  together(...layers) {
+    const group = L.layerGroup(layers);
+    group.setZIndex = () => group;
+    return group;
+  },
   // The layer control in groups. Cells have one colour at a time, or none.
   layerGroups(map, control, titles, groups) {
     const rankOf = ({name}) => [...Object.keys(titles), undefined].indexOf(groups[name]);

@@ -24,43 +24,29 @@ semsig.streetObjects = (key, packed, about) => {
   // What is near enough to be told apart has its shape, and from nearer its letter.
   const sizes = [[12, 1], [13.5, 1.5], [15, 2.2], [16.5, 4], [17.5, 6], [19, 8], [Infinity, 10]];
   const sizeAt = (zoom) => sizes.find(([below]) => zoom < below)[1];
-  // The pixels of a sign that are not clear: how far right and down, and colour.
   const spriteOf = (number, size, dark, dots) => {
     const name = [number, size, dark, dots].join();
-    if (sprites[name]) return sprites[name];
     const {outline, colour, ink, symbol, drop} = classes[number];
-    const half = Math.ceil((1.3 * size + 1) * dots);
-    const canvas = document.createElement("canvas");
-    canvas.width = canvas.height = 2 * half;
-    const ctx = canvas.getContext("2d");
-    ctx.translate(half, half);
-    ctx.scale(size * dots, size * dots);
-    const path = new Path2D(outline);
-    ctx.fillStyle = colour;
-    ctx.fill(path);
-    if (size >= 4) {
-      ctx.lineWidth = 1 / size;
-      const bright = ink === "#000000";
-      ctx.strokeStyle = dark ? "#131518" : bright ? "#444" : "#fff";
-      ctx.stroke(path);
-    }
-    if (size >= 8) {
-      ctx.font = "bold 1.2px system-ui, sans-serif";
-      ctx.textAlign = "center";
-      ctx.fillStyle = ink;
-      ctx.fillText(symbol, 0, drop + 0.42);
-    }
-    const colours = new Uint32Array(ctx.getImageData(0, 0, 2 * half, 2 * half).data.buffer);
-    const solid = [...colours.keys()].filter((at) => colours[at] >>> 24 > 40);
-    sprites[name] = {
-      right: Int16Array.from(solid, (at) => at % (2 * half) - half),
-      down: Int16Array.from(solid, (at) => Math.floor(at / (2 * half)) - half),
-      colour: Uint32Array.from(solid, (at) => colours[at]),
-    };
+    sprites[name] = sprites[name] || semsig.sprite((1.3 * size + 1) * dots, (ctx) => {
+      ctx.scale(size * dots, size * dots);
+      const path = new Path2D(outline);
+      ctx.fillStyle = colour;
+      ctx.fill(path);
+      if (size >= 4) {
+        ctx.lineWidth = 1 / size;
+        const bright = ink === "#000000";
+        ctx.strokeStyle = dark ? "#131518" : bright ? "#444" : "#fff";
+        ctx.stroke(path);
+      }
+      if (size >= 8) {
+        ctx.font = "bold 1.2px system-ui, sans-serif";
+        ctx.textAlign = "center";
+        ctx.fillStyle = ink;
+        ctx.fillText(symbol, 0, drop + 0.42);
+      }
+    });
     return sprites[name];
   };
-  // Half of one colour and half of another.
-  const mixed = (one, other) => (((one ^ other) & 0xfefefefe) >>> 1) + (one & other) >>> 0;
   // Calls back for the objects of a class that are in a box of pixels.
   const within = (frame, {starts, boxes}, min, max, call) => {
     const {scale, left, top} = frame;
@@ -75,29 +61,17 @@ semsig.streetObjects = (key, packed, about) => {
       }
     }
   };
-  // Signs are copied pixel by pixel, many times faster than a canvas draws so many images.
   const paint = (map) => (ctx, min, max) => {
-    const {width, height} = ctx.canvas;
-    if (data === null || !width || !height) return;  // a page that is not shown has no size
-    const image = ctx.createImageData(width, height);
-    const pixels = new Uint32Array(image.data.buffer);
-    const dots = width / (max.x - min.x);
-    const size = sizeAt(map.getZoom());
-    for (const number of about.order) {
-      if (!shown.has(number)) continue;
-      const {right, down, colour} = spriteOf(number, size, semsig.isDark(map), dots);
-      within(semsig.frame(map, about), classes[number], min, max, (x, y) => {
-        const [left, top] = [Math.round((x - min.x) * dots), Math.round((y - min.y) * dots)];
-        for (let at = 0; at < colour.length; at += 1) {
-          const [across, along] = [left + right[at], top + down[at]];
-          if (across < 0 || across >= width || along < 0 || along >= height) continue;
-          const place = along * width + across;
-          const whole = colour[at] >>> 24 > 200 || !pixels[place];
-          pixels[place] = whole ? colour[at] : mixed(colour[at], pixels[place]);
-        }
-      });
-    }
-    ctx.putImageData(image, 0, 0);
+    if (data === null) return;
+    semsig.stamped(ctx, min, max, (dots, stamp) => {
+      const size = sizeAt(map.getZoom());
+      for (const number of about.order) {
+        if (!shown.has(number)) continue;
+        const sprite = spriteOf(number, size, semsig.isDark(map), dots);
+        const frame = semsig.frame(map, about);
+        within(frame, classes[number], min, max, (x, y) => stamp(sprite, x, y));
+      }
+    });
   };
   const placeOf = (one) => L.CRS.EPSG3857.unproject(L.point(
     about.origin[0] + data.x[one] * about.quantum, about.origin[1] + data.y[one] * about.quantum));
