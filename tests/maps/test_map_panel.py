@@ -235,6 +235,6 @@ def test_what_was_seen_but_not_how_far_is_a_ray(page: MapPage) -> None:
     assert page.ask(f"{ray}.length", "#808080") == count
     ActionChains(page.browser).move_to_element(page.one(".semsig-wheels .object")).perform()
     assert page.ask(f"{ray}.length", "#808080") == count - 1
-    page.ask("lines((one) => one.options.color === '#d55e00' && one.options.weight === 5)[0]"
+    page.ask("lines((one) => one.options.color === semsig.pointed && one.options.weight === 5)[0]"
              ".fire('mouseout')")  # fmt: skip
     assert page.ask(f"{ray}.length", "#808080") == count

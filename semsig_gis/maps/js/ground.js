@@ -35,7 +35,7 @@ semsig.ground = (packed, about) => {
         corners: [bounds.getSouthWest(), bounds.getNorthEast()],
         key: `street:${data.names[street]}`,
         drawn: L.polyline(lines, {
-          pane: "shadowPane", interactive: false, color: "#d55e00", weight: 6, opacity: 0.7}),
+          pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 6, opacity: 0.7}),
       });
     };
     semsig.finders.push((words, limit) => semsig.matches(plain, words, limit).map(

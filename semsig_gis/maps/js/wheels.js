@@ -239,7 +239,7 @@ semsig.scenes = (first, others, signs, kind) => {
       markers.forEach((marker, one) => {
         const is = lit.some((mate) => mate[0] === side && mate[1] === one);
         marker?.getElement?.()?.classList.toggle("lit", is);
-        marker?.setStyle?.({color: is ? "#d55e00" : "#808080", weight: is ? 5 : 2});
+        marker?.setStyle?.({color: is ? semsig.pointed : "#808080", weight: is ? 5 : 2});
       });
     });
     box.semsigChosen = draw;
