@@ -27,7 +27,7 @@ from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
-from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url
+from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url, panel_signs
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.detections.exif import picture_shot
 from semsig_gis.queries.detections.formats import read_pictures
@@ -158,6 +158,7 @@ class Workbench:
                 }
                 for item in kinds
             ],
+            "signs": panel_signs(database),
             "verdicts": {
                 verdict: {"colour": VERDICTS[verdict], "text": text, **look}
                 for verdict, (text, look) in RAYS.items()

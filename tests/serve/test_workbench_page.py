@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from map_pages import HOSTILE
 from PIL import Image
+from PIL.ExifTags import GPS, IFD, Base
 from selenium.webdriver.common.keys import Keys
 from street_photos import street_photo
 from workbench_pages import STAGE, WorkbenchPage
@@ -92,6 +93,8 @@ def test_a_place_is_found_by_the_objects_of_two_photos(
     ]
     assert shown.all("#map path[stroke-width]")
     assert "Speaks for candidate 1" in shown.text("#speaks")
+    shown.ask("document.querySelector('#wheels .object').focus()")
+    assert len(shown.all("#wheels .lit")) == 2
     shown.press("#candidates button:nth-child(2)")
     assert "candidate 2" in shown.text("#wheels")
     assert shown.one("#candidates button:nth-child(2)").get_attribute("aria-pressed") == "true"
@@ -168,6 +171,47 @@ def test_marks_are_moved_named_and_removed_by_mouse_and_by_keys(
     assert (photo["fov"], photo["heading"], photo["heading_error"]) == (360, 200, 10)
     shown.choose("#heading-known", "")
     assert shown.ask("return semsig.session.scene.heading") is None
+
+
+def test_what_a_photo_says_of_itself_is_taken(
+    shown: WorkbenchPage, photos: list[StreetPhoto], page: Page, tmp_path: Path
+) -> None:
+    database = page.bench.database
+    place = to_latlon(database.xy[[PLACE]], database.crs)[0]
+    exif = Image.Exif()
+    exif.get_ifd(IFD.Exif)[Base.FocalLengthIn35mmFilm] = 28
+    exif.get_ifd(IFD.GPSInfo).update(
+        {
+            GPS.GPSLatitudeRef: "N",
+            GPS.GPSLatitude: (float(place[0]), 0.0, 0.0),
+            GPS.GPSLongitudeRef: "E",
+            GPS.GPSLongitude: (float(place[1]), 0.0, 0.0),
+            GPS.GPSImgDirection: 180.0,
+            GPS.GPSImgDirectionRef: "T",
+        }
+    )
+    file = tmp_path / "phone.jpg"
+    Image.open(photos[0].file).save(file, exif=exif)
+    shown.give("#photo", file)
+    photo = shown.ask("return semsig.session.scene")
+    assert photo["fov"] == pytest.approx(63.4, abs=1)
+    assert photo["heading"] == pytest.approx(180, abs=2)
+    assert "as the photo says" in shown.text("#camera legend")
+    there = "const {lat, lng} = semsig.map.getCenter(); return [lat, lng]"
+    assert shown.ask(there) == pytest.approx(place.tolist(), abs=1e-4)
+    # Another one some steps on is another place of the same question.
+    shown.mark(photos[0], 0)
+    shown.give("#photo-on", photos[1].file)
+    shown.mark(photos[1], 0)
+    assert [len(view["photos"]) for view in shown.ask("return semsig.session.body().views")] == [
+        1,
+        1,
+    ]
+    assert [one.text for one in shown.all(".view small")] == ["Place 1", "Place 2"]
+    # What is chosen in a photo is shown on the map, and back.
+    assert len(shown.all("#map .at.chosen")) == 1
+    shown.press("#map .at.chosen")
+    assert shown.all(f"{STAGE} .mark[aria-pressed=true]")
 
 
 def test_what_would_tell_most_is_asked_next(

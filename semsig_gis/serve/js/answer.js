@@ -24,8 +24,8 @@ semsig.sentence = ({answer, scenes}) => {
   if (!answer.truth) return told;
   const {found, metres, rank} = answer.truth;
   const verdict = given ? (found ? "Found" : "Wrong") : "Not found";
-  return `${verdict}: the best place is ${semsig.away(metres)} from the true one, whose cell has `
-    + `rank ${rank.toLocaleString("en")}. ${told}`;
+  const ranked = rank === null ? "" : `, whose cell has rank ${rank.toLocaleString("en")}`;
+  return `${verdict}: the best place is ${semsig.away(metres)} from the true one${ranked}. ${told}`;
 };
 semsig.Answer = class {
   constructor(session, map) {
@@ -91,6 +91,13 @@ semsig.Answer = class {
     this.showReasons();
     this.showWheels();
   }
+  // The scene and the mark of a ray, if it is of one that is there still.
+  marked({mark}) {
+    if (!mark) return [];
+    const view = this.session.views[mark[0]];
+    const scene = view?.photos ? view.photos[mark[1]] : view;
+    return [scene, (scene?.marks || scene?.compass)?.[mark[2]]];
+  }
   get candidate() {
     return this.session.answer?.candidates?.[this.session.chosen];
   }
@@ -105,13 +112,17 @@ semsig.Answer = class {
     }
     for (const ray of this.candidate?.rays || []) {
       const {colour, text, ...look} = session.city.verdicts[ray.verdict];
+      const [scene, mark] = this.marked(ray);
+      const chosen = mark && mark === session.mark;
+      if (chosen) look.weight = 6;
       L.polyline([ray.from, ray.to], {color: colour, ...look, interactive: false}).addTo(drawn);
       const one = session.city.classes.find(({name}) => name === ray.class) || semsig.unnamed;
-      const html = L.DomUtil.create("div", `at ${ray.verdict}`);
+      const html = L.DomUtil.create("div", `at ${ray.verdict}${chosen ? " chosen" : ""}`);
       html.append(semsig.sign(one));
       L.marker(ray.to, {
         icon: L.divIcon({html, className: "", iconSize: [22, 22]}), keyboard: false,
-      }).bindTooltip(`${ray.title}: ${text}`).addTo(drawn);
+      }).bindTooltip(`${ray.title}: ${text}`).addTo(drawn)
+        .on("click", () => { if (mark) session.show(scene, mark); });
     }
     for (const [at, one] of [...candidates.entries()].reverse()) {
       const chosen = at === session.chosen;
@@ -121,6 +132,10 @@ semsig.Answer = class {
         icon: L.divIcon({html, className: "", iconSize: [26, 26]}), zIndexOffset: 1000 - at,
         title: `Candidate ${one.rank}`, alt: `Candidate ${one.rank}`,
       }).on("click", () => this.choose(at)).addTo(drawn);
+    }
+    for (const scene of session.scenes.filter((one) => one.place)) {
+      L.circleMarker(scene.place, {radius: 9, color: dark, weight: 3, dashArray: "3 4", fill: false})
+        .bindTooltip(`where the file of ${scene.name} has it`).addTo(drawn);
     }
     if (session.truth) {
       L.circleMarker(session.truth, {
@@ -173,8 +188,7 @@ semsig.Answer = class {
     const view = session.answer?.views?.[at];
     if (!view || !candidate) return;
     const {reach} = session.city;
-    const signs = {
-      classes: Object.fromEntries(session.city.classes.map((one) => [one.symbol, one]))};
+    const [types, bearings, metres] = candidate.signature;
     const whole = (metres) => (metres === null ? null : Math.round(metres));
     const photos = view.photos || [view];
     const marked = session.views[at].photos?.filter((one) => one.marks.length);
@@ -186,13 +200,33 @@ semsig.Answer = class {
       const turned = (degrees) => (degrees + turn + 720) % 360;
       const sectors = (photos[own].sectors || []).map(([from, to]) => [
         turned(from), turned(from) + ((to - from + 360) % 360 || 360)]);
-      box.append(semsig.wheel("Marked", [rows.map((row) => view.types[row]).join(""),
+      const outside = bearings.map((_, one) => one).filter((one) => sectors.length
+        && !sectors.some(([from, to]) => (bearings[one] - from + 720) % 360 <= to - from));
+      const seen = [rows.map((row) => view.types[row]).join(""),
         rows.map((row) => Math.round(turned(view.bearings[row])) % 360),
-        {reach, sectors, metres: rows.map((row) => whole(view.ranges?.[row] ?? null))}], signs));
+        {reach, sectors, metres: rows.map((row) => whole(view.ranges?.[row] ?? null))}];
+      const there = [types, bearings.map((degrees) => Math.round(degrees) % 360),
+        {reach, sectors, outside, metres: metres.map(whole)}];
+      const told = semsig.compare(seen, there, ["false", "missed"]);
+      const {signs} = session.city;
+      const wheels = [semsig.wheel("Marked", seen, signs, told[0]),
+        semsig.wheel(`At candidate ${candidate.rank}`, there, signs, told[1])];
+      box.append(...wheels);
+      this.light(wheels, told);
     }
-    const [types, bearings, metres] = candidate.signature;
-    box.append(semsig.wheel(`At candidate ${candidate.rank}`, [types,
-      bearings.map((degrees) => Math.round(degrees) % 360),
-      {reach, metres: metres ? metres.map(whole) : null}], signs));
+  }
+  // What is pointed at in a wheel stands out in both.
+  light(wheels, told) {
+    const objects = wheels.map((wheel) => [...wheel.querySelectorAll(".object")]);
+    for (const [side, own] of objects.entries()) {
+      for (const [one, object] of own.entries()) {
+        const pair = [object, objects[1 - side][told[side][one].partner]];
+        const lit = (is) => () => {
+          for (const other of pair) other?.classList.toggle("lit", is);
+        };
+        L.DomEvent.on(object, "mouseenter focus", lit(true));
+        L.DomEvent.on(object, "mouseleave blur", lit(false));
+      }
+    }
   }
 };

@@ -7,12 +7,7 @@ semsig.compass = (session, view) => {
   drawing.setAttribute("aria-hidden", "true");
   stage.append(drawing);
   const rim = 90;  // what stands at the rim and outside is at a distance that is not known
-  const draw = (name, values, text = "") => {
-    const part = L.SVG.create(name);
-    for (const [key, value] of Object.entries(values)) part.setAttribute(key, value);
-    part.textContent = text;
-    drawing.append(part);
-  };
+  const draw = (name, values, text) => semsig.svg(drawing, name, values, text);
   const turned = (bearing, out) => {
     const angle = bearing * Math.PI / 180;
     return [out * Math.sin(angle), -out * Math.cos(angle)];

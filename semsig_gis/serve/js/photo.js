@@ -1,22 +1,12 @@
 // A photo, its camera, and the marks on it.
-semsig.sign = ({outline, colour, ink, symbol, drop}) => {
-  const drawing = L.SVG.create("svg");
-  const draw = (name, values, text = "") => {
-    const part = L.SVG.create(name);
-    for (const [key, value] of Object.entries(values)) part.setAttribute(key, value);
-    part.textContent = text;
-    drawing.append(part);
-  };
-  for (const [key, value] of [["class", "semsig-sign"], ["viewBox", "-1.3 -1.3 2.6 2.6"],
-    ["aria-hidden", "true"]]) drawing.setAttribute(key, value);
-  draw("path", {d: outline, fill: colour});
-  draw("text", {y: drop + 0.42, "font-size": 1.2, "font-weight": 700, "text-anchor": "middle",
-    "font-family": "system-ui, sans-serif", fill: ink}, symbol);
+semsig.sign = (one) => {
+  const drawing = semsig.svg(null, "svg", {
+    class: "semsig-sign", viewBox: "-1.3 -1.3 2.6 2.6", "aria-hidden": true});
+  semsig.drawSign(drawing, one, one.symbol);
   return drawing;
 };
 // What is marked without a name.
-semsig.unnamed = {name: "?", symbol: "?", title: "Something unnamed", colour: "#ffffff",
-  ink: "#000000", drop: 0, outline: "M-1,0A1,1 0 1 1 1,0A1,1 0 1 1 -1,0Z"};
+semsig.unnamed = {...semsig.anySign, name: "?", symbol: "?", title: "Something unnamed"};
 semsig.classNamed = (session, name) =>
   session.city.classes.find((one) => one.name === name) || semsig.unnamed;
 // A range is in metres, or near, middle or far; null where it is not known.
@@ -186,6 +176,7 @@ semsig.readPhotos = async (session, files, {on = false} = {}) => {
     session.add({...told, url, told: {fov: told.fov, heading: told.heading},
       fov: told.fov ?? (wide ? 360 : 65), heading_error: told.heading_error ?? null, marks: []},
     {on: next});
+    if (told.place && session.scenes.length === 1) semsig.map.setView(told.place, 17);
     next = false;
   }
 };

@@ -74,7 +74,7 @@ semsig.Session = class extends EventTarget {
     this.ask();
   }
   body() {
-    const kept = ({url, notes, place, told, ...photo}) => photo;
+    const kept = ({url, notes, told, ...photo}) => photo;
     const views = this.views.map(
       (view) => (view.photos ? {...view, photos: view.photos.map(kept)} : view));
     // The answer is where the scene is that is shown.
@@ -97,9 +97,11 @@ semsig.Session = class extends EventTarget {
           answer = await (await semsig.api("answer", this.body())).json();
         }
       } catch (error) {
+        // Another page of this server asked meanwhile.
+        if (error.status === 409) asked = null;
         answer = {error: error.message};
       }
-      if (this.views !== question) continue;
+      if (this.views !== question || asked === null) continue;
       Object.assign(this, {answer, chosen: 0, answeredAt: asked});
       this.tell("answer");
     }

@@ -107,12 +107,13 @@ semsig.readBoxes = async (session, files) => {
     {name, width, height, fov, heading, projection});
   for (const file of files) {
     const body = {text: await file.text(), name: file.name, photos: photos.map(told)};
-    const read = (await (await semsig.api("boxes", body)).json()).photos;
+    const read = await (await semsig.api("boxes", body)).json();
     for (const photo of photos) {
-      for (const {box, class: name} of read[photo.name] || []) {
+      for (const {box, class: name} of read.photos[photo.name] || []) {
         photo.marks.push({box, class: name, range: null});
       }
     }
+    semsig.notice(read.notes.join(" "));
   }
   session.show(session.scene);
   session.changed();
@@ -374,6 +375,7 @@ semsig.start = semsig.trying(async () => {
     semsig.showScenes(session);
     semsig.showScene(session);
     semsig.showCamera(session);
+    answer.draw();
     answer.showWheels();
   });
   session.addEventListener("change", () => semsig.showScene(session));
