@@ -218,6 +218,11 @@ def command_line() -> str:
     return shlex.join(["semsig", *sys.argv[1:]])
 
 
+def city_name(database: Path) -> str:
+    """Return what a city is called in headings, by the name of its file."""
+    return database.stem.replace("_", " ").capitalize()
+
+
 def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> None:
     """Refuse to write over a file that is read, or two results to one file."""
     taken = {os.path.realpath(path) for path in read if path is not None}

@@ -20,6 +20,7 @@ from semsig_gis.cli.console import (
     Scheduler,
     Workers,
     app,
+    city_name,
     command_line,
     keep_inputs,
     known_identifiability,
@@ -144,7 +145,7 @@ def evaluate(
 
         with progress("drawing the report"):
             page = evaluation_page(
-                evaluation, city.database, name=database.name, command=command_line()
+                evaluation, city.database, name=city_name(database), command=command_line()
             )
             write_page(page, report)
     if as_json:

@@ -11,6 +11,7 @@ import typer
 from semsig_gis.cli.console import (
     Database,
     app,
+    city_name,
     keep_inputs,
     known_identifiability,
     progress,
@@ -187,6 +188,6 @@ def map_(
             **dates,
         )
         draw_ground(drawn, city, buildings=buildings, streets=streets)
-        offline = save_map(drawn, out, title=title or database.stem.replace("_", " ").capitalize())
+        offline = save_map(drawn, out, title=title or city_name(database))
     say(f"map: {out}")
     tell_if_online(offline, tiles=tiles)

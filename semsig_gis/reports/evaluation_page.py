@@ -68,13 +68,13 @@ def evaluation_page(
     --------
     >>> from semsig_gis import evaluate
     >>> evaluation = evaluate(demo_database, queries=10)
-    >>> evaluation_page(evaluation, demo_database, name="a city").title
-    'How well queries are placed in a city'
+    >>> evaluation_page(evaluation, demo_database, name="A city").title
+    'A city: how well queries are placed'
     """
     evaluation.rows_in(database)
     settings = evaluation_settings(evaluation)
     return Report(
-        title=f"How well queries are placed in {name}",
+        title=f"{name}: how well queries are placed",
         headline=evaluation_headline(evaluation),
         text=(
             (

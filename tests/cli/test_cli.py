@@ -88,6 +88,7 @@ def test_evaluate_map_and_export(done: Done) -> None:
     assert "report: eval.html" in out
     page = text("eval.html")
     assert f"semsig {line} --report eval.html" in page
+    assert '<h1 dir="auto">City: how well queries are placed</h1>' in page
     assert "queries were placed within 50 m" in page
     assert "map.html" in done("map city.parquet --evaluation eval --out map.html")
     assert Path("map.html").stat().st_size > 1000

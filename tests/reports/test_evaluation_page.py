@@ -133,18 +133,28 @@ def test_another_database_is_refused() -> None:
         evaluation_page(BY_DISTANCE, CITY.select(slice(5)), name="town")
 
 
-@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
-def test_the_page_in_a_browser(browser: Chrome, tmp_path: Path, width: int, height: int) -> None:
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the page of an evaluation."""
     page = evaluation_page(BY_LIKELIHOOD, CITY, name="town <1>", command="semsig evaluate 'a b'")
-    file = tmp_path / "report.html"
+    file = tmp_path_factory.mktemp("page") / "report.html"
     write_page(page, file)
-    parsed = HtmlPage(file.read_text("utf-8"))
-    assert all(one.startswith("data:") for one in parsed.loaded)
-    for text in ("town <1>", page.headline, "semsig evaluate 'a b'", "processors"):
-        assert text in parsed.text
-    shown = MapPage(browser, tmp_path)
+    return file
+
+
+def test_the_page_holds_everything(written: Path) -> None:
+    page = HtmlPage(written.read_text("utf-8"))
+    assert all(one.startswith("data:") for one in page.loaded)
+    headline = evaluation_headline(BY_LIKELIHOOD)
+    for text in ("town <1>", headline, "semsig evaluate 'a b'", "processors"):
+        assert text in page.text
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_the_page_in_a_browser(browser: Chrome, written: Path, width: int, height: int) -> None:
+    shown = MapPage(browser, written.parent)
     with shown.screen(width, height, mobile=width < 500):
-        browser.get(file.as_uri())
+        browser.get(written.as_uri())
         images = shown.all("img")
         assert len(images) == 1 + 1 + 2 + 2 + 12
         assert all(image.get_attribute("alt") for image in images)
