@@ -13,7 +13,7 @@ BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy views bayes chances reproduce golden soak walks docs plugin clean
+.PHONY: help demo test lint bench accuracy views bayes chances reproduce golden soak walks docs pictures plugin clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
@@ -76,11 +76,14 @@ soak: $(DEV) ## kill, starve and damage everything, some thousand times: half an
 walks: $(DEV) ## the functions and modules that a row of trees and a query cross
 	$(BIN)/python -m benchmarks.walks
 
+pictures: $(DEV) ## every kind of map in a browser, light and dark, desk and phone: pictures to look at
+	$(BIN)/python -m benchmarks.pictures
+
 plugin: ## the QGIS plugin, into dist/: a zip file to install
 	$(PYTHON) qgis_plugin/package.py dist
 
 clean: ## remove .venv and everything that the targets write
-	rm -rf $(VENV) demo golden reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
+	rm -rf $(VENV) demo golden pictures reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
 		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

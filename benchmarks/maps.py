@@ -52,7 +52,7 @@ Promise.all(images.map((image) => image.decode())).then(() =>
 """
 
 # Milliseconds between frames while the map is moved and zoomed by a person.
-_FRAMES = """
+FRAMES = """
 const [zooms, done] = arguments;
 const map = Object.values(window).find((value) => value instanceof L.Map);
 const moved = (name, start) => new Promise((resolve) => { map.once(name, resolve); start(); });
@@ -104,7 +104,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
         print("maps: not measured, because Chromium, its driver or the map files are not here")
         return
     with tempfile.TemporaryDirectory() as folder:
-        browser = _started(chromium, driver, folder)
+        browser = started(chromium, driver, folder)
         try:
             for what, drawn in _maps(_CITIES[size], _QUERIES[size]):
                 page = Path(folder, "map.html")
@@ -160,9 +160,9 @@ def _measured(browser: Chrome, page: Path, what: str) -> Iterator[Comparison]:
 
 def _smoothness(browser: Chrome, what: str, zooms: Sequence[int]) -> Comparison:
     """Move the map that is open, with its layers and without."""
-    with_layers = statistics.quantiles(browser.execute_async_script(_FRAMES, zooms), n=20)[-1]
+    with_layers = statistics.quantiles(browser.execute_async_script(FRAMES, zooms), n=20)[-1]
     browser.execute_script(_BARE)
-    bare = statistics.quantiles(browser.execute_async_script(_FRAMES, zooms), n=20)[-1]
+    bare = statistics.quantiles(browser.execute_async_script(FRAMES, zooms), n=20)[-1]
     return Comparison(
         name=f"the longest frame of twenty while the map of {what} is moved",
         unit="ms",
@@ -173,7 +173,7 @@ def _smoothness(browser: Chrome, what: str, zooms: Sequence[int]) -> Comparison:
     )
 
 
-def _started(chromium: str, driver: str, folder: str) -> Chrome:
+def started(chromium: str, driver: str, folder: str | Path) -> Chrome:
     """Start a browser that reaches no network."""
     from selenium import webdriver  # noqa: PLC0415 - where there is no browser it may be absent
 

@@ -31,7 +31,9 @@ semsig.panel = (map) => {
 semsig.panelHead = (map, panel, title) => {
   const head = L.DomUtil.create("div", "semsig-panel-head");
   head.append(title);
-  semsig.mapButton(head, "semsig-copy", "", "Copy latitude and longitude (C)", () => semsig.copy(map));
+  const what = "Copy latitude and longitude (C)";
+  semsig.mapButton(head, "semsig-copy", "", what, () => semsig.copy(map))
+    .append(semsig.icon("M7 7h10v10h-10zM4 13h-1v-10h10v1"));
   semsig.mapButton(head, "semsig-hide", "", "Close", () => semsig.hide(map));
   // A swipe: down where the panel is below the map, to the right where it is beside it.
   let from = null;
