@@ -130,8 +130,8 @@ ANSWERS: Mapping[str, Mark] = MappingProxyType(
 )
 """The best place for a query, whether it is given as the answer or not."""
 
-ERROR_BREAKS = (10, 25, 50, 100, 200, 500, 1000, 2000)
-"""Metres at which errors are told apart; at 50 begins what has failed."""
+ERROR_BREAKS = (5, 10, 25, 50, 100)
+"""Metres at which errors are told apart, on maps and in tables."""
 
 # From the first that is seen on light and on dark, getting darker steadily.
 FAILURES: Mapping[float, str] = MappingProxyType(

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.signs import ERROR_BREAKS
 from semsig_gis.core.statistics import quantile_ranks, wilson_interval
 from semsig_gis.likelihood.posterior import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_PLACES, expected_recall
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from numpy.typing import NDArray
 
-WITHIN = (5, 10, 25, 50, 100)
 RECALLS = (1, 10)
 LENGTHS = ("1-4", "5-9", "10-19", "20+")  # objects that are really seen
 AMBIGUITIES = ("1", "2-9", "10-99", "100-999", "1000+")  # cells with the types of the true one
@@ -39,7 +39,7 @@ def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
     where a method states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN
     where not answered) and ``in_region``.
     """
-    names = [*(f"p{metres}" for metres in WITHIN), *(f"near{count}" for count in NEAR_PLACES)]
+    names = [*(f"p{metres}" for metres in ERROR_BREAKS), *(f"near{count}" for count in NEAR_PLACES)]
     figures = {name: queries[name].to_numpy(dtype=np.float64) for name in names}
     for percent in RECALLS:
         figures[f"recall{percent}"] = expected_recall(

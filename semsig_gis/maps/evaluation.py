@@ -67,7 +67,6 @@ QUERY_FIELDS = (
 )
 FIELD_NAME = "Share of queries that fail"
 KILOMETRE = 1000
-THRESHOLDS = ERROR_BREAKS[:4]  # metres of error that the legend tells of
 SHARES = 250  # steps of a share in a byte, of which 0 is none
 SPOKEN = 10  # steps of a query that speaks
 
@@ -304,7 +303,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
     shares = "".join(
         f"<tr><td>P(error ≤ {threshold} m)</td><td>{share:.1%}</td></tr>"
-        for threshold, share in zip(THRESHOLDS, evaluation.cdf(THRESHOLDS), strict=True)
+        for threshold, share in zip(ERROR_BREAKS, evaluation.cdf(ERROR_BREAKS), strict=True)
     )
     limits = [f"{least:.0%}" for least in FAILURES if least]
     within = f"within {Evaluation.success_metres} m"

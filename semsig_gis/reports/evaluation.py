@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 import pandas as pd
 
+from semsig_gis.core.signs import ERROR_BREAKS
 from semsig_gis.evaluation.figures import percentile
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.likelihood.posterior import DEFAULT_RULE
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 FIGURES = {
-    **{f"p{metres}": f"P(error ≤ {metres} m)" for metres in (5, 10, 25, 50, 100)},
+    **{f"p{metres}": f"P(error ≤ {metres} m)" for metres in ERROR_BREAKS},
     **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
     **{f"near{count}": f"recall@{count} within {NEAR_METRES} m" for count in NEAR_PLACES},
     "coverage": f"Answered, with a chance of {DEFAULT_RULE.threshold:g} or more",
@@ -33,7 +34,7 @@ FIGURES = {
     "in_region": "True cell in the region of 90 %",
 }
 GROUPED = {
-    **{f"p{metres}": f"P(≤ {metres} m)" for metres in (10, 25, 50, 100)},
+    **{f"p{metres}": f"P(≤ {metres} m)" for metres in ERROR_BREAKS[1:]},
     **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
     "coverage": "Answered",
     "precision": "Right",
@@ -221,7 +222,7 @@ def _paper_level(evaluation: Evaluation) -> str | None:
 
 PERCENTILES = {"error_median": 50, "error_p90": 90}
 SHOWN = {
-    **{f"p{metres}": f"P(≤ {metres} m)" for metres in (5, 10, 25, 50, 100)},
+    **{f"p{metres}": f"P(≤ {metres} m)" for metres in ERROR_BREAKS},
     "near5": "recall@5 at 25 m",
     "recall10": "recall@10 %",
     "coverage": "Answered",
