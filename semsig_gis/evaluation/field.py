@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
 
@@ -26,8 +27,8 @@ PIXELS = 10  # to a radius
 MOST_PIXELS = 1 << 10  # across a city as wide as high
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ErrorField:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ErrorField(Displayed):
     """What became of the queries around each pixel of a grid.
 
     Parameters
@@ -56,6 +57,14 @@ class ErrorField:
     failed: NDArray[np.float64]
     errors: NDArray[np.float64]
     speaking: NDArray[np.float64]
+
+    def _facts(self) -> dict[str, object]:
+        rows, columns = self.failed.shape
+        return {
+            "radius": f"{self.radius:g} m",
+            "pixels": f"{columns:,} x {rows:,} of {self.grid.step:g} m",
+            "with queries near": f"{np.isfinite(self.failed).mean():.0%}",
+        }
 
     def at(self, xy: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the share that failed and how many speak at places, shape (..., 2).

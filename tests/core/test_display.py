@@ -24,6 +24,7 @@ from semsig_gis import (
     cell_scene,
     check_identifiability,
     draw_scene,
+    error_field,
     evaluate,
     identify,
     load_catalog,
@@ -67,6 +68,7 @@ def results() -> dict[str, object]:
     index = build_index(database, named_noise("generic"))
     query, store = database.signature(3), ObjectStore.of(town.street_objects)
     location = locate(index, query, store=store, explained=1)
+    evaluation = evaluate(database, queries=5)
     told = identify(index, trials=5, class_trials=2)
     layers = synthetic_city(CitySpec(size=100.0))
     loaded = assemble(layers, load_catalog("openstreetmap"))
@@ -85,7 +87,8 @@ def results() -> dict[str, object]:
         "Explanation": location.explanations[0],
         "Localization": localize(database, query),
         "SearchRegions": search_regions(location, database),
-        "Evaluation": evaluate(database, queries=5),
+        "Evaluation": evaluation,
+        "ErrorField": error_field(evaluation, database),
         "Identifiability": told,
         "IdentifiabilityCheck": check_identifiability(told, index, queries=5),
         "Sight": Sight.of_cell(database, 3),
