@@ -119,6 +119,11 @@ class Mark:
     shape: str
     colour: str
 
+    @property
+    def edge(self) -> str:
+        """Colour of the edge, which sets it off from whatever is below: black or white."""
+        return max(BLACK, WHITE, key=lambda edge: _contrast(edge, self.colour))
+
 
 OUTCOMES: Mapping[str, Mark] = MappingProxyType(
     {"successful": Mark("circle", "#4bb7f5"), "failed": Mark("triangle", "#570079")}

@@ -170,7 +170,12 @@ def _add_queries(
         "count": len(queries),
         "order": np.argsort(-np.bincount(failed, minlength=2), kind="stable").tolist(),
         "outcomes": [
-            {"name": name, "colour": mark.colour, "outline": OUTLINES[mark.shape]}
+            {
+                "name": name,
+                "colour": mark.colour,
+                "edge": mark.edge,
+                "outline": OUTLINES[mark.shape],
+            }
             for name, mark in OUTCOMES.items()
         ],
         "fields": QUERY_FIELDS,

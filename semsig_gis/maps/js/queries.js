@@ -31,16 +31,16 @@ semsig.queries = (map, key, packed, about) => {
   set.selection = () => [...set.data.outcome.keys()].filter(isOn);
   // Many are small from afar.
   const radiusAt = (zoom) => (about.count <= 2000 || zoom >= 16 ? 5 : zoom >= 14 ? 3.5 : 2.5);
-  const spriteOf = (outcome, radius, dark, dots) => {
-    const name = [outcome, radius, dark, dots].join();
-    const {outline, colour} = outcomes[outcome];
+  const spriteOf = (outcome, radius, dots) => {
+    const name = [outcome, radius, dots].join();
+    const {outline, colour, edge} = outcomes[outcome];
     sprites[name] = sprites[name] || semsig.sprite((radius + 2) * dots, (ctx) => {
       const path = new Path2D(outline);
       ctx.scale(radius * dots, radius * dots);
       ctx.fillStyle = colour;
       ctx.fill(path);
       ctx.lineWidth = 1.5 / radius;
-      ctx.strokeStyle = dark ? "#e9e9e6" : "#222";
+      ctx.strokeStyle = edge;
       ctx.stroke(path);
     });
     return sprites[name];
@@ -50,8 +50,8 @@ semsig.queries = (map, key, packed, about) => {
     semsig.stamped(ctx, min, max, (dots, stamp) => {
       const {x, y, outcome} = set.data;
       const {scale, left, top} = frame();
-      const [radius, dark] = [radiusAt(map.getZoom()), semsig.isDark(map)];
-      const stamps = outcomes.map((_, at) => spriteOf(at, radius, dark, dots));
+      const radius = radiusAt(map.getZoom());
+      const stamps = outcomes.map((_, at) => spriteOf(at, radius, dots));
       // The rarer last, so that they lie on top.
       for (const kind of about.order) {
         for (let one = 0; one < x.length; one += 1) {
