@@ -76,7 +76,8 @@ class Question:
         if not any(places):
             msg = "nothing is marked yet; mark an object that you see."
             raise InputError(msg)
-        views, marks = zip(*map(_joined, places), strict=True)
+        views, marks = zip(*(_joined(photos) for photos in places if photos), strict=True)
+        legs, kept = _kept(places, ways)
         last = len(rows) - 1
         shown = _whole(body.get("view", last), "view", most=last)
         seen_from = body.get("seen_from", "anywhere")
@@ -87,8 +88,8 @@ class Question:
         return cls(
             views=views,
             marks=marks,
-            legs=tuple(ways),
-            shown=own[shown],
+            legs=legs,
+            shown=kept[own[shown]],
             top=_whole(body.get("top", 10), "top", least=1, most=MOST_TOP),
             seen_from=seen_from,
             noise=body.get("noise"),
@@ -239,10 +240,27 @@ def _range(mark: Mapping[str, Any], metres: float, error: float) -> dict[str, An
     return {"range": round(metres, METRE_DIGITS), "range_error": round(error, ERROR_DIGITS)}
 
 
+def _kept(
+    places: Sequence[Sequence[object]], ways: Sequence[Leg]
+) -> tuple[tuple[Leg, ...], list[int]]:
+    """Return the legs between the places that have marks, and of each place which of these it is.
+
+    One without marks is passed on the way, and stands for the one before.
+    """
+    legs, kept = list[Leg](), list[int]()
+    found, dx, dy, variance = 0, 0.0, 0.0, 0.0
+    for photos, way in zip(places, (Leg(dx=0.0, dy=0.0), *ways), strict=True):
+        dx, dy, variance = dx + way.dx, dy + way.dy, variance + way.sigma**2
+        if photos:
+            if found:
+                legs.append(Leg(dx=dx, dy=dy, sigma=math.sqrt(variance)))
+            found, dx, dy, variance = found + 1, 0.0, 0.0, 0.0
+        kept.append(max(found - 1, 0))
+    return tuple(legs), kept
+
+
 def _joined(photos: Sequence[tuple[View, list[MarkNumber]]]) -> tuple[View, tuple[MarkNumber, ...]]:
     """Return the photos of one place as one view, and the marks by object."""
-    if not photos:
-        return View(np.empty(0, np.uint8), np.empty(0)), ()
     if len(photos) == 1:
         return photos[0][0], tuple(photos[0][1])
     view = View.joined([seen for seen, _ in photos])

@@ -412,6 +412,30 @@ def test_the_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None
     assert (bounds[:, 2:].max(axis=0) >= (lon, lat)).all()
 
 
+@pytest.mark.parametrize(
+    ("marked", "ways", "shown"),
+    [
+        ("101", [(30.0, 40.0)], 1),
+        ("110", [(10.0, 0.0)], 1),
+        ("011", [(20.0, 40.0)], 1),
+        ("010", [], 0),
+    ],
+)
+def test_a_view_without_marks_is_passed_on_the_way(
+    bench: Workbench, marked: str, ways: list[tuple[float, float]], shown: int
+) -> None:
+    mark = {"x": 10, "y": 10, "class": "?"}
+    steps = [None, {"bearing": 90, "metres": 10}, {"bearing": 26.565051177, "metres": 44.72135955}]
+    views = [
+        {"photos": [{**SIDE, "fov": FOV, "marks": [mark] * int(one)}], "step": step}
+        for one, step in zip(marked, steps, strict=True)
+    ]
+    question = Question.parse({"views": views}, taxonomy=bench.taxonomy, radius=30.0)
+    assert [(leg.dx, leg.dy) for leg in question.legs] == [pytest.approx(way) for way in ways]
+    assert len(question.views) == marked.count("1")
+    assert question.shown == shown
+
+
 def test_a_question_is_read_without_a_server(bench: Workbench) -> None:
     with refused(InputError, "list"):
         Question.parse({"views": [{"photos": 1}]}, taxonomy=bench.taxonomy, radius=30.0)
