@@ -221,7 +221,9 @@ def finished_map(
                 area = child.area or area
         if isinstance(child, folium.LayerControl | LayerGroups | Surroundings):
             del children[name]
-    layers = folium.LayerControl(collapsed=cast("bool", JsCode("semsig.small.matches")))
+    collapsed = cast("bool", JsCode("semsig.small.matches"))
+    # Each layer has its parts in their order, and may share some with others.
+    layers = folium.LayerControl(collapsed=collapsed, autoZIndex=False)
     layers.add_to(map_)
     LayerGroups(map_, layers).add_to(map_)
     Surroundings(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)

@@ -7,9 +7,10 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from selenium.webdriver.support.wait import WebDriverWait
-from small_city import small_city
+from small_city import small_city, small_location
 
 from semsig_gis.maps.cells import ambiguity_map
+from semsig_gis.maps.location import location_map
 
 if TYPE_CHECKING:
     from map_pages import MapPage
@@ -68,6 +69,19 @@ def test_a_link_shows_what_was_seen_when_it_was_copied(alike: MapPage) -> None:
     alike.switch("Same types")
     alike.switch("Tell of a cell when clicked")
     wait_for(alike, layers=None)
+
+
+def test_what_a_link_colours_lies_on_the_cells(page: MapPage) -> None:
+    above = """
+    const images = [...document.querySelectorAll("img.leaflet-image-layer")];
+    return images.map((one) => [one.style.opacity, one.style.zIndex]);
+    """
+    page.open(location_map(small_location()))
+    assert page.ask(above) == [["", "1"], ["0.85", "1"]]
+    address = page.browser.current_url
+    follow(page, f"{address}#layers=~Chance-of-a-cell,Regions-of-50-90-and-99")
+    assert page.ask(above) == [["", "1"], ["0.85", "1"]]
+    assert page.ask(SEEN)[4].startswith("Regions")
 
 
 @pytest.mark.parametrize(

@@ -82,10 +82,11 @@ semsig.rememberLayers = (map, control) => {
     .map(({name, first}) => (first ? `~${name}` : name)).join(",") || null;
   semsig.remember(map, "layers", read, (text) => {
     const changed = new Set(text.split(","));
-    for (const {layer, name, first} of named) {
-      const is = changed.has(first ? `~${name}` : name) ? !first : first;
-      if (is !== map.hasLayer(layer)) map[is ? "addLayer" : "removeLayer"](layer);
-    }
+    const on = named.filter(({name, first}) =>
+      (changed.has(first ? `~${name}` : name) ? !first : first));
+    // Layers may share a part, so that what goes, goes first.
+    for (const one of named) if (!on.includes(one)) map.removeLayer(one.layer);
+    for (const one of on) map.addLayer(one.layer);
   });
   map.on("overlayadd overlayremove", () => map.fire("semsig-state"));
 };
