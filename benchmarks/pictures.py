@@ -92,6 +92,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.pictures", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("pictures"), metavar="FOLDER")
     parser.add_argument("--size", choices=["full", "small"], default="full")
+    parser.add_argument("--map", metavar="NAME", help="take pictures of this map alone")
     parser.add_argument(
         "--geodata",
         type=Path,
@@ -111,6 +112,8 @@ def main() -> None:
         browser = started(chromium, driver, folder)
         try:
             for name, drawn in _maps(objects, 50 if small else QUERIES):
+                if options.map not in {None, name}:
+                    continue
                 page = options.out / f"{name}.html"
                 save_map(drawn, page, self_contained=True, title=None if small else MONTPELLIER)
                 for picture in _pictures(browser, page, options.out):

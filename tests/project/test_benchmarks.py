@@ -118,6 +118,20 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
         assert (one["paper"] is None) == (one["name"].split(",")[0] not in FUSIONS | SINGLES.keys())
 
 
+@pytest.mark.usefixtures("browser", "carried")
+def test_pictures_of_a_map_are_taken(tmp_path: Path) -> None:
+    subprocess.run(
+        f"{sys.executable} -m benchmarks.pictures --size small --map ambiguity "
+        f"--out {tmp_path}".split(),
+        cwd=Path(__file__).parents[2],
+        check=False,  # it fails on frames that take long
+        timeout=300,
+    )
+    rows = json.loads((tmp_path / "pictures.json").read_text(encoding="utf-8"))
+    assert len(rows) == len(list(tmp_path.glob("ambiguity-*.png"))) == 4
+    assert not any(row["errors"] or row["requests"] or row["violations"] for row in rows)
+
+
 def test_the_page_of_figures_is_that_of_the_results() -> None:
     results = (
         json.loads((tables.FOLDER / name).read_text(encoding="utf-8"))
