@@ -196,3 +196,13 @@ def test_signs_on_a_map_of_vectors(page: MapPage) -> None:
     page.open(location_map(found(), map_=folium.Map(tiles=None)))
     outline = OUTLINES[ANSWERS["given"].shape]
     assert len(page.all(f'.leaflet-marker-pane path[d="{outline}"]')) == 1
+
+
+def test_what_has_bearings_alone_is_drawn_as_dots(page: MapPage) -> None:
+    seen = CITY.signature(LONGEST)
+    page.open(localization_map(localize(CITY, Signature(None, seen.bearings), top=1), CITY))
+    page.panel_of(CANDIDATE_RAMP[0])
+    asked, cell = page.all(".semsig-wheels figure")
+    assert len(asked.find_elements(By.CSS_SELECTOR, ".object .north")) == len(seen)
+    assert asked.find_elements(By.TAG_NAME, "text") == []
+    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched text")) == len(seen)
