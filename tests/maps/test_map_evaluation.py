@@ -132,8 +132,6 @@ def test_outcomes_have_shapes(evaluated: MapPage) -> None:
     counts = [evaluated.ask("return signArea(arguments[0])", one) for one in OUTCOMES]
     assert counts[0] == pytest.approx(np.pi / 4, abs=0.1)
     assert counts[1] == pytest.approx(0.5, abs=0.1)
-    size = "map.setZoom(arguments[1], {animate: false}); return circles(arguments[0])[0]._radius"
-    assert [evaluated.ask(size, FAILED, zoom) for zoom in (18, 11, 14, 16)] == [5.0, 2.5, 5.0, 5.0]
 
 
 def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> None:

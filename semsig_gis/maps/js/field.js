@@ -80,12 +80,6 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
 };
 // A sign of a shape, given as a path around (0, 0) for a circle of radius 1.
 semsig.Sign = L.CircleMarker.extend({
-  _project() {
-    // From afar smaller, lest many hide what they lie on.
-    this._size ??= this._radius;
-    this._radius = this._size * Math.min(1, Math.max(0.5, (this._map.getZoom() - 9) / 5));
-    L.CircleMarker.prototype._project.call(this);
-  },
   _updateBounds() {
     const out = 1.25 * this._radius + this._clickTolerance() + 1;  // corners, and their outline
     this._pxBounds = L.bounds(this._point.subtract([out, out]), this._point.add([out, out]));

@@ -29,8 +29,9 @@ semsig.queries = (map, key, packed, about) => {
     [2 * one, 2 * one + 1].map((at) => set.data[name][at] / 1e6);
   // The numbers of the queries that are selected, from 0: those that are drawn.
   set.selection = () => [...set.data.outcome.keys()].filter(isOn);
-  // Many are small from afar.
-  const radiusAt = (zoom) => (about.count <= 2000 || zoom >= 16 ? 5 : zoom >= 14 ? 3.5 : 2.5);
+  // From afar smaller, lest they hide what they lie on; many more so.
+  const radiusAt = (zoom) => (about.count <= 2000
+    ? 5 * Math.min(1, Math.max(0.5, (zoom - 9) / 5)) : zoom >= 16 ? 5 : zoom >= 14 ? 3.5 : 2.5);
   const spriteOf = (outcome, radius, dots) => {
     const name = [outcome, radius, dots].join();
     const {outline, colour, edge} = outcomes[outcome];
