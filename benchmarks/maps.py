@@ -182,7 +182,7 @@ def _filtering(browser: Chrome, what: str) -> Comparison:
     """Choose among the queries of the map that is open."""
     times = statistics.quantiles(browser.execute_async_script(_FILTERED), n=20)
     return Comparison(
-        name=f"the longest frame of twenty while the filters of {what} are moved",
+        name=f"the longest of twenty frames while the filters of {what} are moved",
         unit="ms",
         ours=times[-1],
         peer=_MOST_MS,
