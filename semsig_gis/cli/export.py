@@ -17,6 +17,7 @@ from semsig_gis.cli.console import (
     require_suffix,
     say,
 )
+from semsig_gis.cli.options import Smooth
 from semsig_gis.core.errors import InputError
 
 
@@ -46,14 +47,7 @@ def export(
             "queries around fails."
         ),
     ] = None,
-    smooth: Annotated[
-        float | None,
-        typer.Option(
-            help="Count queries within so many metres in the field, the nearer the more; by "
-            "default 250, or more where queries are few.",
-            show_default=False,
-        ),
-    ] = None,
+    smooth: Smooth = None,
     geometry: Annotated[
         Literal["polygon", "point"] | None,
         typer.Option(

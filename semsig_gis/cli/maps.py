@@ -20,6 +20,7 @@ from semsig_gis.cli.console import (
     say,
     tell_if_online,
 )
+from semsig_gis.cli.options import Smooth
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 
 if TYPE_CHECKING:
@@ -85,14 +86,7 @@ def map_(
     evaluation: Annotated[
         Path | None, typer.Option(help="Folder written by `semsig evaluate --out`.")
     ] = None,
-    smooth: Annotated[
-        float | None,
-        typer.Option(
-            help="Count queries within so many metres in the field of an evaluation, the nearer "
-            "the more; by default 250, or more where queries are few.",
-            show_default=False,
-        ),
-    ] = None,
+    smooth: Smooth = None,
     identifiability: Annotated[
         bool,
         typer.Option(

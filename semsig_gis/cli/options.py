@@ -78,6 +78,17 @@ Refine = Annotated[
         show_default=False,
     ),
 ]
+Smooth = Annotated[
+    float | None,
+    typer.Option(
+        "--smooth",
+        min=1,
+        max=100_000,
+        help="Count queries within so many metres in the field of an evaluation, the nearer the "
+        "more; by default 250, or more where queries are few.",
+        show_default=False,
+    ),
+]
 Objects = Annotated[
     Path | None,
     typer.Option(
