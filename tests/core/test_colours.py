@@ -39,7 +39,7 @@ from semsig_gis.core.signs import (
 from semsig_gis.exports.layers import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
 from semsig_gis.maps.parts import OUTLINES, mark_svg
 
-with warnings.catch_warnings():
+with warnings.catch_warnings(), np.printoptions():  # which it sets as they were long ago
     warnings.simplefilter("ignore")  # it tells what it lacks, and of its tritanopia
     import colour
 
