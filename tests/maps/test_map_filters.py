@@ -79,7 +79,7 @@ def test_queries_are_chosen_by_all_that_is_known_of_them(strong: MapPage) -> Non
     (outcome,) = (one for one in strong.all(".semsig-filters label") if "failed" in one.text)
     outcome.click()
     assert_selected(strong, unsure & ~FAILED)
-    strong.one(".semsig-save button").click()  # all
+    strong.one(".semsig-download button").click()  # all
     assert_selected(strong, everything)
     strong.switch("Successful")
     assert_selected(strong, FAILED)
@@ -158,7 +158,7 @@ def test_the_selection_is_written_to_files(strong: MapPage) -> None:
     const click = HTMLAnchorElement.prototype.click;
     const names = [];
     HTMLAnchorElement.prototype.click = function () { names.push(this.download); };
-    document.querySelectorAll(".semsig-save button").forEach((one) => one.click());
+    document.querySelectorAll(".semsig-download button").forEach((one) => one.click());
     HTMLAnchorElement.prototype.click = click;
     setTimeout(() => arguments[0](names), 1100);
     """

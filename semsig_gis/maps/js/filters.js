@@ -219,7 +219,7 @@ semsig.filters = async (map, key) => {
     option.value = symbol;
   }
   L.DomEvent.on(select, "change", () => changed());
-  const foot = L.DomUtil.create("div", "semsig-save", box);
+  const foot = L.DomUtil.create("div", "semsig-download", box);
   const button = (text, title, act) => {
     const one = semsig.text(foot, "button", text);
     Object.assign(one, {type: "button", title});
