@@ -33,7 +33,7 @@ from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database.build import build_database
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
-from semsig_gis.likelihood.posterior import calibrate
+from semsig_gis.likelihood.rule import calibrate
 from semsig_gis.matching.method import Method
 from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 

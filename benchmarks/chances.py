@@ -31,7 +31,7 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.age import Drift, aged_noise, named_drift
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
-from semsig_gis.likelihood.posterior import DEFAULT_RULE
+from semsig_gis.likelihood.rule import DEFAULT_RULE
 from semsig_gis.objects.changes import compare_objects
 from semsig_gis.queries.chain import parse_chain
 from semsig_gis.queries.draw import QuerySpec, draw_queries

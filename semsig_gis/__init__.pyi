@@ -72,10 +72,10 @@ from .database.views import ViewpointSpec as ViewpointSpec
 from .matching.method import Method as Method
 from .matching.scores import score_cells as score_cells
 from .matching.search import Localization as Localization, localize as localize
-from .likelihood.posterior import (
+from .likelihood.posterior import open_posterior as open_posterior
+from .likelihood.rule import (
     AnswerRule as AnswerRule,
     calibrate as calibrate,
-    open_posterior as open_posterior,
     open_rule as open_rule,
     save_rule as save_rule,
 )

@@ -186,7 +186,7 @@ def calibrate(
     import numpy as np
 
     from semsig_gis.database.city import open_city
-    from semsig_gis.likelihood import posterior as abstention
+    from semsig_gis.likelihood import rule as abstention
     from semsig_gis.likelihood.noise.learn import read_samples
 
     keep_inputs(out, read=(database, samples, noise, drift_report, objects))

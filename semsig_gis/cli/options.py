@@ -169,7 +169,7 @@ class SearchOptions:
         from semsig_gis.likelihood.index import build_index
         from semsig_gis.likelihood.locate import LikelihoodLocator
         from semsig_gis.likelihood.noise.model import cell_noise
-        from semsig_gis.likelihood.posterior import DEFAULT_RULE, open_rule
+        from semsig_gis.likelihood.rule import DEFAULT_RULE, open_rule
 
         if self.on_grid and self.refine:
             msg = (

@@ -14,7 +14,7 @@ import pandas as pd
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import ERROR_BREAKS
 from semsig_gis.core.statistics import quantile_ranks, wilson_interval
-from semsig_gis.likelihood.posterior import DEFAULT_RULE
+from semsig_gis.likelihood.rule import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_PLACES, expected_recall
 
 if TYPE_CHECKING:

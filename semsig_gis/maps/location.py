@@ -19,7 +19,7 @@ from semsig_gis.core.view import View
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.likelihood.explain import VERDICTS as COUNTED
-from semsig_gis.likelihood.posterior import DEFAULT_RULE
+from semsig_gis.likelihood.rule import DEFAULT_RULE
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.parts import (
     FLIPPING,
@@ -30,6 +30,7 @@ from semsig_gis.maps.parts import (
     colour_cells,
     corners_of,
     draw,
+    exact_latlon,
     finished_map,
     folded,
     isolated,
@@ -179,7 +180,7 @@ def posterior_map(
     page = prepared_map(map_, tiles, title="Where it was seen")
     _colour_chances(page, posterior, radius=radius, near=False)
     cell, mass = posterior.best_place(radius)
-    (place,) = to_latlon(database.xy[[cell]], database.crs, digits=7).tolist()
+    (place,) = exact_latlon(database.xy[cell], database.crs)
     told = f"{mass:.1%} within {radius:g} m"
     seen = cell_signature(database, cell, place=place)
     details = [told, seen, str(database.cell_ids[cell]), _position(place)]
@@ -245,9 +246,7 @@ class _Drawings:
         self.titles = {item.name: item.title for item in self.database.taxonomy.classes}
 
     def latlon(self, xy: ArrayLike) -> list[list[float]]:
-        places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        degrees: list[list[float]] = to_latlon(places, self.database.crs, digits=7).tolist()
-        return degrees
+        return exact_latlon(xy, self.database.crs)
 
     def view(self) -> NDArray[np.float64]:
         """Return the corners of what is shown first."""

@@ -12,7 +12,7 @@ import pandas as pd
 from semsig_gis.core.signs import ERROR_BREAKS
 from semsig_gis.evaluation.figures import percentile
 from semsig_gis.evaluation.result import Evaluation
-from semsig_gis.likelihood.posterior import DEFAULT_RULE
+from semsig_gis.likelihood.rule import DEFAULT_RULE
 from semsig_gis.matching.ties import NEAR_METRES, NEAR_PLACES
 from semsig_gis.queries.chain import chain_text
 from semsig_gis.queries.distortions import DISTORTIONS, FalseClass

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.evaluation.figures import percentile
-from semsig_gis.likelihood.posterior import DEFAULT_RULE
+from semsig_gis.likelihood.rule import DEFAULT_RULE
 from semsig_gis.reports.evaluation import (
     FIGURES,
     evaluation_headline,

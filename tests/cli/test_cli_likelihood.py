@@ -22,7 +22,7 @@ from semsig_gis.database.file import save_database
 from semsig_gis.database.views import views_at
 from semsig_gis.evaluation.file import open_evaluation
 from semsig_gis.likelihood.noise.model import open_noise
-from semsig_gis.likelihood.posterior import open_rule
+from semsig_gis.likelihood.rule import open_rule
 from semsig_gis.objects.table import save_objects
 
 if TYPE_CHECKING:

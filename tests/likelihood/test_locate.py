@@ -20,18 +20,14 @@ from semsig_gis.core.view import View
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.views import views_at
+from semsig_gis.likelihood.estimate import PlaceEstimate, cell_estimate, refined_estimate
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import (
-    PlaceEstimate,
-    cell_estimate,
-    locate,
-    locate_route,
-    refined_estimate,
-)
+from semsig_gis.likelihood.locate import locate, locate_route
 from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.likelihood.posterior import AnswerRule, Posterior, Refinement, posterior, refine
+from semsig_gis.likelihood.posterior import Posterior, Refinement, posterior, refine
 from semsig_gis.likelihood.priors import position_prior
 from semsig_gis.likelihood.route import Leg
+from semsig_gis.likelihood.rule import AnswerRule
 
 if TYPE_CHECKING:
     from semsig_gis.objects.table import StreetObjects

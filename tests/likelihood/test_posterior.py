@@ -18,14 +18,7 @@ from pyproj import CRS
 from sentences import refused
 
 from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.likelihood.posterior import (
-    AnswerRule,
-    calibrate,
-    open_rule,
-    posterior,
-    prior_ratio,
-    save_rule,
-)
+from semsig_gis.likelihood.posterior import posterior, prior_ratio
 from semsig_gis.likelihood.priors import (
     KnownPosition,
     area_prior,
@@ -34,6 +27,7 @@ from semsig_gis.likelihood.priors import (
     weight_prior,
 )
 from semsig_gis.likelihood.route import LOST, Leg, moved_chances, route_posteriors
+from semsig_gis.likelihood.rule import AnswerRule, calibrate, open_rule, save_rule
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -21,9 +21,10 @@ from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.learn import Sample, learn_noise
 from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise, place_noise
 from semsig_gis.likelihood.noise.table import noise_tables
-from semsig_gis.likelihood.posterior import AnswerRule, calibrate, posterior, refine
+from semsig_gis.likelihood.posterior import posterior, refine
 from semsig_gis.likelihood.priors import area_prior, position_prior, weight_prior
 from semsig_gis.likelihood.route import Leg, route_posteriors
+from semsig_gis.likelihood.rule import AnswerRule, calibrate
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,7 +19,7 @@ from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.likelihood.posterior import AnswerRule
+from semsig_gis.likelihood.rule import AnswerRule
 from semsig_gis.maps.cells import ambiguity_legend, identifiability_legend
 from semsig_gis.maps.drift import drift_legend
 from semsig_gis.maps.evaluation import evaluation_legend
