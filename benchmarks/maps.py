@@ -44,7 +44,7 @@ _SEED = 20
 _GONE = 0.02  # share of the objects that a year takes away
 
 # Seconds from the start of loading until all layers are drawn.
-_DRAWN = """
+DRAWN = """
 const done = arguments[0];
 const images = [...document.querySelectorAll("img.leaflet-image-layer")];
 Promise.all(images.map((image) => image.decode())).then(() =>
@@ -159,7 +159,7 @@ def _measured(browser: Chrome, page: Path, what: str) -> Iterator[Comparison]:
     for _ in range(_REPEATS):
         browser.get("about:blank")
         browser.get(page.as_uri())
-        seconds.append(browser.execute_async_script(_DRAWN))
+        seconds.append(browser.execute_async_script(DRAWN))
     yield Comparison(
         name=f"map of {what}",
         unit="MB",

@@ -18,7 +18,7 @@ import numpy as np
 from axe_core_python.selenium import Axe
 
 from benchmarks._cities import MONTPELLIER, made_up, real
-from benchmarks.maps import FRAMES, started
+from benchmarks.maps import DRAWN, FRAMES, started
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.evaluation.evaluate import evaluate
@@ -27,6 +27,7 @@ from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+from semsig_gis.maps.city import city_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import localization_map, location_map
@@ -51,13 +52,6 @@ QUERIES, TRIALS = 500, 5
 MOST_MB, MOST_MEDIAN_MS, MOST_LATE_MS = 6.5, 20.0, 100.0
 ZOOMS = (-1, -1, 1, 1)
 SETTLED_S = 1.0  # until what moves and fades is at rest
-# Waits until images are there and drawn.
-SHOWN = """
-const done = arguments[0];
-const images = [...document.querySelectorAll("img.leaflet-image-layer")];
-Promise.all(images.map((image) => image.decode())).then(() =>
-  requestAnimationFrame(() => requestAnimationFrame(() => done())));
-"""
 # Clicks the middle of the map.
 ASK = """
 const map = Object.values(window).find((value) => value instanceof L.Map);
@@ -138,13 +132,17 @@ def _maps(objects: StreetObjects, queries: int) -> Iterator[tuple[str, folium.Ma
     yield "identifiability", identifiability_map(identifiability)
     evaluation = evaluate(database, queries=queries, method=Method.parse("types:edit"))
     yield "evaluation", evaluation_map(evaluation, database)
-    whole = ambiguity_map(
-        database, identifiability=identifiability, map_=evaluation_map(evaluation, database)
-    )
-    whole = identifiability_map(identifiability, map_=whole)
-    whole = drift_map(database, newer, objects_before=objects, objects_after=later, map_=whole)
-    yield "everything", whole
     yield "drift", drift_map(database, newer, objects_before=objects, objects_after=later)
+    everything = city_map(
+        database,
+        evaluation=evaluation,
+        identifiability=identifiability,
+        ambiguity=True,
+        newer=newer,
+        objects_before=objects,
+        objects_after=later,
+    )
+    yield "everything", everything
     yield "objects", objects_map(objects, database=database)
     query = database.signature(int(np.argsort(database.lengths)[-len(database) // 10]))
     yield "localization", localization_map(localize(database, query), database)
@@ -163,7 +161,7 @@ def _pictures(browser: Chrome, page: Path, out: Path) -> Iterator[Picture]:
             scheme = {"name": "prefers-color-scheme", "value": ground}
             browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
             browser.get(page.resolve().as_uri())
-            browser.execute_async_script(SHOWN)
+            browser.execute_async_script(DRAWN)
             browser.execute_script(ASK)
             time.sleep(SETTLED_S)
             browser.save_screenshot(str(out / f"{page.stem}-{screen}-{ground}.png"))
@@ -173,7 +171,7 @@ def _pictures(browser: Chrome, page: Path, out: Path) -> Iterator[Picture]:
                 "return performance.getEntriesByType('resource').map((one) => one.name)"
             )
             browser.get(page.resolve().as_uri())
-            browser.execute_async_script(SHOWN)
+            browser.execute_async_script(DRAWN)
             frames = browser.execute_async_script(FRAMES, ZOOMS)
             yield Picture(
                 map=page.stem,

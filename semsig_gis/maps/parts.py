@@ -277,6 +277,19 @@ def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[
     return np.where(np.isfinite(degrees), degrees, np.nan)
 
 
+def to_metres(place: tuple[float, float], crs: CRS) -> NDArray[np.float64]:
+    """Return where a latitude and longitude is in a coordinate system, shape (1, 2)."""
+    lat, lon = place
+    return np.array([_to_degrees(crs).transform(lon, lat, direction="INVERSE")])
+
+
+def exact_latlon(xy: ArrayLike, crs: CRS) -> list[list[float]]:
+    """Return latitudes and longitudes of one place or many, to about a centimetre."""
+    places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    degrees: list[list[float]] = to_latlon(places, crs, digits=7).tolist()
+    return degrees
+
+
 def corners_of(source: SignatureDatabase | StreetObjects) -> NDArray[np.float64]:
     """Return latitudes and longitudes of the corners of all places."""
     return to_latlon(np.stack([source.xy.min(axis=0), source.xy.max(axis=0)]), source.crs)

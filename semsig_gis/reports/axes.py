@@ -6,7 +6,6 @@ can be plotted into the same axes.
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
@@ -33,7 +32,7 @@ from semsig_gis.core.signs import (
 from semsig_gis.evaluation.result import PlotKind
 from semsig_gis.likelihood.locate import Location
 from semsig_gis.queries.chain import chain_text
-from semsig_gis.reports.plots import INK, draw_curve, draw_frame, label
+from semsig_gis.reports.plots import INK, cell_pixels, draw_curve, draw_frame, label
 from semsig_gis.reports.scenes import MARKERS
 from semsig_gis.reports.shares import curve_of, plot_of
 
@@ -468,12 +467,7 @@ def _draw_cells(
     if not len(database):
         msg = "the database has no cells to show; give one with at least one cell."
         raise EmptyResultError(msg)
-    columns, rows = (one - one.min() for one in (database.columns, database.rows))
-    cells = math.ceil((max(columns.max(), rows.max()) + 1) / MOST_PIXELS)
-    columns, rows = columns // cells, rows // cells
-    image = np.full((rows.max() + 1, columns.max() + 1), np.nan)
-    image[rows, columns] = values
-    side = cells * database.grid.step
+    image, side = cell_pixels(database, values, most=MOST_PIXELS)
     west, south = (database.xy.min(axis=0) - database.grid.step / 2).tolist()
     box = (west, west + side * image.shape[1], south, south + side * image.shape[0])
     # Where several cells come to a pixel of the screen, it has the mean of their colours.

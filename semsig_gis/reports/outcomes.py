@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from semsig_gis.core.signs import OUTCOMES, WHITE
 from semsig_gis.reports.parts import OutcomeMap
-from semsig_gis.reports.plots import SOFT, blank_figure, draw_legend, label, saved
+from semsig_gis.reports.plots import SOFT, blank_figure, cell_pixels, draw_legend, label, saved
 from semsig_gis.reports.scenes import MARKERS, draw_north, draw_scale
 
 if TYPE_CHECKING:
@@ -33,18 +32,14 @@ def outcome_map(
     evaluation: Evaluation, database: SignatureDatabase, *, name: str, title: str
 ) -> OutcomeMap:
     """Return a map of the queries of an evaluation on the cells of the database."""
-    columns, rows = (values - values.min() for values in (database.columns, database.rows))
-    merged = math.ceil((max(columns.max(), rows.max()) + 1) / MOST_SQUARES)
-    columns, rows = columns // merged, rows // merged
-    ground = np.zeros((rows.max() + 1, columns.max() + 1), np.bool_)
-    ground[rows, columns] = True
+    pixels, step = cell_pixels(database, np.ones(len(database)), most=MOST_SQUARES)
     corner = database.xy.min(axis=0) - database.grid.step / 2
     points = evaluation.queries.geometry
     return OutcomeMap(
         name=name,
         title=title,
-        step=merged * database.grid.step,
-        ground=ground,
+        step=step,
+        ground=~np.isnan(pixels),
         places=np.column_stack([points.x, points.y]) - corner,
         successful=evaluation.successful,
     )

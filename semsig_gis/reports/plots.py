@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
+    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.reports.parts import Curve, Plot
 
 
@@ -136,6 +138,21 @@ def label(text: str, length: int) -> str:
     if not ends or ends[-1] <= length:
         return plain
     return plain[: bisect.bisect_right(ends, length - 1)].rstrip() + "…"
+
+
+def cell_pixels(
+    database: SignatureDatabase, values: NDArray[np.float64], *, most: int
+) -> tuple[NDArray[np.float64], float]:
+    """Return numbers of cells as an image, south first, NaN where none is, and a pixel's metres.
+
+    In a city with more than `most` cells a side, one of those that share a pixel is drawn.
+    """
+    columns, rows = (one - one.min() for one in (database.columns, database.rows))
+    merged = math.ceil((max(columns.max(), rows.max()) + 1) / most)
+    columns, rows = columns // merged, rows // merged
+    image = np.full((rows.max() + 1, columns.max() + 1), np.nan)
+    image[rows, columns] = values
+    return image, merged * database.grid.step
 
 
 def draw_legend(

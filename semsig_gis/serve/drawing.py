@@ -10,7 +10,7 @@ import numpy as np
 from semsig_gis.core.signs import CHANCES
 from semsig_gis.likelihood.explain import UNKNOWN_NAME
 from semsig_gis.maps.location import REGION_COLOURS, region_levels
-from semsig_gis.maps.parts import cell_signature, data_url, to_latlon
+from semsig_gis.maps.parts import cell_signature, data_url, exact_latlon, to_metres
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -101,19 +101,14 @@ class _Drawer:
 
     def latlon(self, xy: ArrayLike) -> list[list[float]]:
         """Return places in degrees."""
-        places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        degrees: list[list[float]] = to_latlon(places, self.database.crs, digits=7).tolist()
-        return degrees
+        return exact_latlon(xy, self.database.crs)
 
     def truth(self, place: tuple[float, float]) -> dict[str, Any]:
         """Return how far the answer is from the true place."""
-        from pyproj import Transformer  # noqa: PLC0415
-
-        lat, lon = place
-        crs = self.database.crs
-        x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(lon, lat)
-        metres = math.hypot(x - self.location.estimate.x, y - self.location.estimate.y)
-        cell = int(self.database.cells_at(np.array([[x, y]]))[0])
+        xy = to_metres(place, self.database.crs)
+        (x, y), estimate = xy[0].tolist(), self.location.estimate
+        metres = math.hypot(x - estimate.x, y - estimate.y)
+        cell = int(self.database.cells_at(xy)[0])
         chances = self.location.chances
         better = int((chances > chances[cell]).sum()) if cell >= 0 else None
         return {

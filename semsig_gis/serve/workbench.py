@@ -13,7 +13,6 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
@@ -27,7 +26,7 @@ from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
-from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url, panel_signs
+from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url, panel_signs, to_metres
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.detections.exif import picture_shot
 from semsig_gis.queries.detections.formats import read_pictures
@@ -358,8 +357,7 @@ class Workbench:
         """Return what would be seen from a place, and spoiled as a noise model says, as a view."""
         database = self.database
         lat, lon = degrees(told.get("place"))
-        to_metres = Transformer.from_crs("EPSG:4326", database.crs, always_xy=True)
-        place = np.array([to_metres.transform(lon, lat)])
+        place = to_metres((lat, lon), database.crs)
         cell = int(database.cells_at(place)[0])
         if cell < 0:
             msg = "no cell of the city is there; choose a place in one that is shaded."
