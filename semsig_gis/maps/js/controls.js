@@ -55,6 +55,13 @@ semsig.mapButton = (parent, name, sign, title, act) => {
   });
   return button;
 };
+// Hands a file to whoever sits at the browser.
+semsig.download = (name, blob) => {
+  const link = document.createElement("a");
+  Object.assign(link, {href: URL.createObjectURL(blob), download: name});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+};
 // What the map is of, how it was made, and its name for who cannot see it.
 semsig.title = (map) => {
   const container = map.getContainer();

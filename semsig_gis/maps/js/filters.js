@@ -155,13 +155,6 @@ semsig.files = {
     return ["application/geo+json", JSON.stringify({type: "FeatureCollection", features})];
   },
 };
-semsig.save = (name, [type, text]) => {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], {type}));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-};
 // A box to choose which queries are drawn: by outcome, error, objects seen, class and chance.
 semsig.filters = async (map, key) => {
   const box = L.DomUtil.create("details", "semsig-filters");
@@ -233,8 +226,10 @@ semsig.filters = async (map, key) => {
     changed();
   });
   for (const [text, kind] of [["GeoJSON", "geojson"], ["CSV", "csv"]]) {
-    button(text, `Download the selection as ${text}`, () => semsig.save(
-      `queries.${kind}`, semsig.files[kind](semsig.queryColumns(set), set.selection())));
+    button(text, `Download the selection as ${text}`, () => {
+      const [type, file] = semsig.files[kind](semsig.queryColumns(set), set.selection());
+      semsig.download(`queries.${kind}`, new Blob([file], {type}));
+    });
   }
   const inside = ({low, high, last}, value) =>
     (low === 0 || value >= low) && (high === last || value <= high);

@@ -84,12 +84,9 @@ semsig.picture = async (map) => {
 semsig.savePicture = async (map) => {
   const canvas = await semsig.picture(map);
   const blob = await new Promise((done) => { canvas.toBlob(done); });
-  const link = document.createElement("a");
-  link.download = `${(document.title.match(/[\p{L}\p{N}]+/gu) || ["map"]).join("-")}.png`;
-  link.href = URL.createObjectURL(blob);
-  link.click();
-  URL.revokeObjectURL(link.href);
-  semsig.say(map, `Saved: ${link.download}`);
+  const name = `${(document.title.match(/[\p{L}\p{N}]+/gu) || ["map"]).join("-")}.png`;
+  semsig.download(name, blob);
+  semsig.say(map, `Saved: ${name}`);
 };
 // On a page of paper the map is as large as that, and light.
 semsig.print = async (map) => {

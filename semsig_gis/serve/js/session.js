@@ -133,10 +133,3 @@ semsig.Session = class extends EventTarget {
     this.changed();
   }
 };
-// Hand a file to whoever sits at the browser.
-semsig.download = (name, blob) => {
-  const link = L.DomUtil.create("a", "");
-  Object.assign(link, {href: URL.createObjectURL(blob), download: name});
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-};
