@@ -27,6 +27,13 @@ const signs = (kind) => (kind.startsWith("#") ? circles(kind) : queries(kind));
 
 const lines = (test) => shown((layer) => layer.getLatLngs && test(layer));
 
+// Calls back once the map has lain still for three frames: a zoom begins with the next one.
+const atRest = (then, frames = 3) => {
+  const moves = map._animatingZoom || map._panAnim?._inProgress;
+  if (frames === 0) then();
+  else requestAnimationFrame(() => atRest(then, moves ? 3 : frames - 1));
+};
+
 // What the panel says.
 const panel = () => document.querySelector(".semsig-panel").innerText;
 

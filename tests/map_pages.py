@@ -95,13 +95,17 @@ class MapPage:
         next(label for label in labels if label.text.strip().startswith(name)).click()
 
     def search(self, text: str, *keys: str) -> list[str]:
-        """Type something into the search box, then press keys; return what it offered."""
+        """Type something into the search box, then press keys; return what it offered.
+
+        Returns once the map lies still: it glides to what was chosen.
+        """
         box = self.one(".semsig-search input")
         box.clear()
         box.send_keys(text)
         offered = [one.text for one in self.all(".semsig-search [role=option]")]
         for key in keys:
             box.send_keys(key)
+        self.ask_later("atRest(arguments[arguments.length - 1])")
         return offered
 
     def panel(self) -> str:
