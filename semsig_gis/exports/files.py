@@ -21,7 +21,8 @@ from pyarrow import csv
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GEOMETRY
-from semsig_gis.exports.layers import GEOMETRY_TYPES, by_failures
+from semsig_gis.exports.layers import GEOMETRY_TYPES
+from semsig_gis.exports.styles import by_failures
 from semsig_gis.storage.geoparquet import (
     BBOX,
     COVERING,

@@ -36,7 +36,7 @@ from semsig_gis.core.signs import (
     ClassSign,
     group_labels,
 )
-from semsig_gis.exports.layers import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
+from semsig_gis.exports.styles import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
 from semsig_gis.maps.parts import OUTLINES, mark_svg
 
 with warnings.catch_warnings(), np.printoptions():  # which it sets as they were long ago

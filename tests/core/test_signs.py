@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from semsig_gis.core.signs import COLOURS, SHAPES, ClassSign, class_signs, escaped, one_line
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.exports.layers import CLASS_MARKERS
+from semsig_gis.exports.styles import CLASS_MARKERS
 from semsig_gis.maps.parts import OUTLINES
 from semsig_gis.reports.scenes import MARKERS
 

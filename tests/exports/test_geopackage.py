@@ -44,7 +44,7 @@ from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identify.result import Identifiability
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.geopackage import read_geopackage
-from semsig_gis.exports.layers import CLASS_MARKERS, by_class
+from semsig_gis.exports.styles import CLASS_MARKERS, by_class
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 
