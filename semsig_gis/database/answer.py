@@ -16,6 +16,7 @@ import numpy as np
 import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import LICENSES
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.core.view import View
 from semsig_gis.database.north import GRID_NORTH
@@ -94,7 +95,9 @@ class Answer(Displayed):
         import geopandas as gpd  # noqa: PLC0415 - it loads slowly
 
         points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
-        return gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
+        frame = gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
+        frame.attrs[LICENSES] = list(self.licenses)
+        return frame
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw where the query may have been seen (see `plot_answer`)."""

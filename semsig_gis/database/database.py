@@ -29,12 +29,14 @@ from semsig_gis.storage.geoparquet import whole_numbers
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    import geopandas as gpd
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.core.display import Axes, MapFrame
     from semsig_gis.core.geometry import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.table import CellGeometry
 
     _Array = TypeVar("_Array", bound="NDArray[Any]")
 
@@ -238,6 +240,18 @@ class SignatureDatabase(Displayed):
     def types(self, cell: int) -> str:
         """Return the type sequence of the cell in a row, one symbol an object."""
         return self.taxonomy.decode(self.codes[self.offsets[cell] : self.offsets[cell + 1]])
+
+    def to_geodataframe(self, *, geometry: CellGeometry = "polygon") -> gpd.GeoDataFrame:
+        """Return the cells as a table in the CRS of the database, squares or points.
+
+        ``cell_id``, ``x`` and ``y`` (viewpoint), ``length`` (objects), ``types`` (symbols),
+        ``bearings``, ``levels`` and ``distances`` (as text, a number an object), and
+        ``type_group_size`` and ``angle_group_size`` (cells that look the same), as
+        `export_database` writes them.
+        """
+        from semsig_gis.database.table import CellTable  # noqa: PLC0415 - it loads slowly
+
+        return CellTable(self, geometry=geometry).frame()
 
     def plot(
         self,

@@ -32,9 +32,10 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.table import CellGeometry
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.exports.layers import CellGeometry, Layer
+    from semsig_gis.exports.layers import Layer
     from semsig_gis.exports.regions import SearchRegions
     from semsig_gis.objects.table import StreetObjects
 

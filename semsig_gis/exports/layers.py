@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import UnknownNameError, nearest_name
 from semsig_gis.core.geometry import (
     CLASS_CODE,
     CLASS_NAME,
@@ -24,9 +21,9 @@ from semsig_gis.core.geometry import (
     SOURCE,
     SOURCE_ID,
 )
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.signs import OUTCOMES
 from semsig_gis.database.file import database_specs
+from semsig_gis.database.table import CellTable
 from semsig_gis.exports.styles import (
     AMBIGUITY,
     IDENTIFIABILITY,
@@ -41,19 +38,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     import geopandas as gpd
-    from numpy.typing import NDArray
     from pyproj import CRS
 
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.table import CellGeometry
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.regions import SearchRegions
     from semsig_gis.exports.styles import Style
     from semsig_gis.objects.table import StreetObjects
 
-
-CellGeometry = Literal["polygon", "point"]
 
 ROWS_A_BLOCK = 1 << 16
 GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
@@ -96,41 +91,16 @@ def cells_layer(
     geometry: CellGeometry = "polygon",
 ) -> Layer:
     """Return the cells, as squares or as points."""
-    if geometry not in get_args(CellGeometry):
-        names = " or ".join(repr(name) for name in get_args(CellGeometry))
-        hint = nearest_name(str(geometry), get_args(CellGeometry))
-        msg = f"{geometry!r} is no geometry of a cell; give {names}{hint}."
-        raise UnknownNameError(msg)
+    cells = CellTable(database, geometry=geometry)
     if identifiability is not None:
         identifiability.require_cells_of(database)
-    symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
-    degrees = pa.array([f"{unit * 360 / BEARING_UNITS:.2f}" for unit in range(BEARING_UNITS)])
-    whole_numbers = pa.array([str(level) for level in range(1 << 8)])
-    distances = database.reach * np.arange(DISTANCE_UNITS + 1) / DISTANCE_UNITS
-    decimals = max(2, math.ceil(-math.log10(distances[1])))  # which tell each from the next
-    metres = pa.array([f"{distance:.{decimals}f}" for distance in distances.tolist()])
-    type_groups, angle_groups = database.type_group_sizes, database.angle_group_sizes
 
     def read(rows: slice) -> pa.Table:
-        places = database.xy[rows]
-        offsets = database.offsets[rows.start : rows.stop + 1]
-        columns = {
-            "cell_id": database.cell_ids[rows],
-            "x": np.ascontiguousarray(places[:, 0]),
-            "y": np.ascontiguousarray(places[:, 1]),
-            "length": database.lengths[rows].astype(np.int32),
-            "types": _joined(database.codes, offsets, texts=symbols, separator=""),
-            "bearings": _joined(database.bearing_units, offsets, texts=degrees),
-            "levels": _joined(database.levels, offsets, texts=whole_numbers),
-            "distances": _joined(database.distance_units, offsets, texts=metres),
-            "type_group_size": type_groups[rows],
-            "angle_group_size": angle_groups[rows],
-        }
+        columns = cells.columns(rows)
         if identifiability is not None:
             more = identifiability.table(rows)
             columns |= dict(zip(more.column_names, more.columns, strict=True))
-        shapes = shapely.points(places) if geometry == "point" else _squares(database, rows)
-        return pa.table({**columns, GEOMETRY: shapely.to_wkb(shapes)})
+        return pa.table({**columns, GEOMETRY: shapely.to_wkb(cells.shapes(rows))})
 
     step = database.grid.step
     crs = database.crs.to_json_dict()
@@ -285,23 +255,3 @@ def _table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN40
         bounds=tuple(shapes.total_bounds.tolist()),
         read=lambda rows: table.slice(rows.start, rows.stop - rows.start),
     )
-
-
-def _squares(database: SignatureDatabase, rows: slice) -> NDArray[np.object_]:
-    """Return the squares of some cells; neighbours share their corners to the last bit."""
-    step, (west, south) = database.grid.step, database.grid.origin
-    columns, lines = database.columns[rows], database.rows[rows]
-    left, right = west + columns * step, west + (columns + 1) * step
-    bottom, top = south + lines * step, south + (lines + 1) * step
-    return np.asarray(shapely.box(left, bottom, right, top))
-
-
-def _joined(
-    values: NDArray[Any], offsets: NDArray[np.int64], *, texts: pa.Array, separator: str = " "
-) -> pa.Array:
-    """Return the values of each cell as one text; `texts` holds every possible value as text."""
-    entries = pa.array(values[offsets[0] : offsets[-1]])
-    # From 0, and small enough for Arrow's 32-bit lists: a block has few cells.
-    starts = pa.array((offsets - offsets[0]).astype(np.int32))
-    lists = pa.ListArray.from_arrays(starts, texts.take(entries))
-    return pc.binary_join(lists, separator)

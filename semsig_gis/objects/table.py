@@ -17,6 +17,7 @@ from semsig_gis.core.display import Displayed, bounds_text
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.core.geometry import (
     CLASS_CODE,
+    CLASS_NAME,
     COUNT,
     GEOMETRY,
     LICENSES,
@@ -161,6 +162,21 @@ class StreetObjects(Displayed):
         xy: NDArray[np.float64] = shapely.get_coordinates(self.table.geometry.array)
         xy.setflags(write=False)
         return xy
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the objects as a table in their CRS that tells their classes in words.
+
+        ``class_code``, ``symbol``, ``class_name`` and ``title``, then the other columns of `table`;
+        `objects_from_frame` takes it with ``class_column="class_name"``.
+        """
+        classes = {item.code: item for item in self.taxonomy.classes}
+        kinds = [classes[code] for code in self.codes.tolist()]
+        frame = self.table.copy()
+        frame.insert(1, "symbol", [item.symbol for item in kinds])
+        frame.insert(2, CLASS_NAME, [item.name for item in kinds])
+        frame.insert(3, "title", [item.title for item in kinds])
+        frame.attrs[LICENSES] = [str(licence) for licence in self.licenses]
+        return frame
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw the objects with the signs of their classes (see `plot_objects`)."""

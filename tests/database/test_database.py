@@ -13,7 +13,7 @@ from sentences import refused
 from worlds import ARRAYS, TAXONOMY, assert_same
 
 import semsig_gis
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import SequenceTable, checked_sequence, join_databases
@@ -44,6 +44,20 @@ def test_places_are_in_their_cells(database: SignatureDatabase) -> None:
     assert (database.cells_at(database.xy + aside) == cells).all()
     far = database.xy.min(axis=0) - 1000.0
     assert database.cells_at([far, database.xy[2]]).tolist() == [-1, 2]
+
+
+def test_cells_are_a_table_of_squares_or_points(database: SignatureDatabase) -> None:
+    table = database.to_geodataframe()
+    assert table.crs == database.crs
+    assert table.attrs["licenses"] == list(database.licenses)
+    assert table["types"].tolist() == [database.types(cell) for cell in range(len(database))]
+    numbers = [float(text) for row in table["bearings"] for text in row.split()]
+    assert numbers == pytest.approx(database.bearings.tolist(), abs=0.006)
+    assert set(table.geometry.area.round(6)) == {database.grid.step**2}
+    points = database.to_geodataframe(geometry="point")
+    assert np.column_stack([points.geometry.x, points.geometry.y]).tolist() == database.xy.tolist()
+    with refused(UnknownNameError, "'square'", "'polygon' or 'point'"):
+        database.to_geodataframe(geometry="square")  # type: ignore[arg-type]
 
 
 def test_a_signature_is_a_part_of_the_arrays(database: SignatureDatabase) -> None:

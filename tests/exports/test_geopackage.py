@@ -49,7 +49,7 @@ from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
-    from semsig_gis.exports.layers import CellGeometry
+    from semsig_gis.database.table import CellGeometry
 
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"

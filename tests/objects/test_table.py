@@ -47,6 +47,20 @@ def points(*places: tuple[float, float]) -> list[shapely.Point]:
     return [shapely.Point(x, y) for x, y in places]
 
 
+def test_objects_are_a_table_that_tells_their_classes() -> None:
+    objects = build(
+        raw_layer(points((0, 0), (50, 0)), classes=["bench", "street_light"], ids=["7", "8"])
+    )
+    table = objects.to_geodataframe()
+    assert table[["symbol", "class_name", "source_id"]].to_numpy().tolist() == [
+        ["L", "bench", "7"],
+        ["D", "street_light", "8"],
+    ]
+    assert table.crs == objects.crs
+    assert table.attrs["licenses"] == [str(licence) for licence in objects.licenses]
+    assert "symbol" not in objects.table
+
+
 ABSENT = object()
 
 
