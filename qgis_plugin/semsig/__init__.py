@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from .plugin import SemsigPlugin
 
 
-def classFactory(iface: QgisInterface) -> SemsigPlugin:  # noqa: N802, ARG001 - as QGIS calls it
+def classFactory(iface: QgisInterface) -> SemsigPlugin:  # noqa: N802 - as QGIS calls it
     """Return the plugin.
 
     Parameters
     ----------
     iface : QgisInterface
-        The window of QGIS; not needed.
+        The window of QGIS.
 
     Returns
     -------
@@ -25,4 +25,4 @@ def classFactory(iface: QgisInterface) -> SemsigPlugin:  # noqa: N802, ARG001 - 
     """
     from .plugin import SemsigPlugin
 
-    return SemsigPlugin()
+    return SemsigPlugin(iface)

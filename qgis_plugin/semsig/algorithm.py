@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import html
-import os
 import re
 import shlex
 from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from processing.core.ProcessingConfig import ProcessingConfig
 from qgis.core import (
     QgsProcessing,
     QgsProcessingAlgorithm,
@@ -29,22 +27,15 @@ from qgis.core import (
 )
 from qgis.PyQt.QtGui import QIcon
 
+from . import settings
 from .answers import log_text
 from .arguments import check_output
-from .command import (
-    Cancelled,
-    CommandError,
-    Watcher,
-    clean_environment,
-    find_command,
-    run_command,
-)
+from .command import Cancelled, CommandError, Watcher, run_command
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingFeedback
 
 __all__ = [
-    "SETTING",
     "SemsigAlgorithm",
     "advanced",
     "area",
@@ -61,9 +52,6 @@ __all__ = [
     "style_layer",
     "whole_number",
 ]
-
-SETTING = "SEMSIG_COMMAND"
-"""Name of the setting that says where the command is."""
 
 HERE = Path(__file__).parent
 PARQUET = "GeoParquet (*.parquet)"
@@ -103,7 +91,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
 
     def svgIconPath(self) -> str:  # noqa: N802
         """Return where the icon is."""
-        return str(HERE / "icon.svg")
+        return settings.icon_path()
 
     def shortHelpString(self) -> str:  # noqa: N802
         """Return what it does, and what each parameter means."""
@@ -119,7 +107,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     def canExecute(self) -> tuple[bool, str]:  # noqa: N802
         """Tell whether the command is there, and what to do if not."""
         try:
-            _command()
+            settings.command()
         except CommandError as error:
             return False, str(error)
         return True, ""
@@ -177,7 +165,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         feedback.pushCommandInfo(shlex.join(["semsig", *arguments]))
         watcher = Watcher(progress, feedback.pushInfo, feedback.isCanceled)
         return run_command(
-            [_command(), *arguments], clean_environment(os.environ), watcher, written=written
+            [settings.command(), *arguments], settings.environment(), watcher, written=written
         )
 
     def tell(
@@ -225,10 +213,6 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
                 parameters, name, context, formats, "gpkg", feedback
             )
         )
-
-
-def _command() -> str:
-    return find_command(ProcessingConfig.getSetting(SETTING) or "", os.environ)
 
 
 def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]) -> str:

@@ -8,21 +8,23 @@ Nothing here imports QGIS.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import re
 import shutil
 import signal
-import subprocess
+import subprocess  # nosec B404 - the command is a process of its own
 import sys
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 __all__ = [
+    "ENGINE",
     "SETTINGS",
     "Cancelled",
     "CommandError",
@@ -30,6 +32,7 @@ __all__ = [
     "clean_environment",
     "find_command",
     "run_command",
+    "run_program",
 ]
 
 # What belongs to QGIS, by how the names of variables begin.
@@ -64,6 +67,9 @@ PLACES = (
 )
 SETTINGS = "Settings > Options > Processing > Providers > Semantic signatures"
 """Where in QGIS the command is chosen."""
+
+ENGINE = "Plugins > Semantic signatures > Engine..."
+"""Where in QGIS the command is installed."""
 
 PROGRESS = re.compile(r"semsig progress (\d+)% (.*)")
 # How its sentences begin.
@@ -112,7 +118,7 @@ def clean_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def find_command(
-    chosen: str, environment: Mapping[str, str], places: Sequence[str] = PLACES
+    chosen: str, environment: Mapping[str, str], places: Sequence[str] = PLACES, *, own: str = ""
 ) -> str:
     """Return the path of the `semsig` command.
 
@@ -124,6 +130,8 @@ def find_command(
         Its ``PATH`` is searched first.
     places : sequence of str, optional
         Folders to look in after that; may have wildcards and begin with ``~``.
+    own : str, optional
+        The command that the plugin installed, which comes before the search.
 
     Returns
     -------
@@ -144,13 +152,15 @@ def find_command(
             )
             raise CommandError(message)
         return found
+    if own:
+        return own
     folders = [str(folder) for place in places for folder in _folders(place)]
     path = os.pathsep.join([environment.get("PATH", ""), *folders])
     found = shutil.which("semsig", path=path)
     if found is None:
         message = (
             "The semsig command is not on this computer, or not where it is looked for; install "
-            f"semsig_gis with pip, or choose the command in {SETTINGS}."
+            f"it with {ENGINE}, or choose the command in {SETTINGS}."
         )
         raise CommandError(message)
     return found
@@ -200,12 +210,11 @@ def run_command(
     try:
         process = _start(command, environment)
     except OSError as error:
-        message = f"{command[0]} cannot be run ({error.strerror or error}); choose another program."
-        raise CommandError(message) from error
+        raise CommandError(_unusable(command[0], error)) from error
     said: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     results: list[str] = []
     readers = [
-        threading.Thread(target=_hand_on, args=(process, said), daemon=True),
+        threading.Thread(target=_hand_on, args=(process.stderr, said), daemon=True),
         threading.Thread(target=_collect, args=(process, results), daemon=True),
     ]
     with process:
@@ -229,6 +238,57 @@ def run_command(
     return "".join(results)
 
 
+def run_program(
+    command: Sequence[str],
+    environment: Mapping[str, str],
+    hear: Callable[[str], None],
+    cancelled: Callable[[], bool],
+) -> int:
+    """Run any program and return its exit code.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    environment : mapping of str to str
+        See `clean_environment`.
+    hear : callable
+        Takes each line that the program prints, be it a result or an error.
+    cancelled : callable
+        Tells whether the program shall end; asked ten times a second.
+
+    Returns
+    -------
+    int
+        The exit code.
+
+    Raises
+    ------
+    CommandError
+        If it cannot be run.
+    Cancelled
+        If that was wished. The program has ended, with all that it started.
+    """
+    try:
+        process = _start(command, environment, errors=subprocess.STDOUT)
+    except OSError as error:
+        raise CommandError(_unusable(command[0], error)) from error
+    said: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    reader = threading.Thread(target=_hand_on, args=(process.stdout, said), daemon=True)
+    with process:
+        reader.start()
+        try:
+            for line in _listen(said, cancelled):
+                hear(line)
+            code = process.wait()
+        except BaseException:
+            _kill(process)
+            raise
+        finally:
+            reader.join(PATIENCE_S)
+    return code
+
+
 def _state(path: str | None) -> tuple[int, int] | None:
     """Return what differs once a file is written anew."""
     try:
@@ -238,13 +298,16 @@ def _state(path: str | None) -> tuple[int, int] | None:
     return found.st_ino, found.st_mtime_ns
 
 
-def _start(command: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(  # noqa: S603 - the program is what the user installed or chose
+def _start(
+    command: Sequence[str], environment: Mapping[str, str], errors: int = subprocess.PIPE
+) -> subprocess.Popen[str]:
+    # The program is what the user installed or chose.
+    return subprocess.Popen(  # noqa: S603  # nosec B603
         command,
         env=dict(environment),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=errors,
         text=True,
         encoding="utf-8",
         errors="replace",
@@ -255,8 +318,12 @@ def _start(command: Sequence[str], environment: Mapping[str, str]) -> subprocess
     )
 
 
-def _hand_on(process: subprocess.Popen[str], said: queue.SimpleQueue[str | None]) -> None:
-    for line in process.stderr or ():
+def _unusable(program: str, error: OSError) -> str:
+    return f"{program} cannot be run ({error.strerror or error}); choose another program."
+
+
+def _hand_on(lines: Iterable[str] | None, said: queue.SimpleQueue[str | None]) -> None:
+    for line in lines or ():
         said.put(line.rstrip())
     said.put(None)
 
@@ -268,7 +335,7 @@ def _collect(process: subprocess.Popen[str], results: list[str]) -> None:
 def _hand_out(said: queue.SimpleQueue[str | None], watcher: Watcher) -> tuple[str, bool]:
     """Tell what is said, and return the last remark and whether it was `semsig` that spoke."""
     last, known = "", False
-    for line in _listen(said, watcher):
+    for line in _listen(said, watcher.cancelled):
         # The last remark is held back: it says why the command fails, if it does.
         if last:
             watcher.remark(last.removeprefix(SENTENCE))
@@ -280,9 +347,9 @@ def _hand_out(said: queue.SimpleQueue[str | None], watcher: Watcher) -> tuple[st
     return last, known
 
 
-def _listen(said: queue.SimpleQueue[str | None], watcher: Watcher) -> Iterator[str]:
+def _listen(said: queue.SimpleQueue[str | None], cancelled: Callable[[], bool]) -> Iterator[str]:
     """Yield the lines until the command has no more to say."""
-    while not watcher.cancelled():
+    while not cancelled():
         try:
             line = said.get(timeout=BLINK_S)
         except queue.Empty:
@@ -300,11 +367,22 @@ def _stop(process: subprocess.Popen[str]) -> None:
     try:
         process.wait(PATIENCE_S)
     except subprocess.TimeoutExpired:
-        if sys.platform == "win32":
-            process.kill()
-        else:
+        _kill(process)
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    """End a program with all that it started, by force."""
+    if sys.platform == "win32":
+        subprocess.run(  # noqa: S603  # nosec B603 B607
+            ["taskkill", "/F", "/T", "/PID", str(process.pid)],  # noqa: S607 - of the system
+            check=False,
+            capture_output=True,
+        )
+        process.kill()
+    else:
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+    process.wait()
 
 
 def _reason(program: str, last: str, code: int, *, known: bool) -> str:

@@ -1,14 +1,11 @@
-"""The Processing provider: its algorithms, its icon, and the setting of the command."""
+"""The Processing provider: its algorithms, its icon, and its settings."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from processing.core.ProcessingConfig import ProcessingConfig, Setting
 from qgis.core import QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
-from .algorithm import SETTING
+from . import settings
 from .build import Build
 from .evaluate import Evaluate
 from .export import Export
@@ -28,7 +25,7 @@ class SemsigProvider(QgsProcessingProvider):
 
     def name(self) -> str:
         """Return the name in the toolbox."""
-        return "Semantic signatures"
+        return settings.GROUP
 
     def longName(self) -> str:  # noqa: N802 - the names are those of QGIS
         """Return the name with what it is for."""
@@ -40,27 +37,17 @@ class SemsigProvider(QgsProcessingProvider):
 
     def svgIconPath(self) -> str:  # noqa: N802
         """Return where the icon is."""
-        return str(Path(__file__).with_name("icon.svg"))
+        return settings.icon_path()
 
     def load(self) -> bool:
-        """Add the setting and the algorithms."""
-        ProcessingConfig.settingIcons[self.name()] = self.icon()
-        ProcessingConfig.addSetting(
-            Setting(
-                self.name(),
-                SETTING,
-                "The semsig command (leave empty to look for it)",
-                "",
-                valuetype=Setting.FILE,
-            )
-        )
-        ProcessingConfig.readSettings()
+        """Add the settings and the algorithms."""
+        settings.add_settings()
         self.refreshAlgorithms()
         return True
 
     def unload(self) -> None:
-        """Take the setting away."""
-        ProcessingConfig.removeSetting(SETTING)
+        """Take the settings away."""
+        settings.remove_settings()
 
     def loadAlgorithms(self) -> None:  # noqa: N802
         """Add the algorithms, in the order in which they are used."""

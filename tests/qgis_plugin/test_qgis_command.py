@@ -92,7 +92,9 @@ def test_the_usual_places_are_in_the_home(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
-    with refused(CommandError, "install semsig_gis", "Settings > Options > Processing"):
+    with refused(
+        CommandError, "Plugins > Semantic signatures > Engine...", "Settings > Options > Processing"
+    ):
         find_command("", {"PATH": str(tmp_path)}, [])
     (tmp_path / "text").write_text("not a program")
     for name in ("text", "missing"):

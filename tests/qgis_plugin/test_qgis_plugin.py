@@ -278,7 +278,7 @@ def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> N
     )
     for (sentence,), words in zip(session["refused"], expected, strict=True):
         assert all(word in sentence for word in words), sentence
-    assert "install semsig_gis" in session["lost"]
+    assert "install it with Plugins > Semantic signatures > Engine..." in session["lost"]
 
 
 @pytest.mark.usefixtures("session")
