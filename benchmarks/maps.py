@@ -218,7 +218,7 @@ def started(chromium: str, driver: str, folder: str | Path) -> Chrome:
         "--disable-gpu",
         "--disable-background-networking",
         "--no-first-run",
-        "--host-resolver-rules=MAP * ~NOTFOUND",
+        "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
         "--window-size=1400,900",
         f"--user-data-dir={folder}/chromium",
     ):

@@ -1,16 +1,17 @@
-"""Pictures of every kind of map in Chromium, to be looked at, and what the browser found wrong."""
+"""Pictures of every map and of the workbench in Chromium, and what the browser found wrong."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import shutil
 import statistics
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,9 @@ from axe_core_python.selenium import Axe
 
 from benchmarks._cities import MONTPELLIER, made_up, real
 from benchmarks.maps import DRAWN, FRAMES, started
+from benchmarks.workbench import asked, photo_in, serving
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.city import ObjectStore, open_city, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identify.identify import identify
 from semsig_gis.likelihood.index import build_index
@@ -49,6 +51,7 @@ GROUNDS = ("light", "dark")
 SEED = 20
 GONE = 0.02  # share of the objects that a year takes away
 QUERIES, TRIALS = 500, 5
+WORKBENCH, MARKS = "workbench", 6
 MOST_MB, MOST_MEDIAN_MS, MOST_LATE_MS = 6.5, 20.0, 100.0
 ZOOMS = (-1, -1, 1, 1)
 SETTLED_S = 1.0  # until what moves and fades is at rest
@@ -67,11 +70,11 @@ class Picture:
     screen: str
     ground: str
     mb: float
-    median_ms: float
-    late_ms: float
     errors: tuple[str, ...]
     requests: tuple[str, ...]
     violations: tuple[str, ...]
+    median_ms: float = math.nan
+    late_ms: float = math.nan
 
     @property
     def passed(self) -> bool:
@@ -87,6 +90,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("pictures"), metavar="FOLDER")
     parser.add_argument("--size", choices=["full", "small"], default="full")
     parser.add_argument("--map", metavar="NAME", help="take pictures of this map alone")
+    parser.add_argument(
+        "--database", type=Path, metavar="FILE", help="take pictures of its workbench, too"
+    )
     parser.add_argument(
         "--geodata",
         type=Path,
@@ -105,12 +111,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         browser = started(chromium, driver, folder)
         try:
-            for name, drawn in _maps(objects, 50 if small else QUERIES):
+            maps = () if options.map == WORKBENCH else _maps(objects, 50 if small else QUERIES)
+            for name, drawn in maps:
                 if options.map not in {None, name}:
                     continue
                 page = options.out / f"{name}.html"
                 save_map(drawn, page, self_contained=True, title=None if small else MONTPELLIER)
                 for picture in _pictures(browser, page, options.out):
+                    print(_line(picture), flush=True)
+                    pictures.append(picture)
+            cities = [] if options.database is None else [options.database]
+            if options.map in {None, WORKBENCH}:
+                cities.insert(0, Path(folder, "city.parquet"))
+                save_with_store(build_database(objects), ObjectStore.of(objects), cities[0])
+            for city in cities:
+                for picture in _workbench(browser, city, options.out, 2 if small else MARKS):
                     print(_line(picture), flush=True)
                     pictures.append(picture)
         finally:
@@ -152,6 +167,43 @@ def _maps(objects: StreetObjects, queries: int) -> Iterator[tuple[str, folium.Ma
 
 def _pictures(browser: Chrome, page: Path, out: Path) -> Iterator[Picture]:
     """Yield the pictures of one page: on each screen, on each ground."""
+    url = page.resolve().as_uri()
+    for screen, ground in _screens(browser):
+        browser.get(url)
+        browser.execute_async_script(DRAWN)
+        browser.execute_script(ASK)
+        picture = _picture(browser, out, (page.stem, screen, ground), page.stat().st_size)
+        browser.get(url)
+        browser.execute_async_script(DRAWN)
+        yield _moved(browser, picture)
+
+
+def _workbench(browser: Chrome, path: Path, out: Path, marks: int) -> Iterator[Picture]:
+    """Yield the pictures of the workbench of a city; print how soon it answers."""
+    city, times = open_city(path), []
+    name = WORKBENCH if path.stem == "city" else f"{WORKBENCH}-{path.stem}"
+    with tempfile.TemporaryDirectory() as folder, serving(city) as address:
+        photo = photo_in(city, Path(folder))
+        for screen, ground in _screens(browser):
+            times += asked(browser, address, photo, marks=marks)
+            browser.execute_script("scroll(0, 0); document.querySelector('#seen').scrollTop = 0")
+            size = len(browser.page_source.encode())
+            picture = _picture(
+                browser, out, (name, screen, ground), size, own=address.partition("?")[0]
+            )
+            browser.execute_script("document.getElementById('map').scrollIntoView()")
+            browser.save_screenshot(str(out / f"{name}-{screen}-{ground}-map.png"))
+            browser.execute_script("window.moved = semsig.map")
+            yield _moved(browser, picture)
+    median, late = statistics.median(times), statistics.quantiles(times, n=10)[-1]
+    print(
+        f"{name}, {len(city.database):,} cells: of {len(times)} changes half are answered and "
+        f"drawn within {median:.0f} ms, and nine of ten within {late:.0f} ms"
+    )
+
+
+def _screens(browser: Chrome) -> Iterator[tuple[str, str]]:
+    """Yield the names of each screen and ground, once the browser has them."""
     for screen, (width, height, dots) in SCREENS.items():
         browser.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",
@@ -160,30 +212,37 @@ def _pictures(browser: Chrome, page: Path, out: Path) -> Iterator[Picture]:
         for ground in GROUNDS:
             scheme = {"name": "prefers-color-scheme", "value": ground}
             browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
-            browser.get(page.resolve().as_uri())
-            browser.execute_async_script(DRAWN)
-            browser.execute_script(ASK)
-            time.sleep(SETTLED_S)
-            browser.save_screenshot(str(out / f"{page.stem}-{screen}-{ground}.png"))
-            broken = Axe().run(browser)["violations"]
-            errors = browser.get_log("browser")
-            requests = browser.execute_script(
-                "return performance.getEntriesByType('resource').map((one) => one.name)"
-            )
-            browser.get(page.resolve().as_uri())
-            browser.execute_async_script(DRAWN)
-            frames = browser.execute_async_script(FRAMES, ZOOMS)
-            yield Picture(
-                map=page.stem,
-                screen=screen,
-                ground=ground,
-                mb=page.stat().st_size / 1e6,
-                median_ms=statistics.median(frames),
-                late_ms=statistics.quantiles(frames, n=20)[-1],
-                errors=tuple(entry["message"] for entry in errors),
-                requests=tuple(requests),
-                violations=tuple(rule["id"] for rule in broken),
-            )
+            yield screen, ground
+
+
+def _picture(
+    browser: Chrome, out: Path, names: tuple[str, str, str], size: int, *, own: str | None = None
+) -> Picture:
+    """Take a picture of the page that is open, which may ask its own server alone."""
+    time.sleep(SETTLED_S)
+    browser.save_screenshot(str(out / f"{'-'.join(names)}.png"))
+    broken = Axe().run(browser)["violations"]
+    requests = browser.execute_script(
+        "return performance.getEntriesByType('resource').map((one) => one.name)"
+    )
+    allowed = () if own is None else (own, "data:", "blob:")
+    name, screen, ground = names
+    return Picture(
+        map=name,
+        screen=screen,
+        ground=ground,
+        mb=size / 1e6,
+        errors=tuple(entry["message"] for entry in browser.get_log("browser")),
+        requests=tuple(one for one in requests if not one.startswith(allowed)),
+        violations=tuple(rule["id"] for rule in broken),
+    )
+
+
+def _moved(browser: Chrome, picture: Picture) -> Picture:
+    """Return a picture with how smoothly the map that is open moves."""
+    frames = browser.execute_async_script(FRAMES, ZOOMS)
+    late = statistics.quantiles(frames, n=20)[-1]
+    return replace(picture, median_ms=statistics.median(frames), late_ms=late)
 
 
 def _line(picture: Picture) -> str:

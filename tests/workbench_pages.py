@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from selenium.webdriver import Chrome
     from selenium.webdriver.remote.webelement import WebElement
-    from street_photos import StreetPhoto
+
+    from benchmarks.street_photos import StreetPhoto
 
 STAGE = "#picture .stage"
 QUIET = """

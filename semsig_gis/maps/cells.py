@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from folium.template import Template
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
@@ -18,7 +19,7 @@ from semsig_gis.core.signs import (
     SAME_TYPES,
     group_labels,
 )
-from semsig_gis.maps.image import QUANTUM_M, level_image, packed, place_lattices, steps
+from semsig_gis.maps.image import QUANTUM_M, level_image, packed, place_lattices, script_json, steps
 from semsig_gis.maps.parts import (
     LIFTING,
     NAMED_CLASSES,
@@ -71,7 +72,16 @@ class CellFacts:
 
 
 class Cells(Drawing):
-    """A layer without signs of its own that tells what is known of a cell when clicked."""
+    """A layer without signs of its own that tells what is known of a cell when clicked.
+
+    Of several on one map, each has only those packed numbers that none before it has.
+    """
+
+    _template = Template(
+        "{% macro script(this, kwargs) %}var {{ this.get_name() }}_arrays = {{ this.packed() }};"
+        "var {{ this.get_name() }} = "
+        "semsig.cells({{ this.get_name() }}_arrays, {{ this.arguments }});{% endmacro %}"
+    )
 
     def __init__(
         self, name: str | None, database: SignatureDatabase, facts: Sequence[CellFacts]
@@ -81,9 +91,25 @@ class Cells(Drawing):
             arrays |= part.arrays
             grid |= part.settings
         parts = [part.name for part in facts]
-        super().__init__(name, "cells", arrays, grid, panel_signs(database), parts, group="ground")
+        super().__init__(name, "cells", grid, panel_signs(database), parts, group="ground")
         self.files = (*PAGE_FILES, "cells.css", "cells.js", *(f"{part}.js" for part in parts))
-        self.database, self.facts = database, facts
+        self.database, self.facts, self.arrays = database, facts, arrays
+
+    def packed(self) -> str:
+        """Return the packed numbers for the script."""
+        known: dict[tuple[str, ...], str] = {}
+        for layer in layers_of(cast("folium.Map", self._parent)).values():
+            if layer is self:
+                break
+            if isinstance(layer, Cells):
+                for name, array in layer.arrays.items():
+                    place = f"{layer.get_name()}_arrays[{script_json(name)}]"
+                    known.setdefault(tuple(array), place)
+        entries = (
+            f"{script_json(name)}: {known.get(tuple(array)) or script_json(array)}"
+            for name, array in self.arrays.items()
+        )
+        return f"{{{', '.join(entries)}}}"
 
 
 def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:

@@ -115,11 +115,11 @@ def drift_map(
         for some, dark in looks
         if some.any()
     ]
-    differing = old.select(np.sort(np.concatenate([cells.changed[:, 0], cells.vanished])))
+    differing = new.select(np.sort(np.concatenate([cells.changed[:, 1], cells.appeared])))
     arrays = {
         "kind": packed(kinds),
-        **_signatures("before", differing, city),
-        **_signatures("now", new, city),
+        **_signatures("before", old, city),  # as a map of the cells before has them, too
+        **_signatures("now", differing, city),
     }
     facts = CellFacts(name="change", arrays=arrays, settings={"kinds": list(DRIFT_COLOURS)})
     cells_now = Cells(None, city, [facts])

@@ -30,6 +30,8 @@ from semsig_gis.objects.table import licenses_of
 from semsig_gis.storage.geoparquet import hilbert_order
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import folium
     import geopandas as gpd
     from numpy.typing import NDArray
@@ -96,23 +98,34 @@ def ground_map(
         names = " and ".join("no CRS" if crs is None else crs.name for crs in systems)
         msg = f"the streets and buildings have {names}; give both in one CRS."
         raise CrsError(msg)
+    arrays, about, bounds = packed_ground(tables, box)
+    page = prepared_map(map_, None, title="Streets and buildings")
+    draw(page, "Streets and buildings", "ground", arrays, about, group="ground")
+    legend, view = "", None
+    if map_ is None:
+        legend = "<summary>Streets and buildings</summary>"
+        view = to_latlon(bounds, systems[0])
+    licenses = licenses_of(buildings, streets)
+    return finished_map(page, None, legend=legend, view=view, licenses=licenses)
+
+
+def packed_ground(
+    tables: Mapping[str, gpd.GeoDataFrame], box: tuple[float, float, float, float] | None = None
+) -> tuple[dict[str, dict[str, list[str]]], dict[str, Any], NDArray[np.float64]]:
+    """Return ``streets`` and ``buildings`` of one CRS for the script, and the bounds of them.
+
+    EmptyResultError if nothing of them meets the box.
+    """
     simple = {kind: _simple(table, box) for kind, table in tables.items()}
     shapes = {kind: parts for kind, (parts, _) in simple.items() if len(parts)}
     if not shapes:
         msg = "there are no streets or buildings to show; give some that are in the city."
         raise EmptyResultError(msg)
-    page = prepared_map(map_, None, title="Streets and buildings")
-    arrays, about = _ground(shapes, systems[0])
-    if streets is not None and NAME in streets and "streets" in shapes:
-        arrays["streets"] |= _named(streets[NAME].iloc[simple["streets"][1]])
-    draw(page, "Streets and buildings", "ground", arrays, about, group="ground")
-    legend, view = "", None
-    if map_ is None:
-        bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
-        legend = "<summary>Streets and buildings</summary>"
-        view = to_latlon(bounds, systems[0])
-    licenses = licenses_of(buildings, streets)
-    return finished_map(page, None, legend=legend, view=view, licenses=licenses)
+    arrays, about = _ground(shapes, next(iter(tables.values())).crs)
+    if "streets" in shapes and NAME in tables["streets"]:
+        arrays["streets"] |= _named(tables["streets"][NAME].iloc[simple["streets"][1]])
+    bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
+    return arrays, about, bounds
 
 
 def _simple(

@@ -212,7 +212,7 @@ def finished_map(
         corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
         Call("legend", map_, legend, corners, zoom).add_to(map_)
     children = layers_of(map_)
-    area = None if source is None else _area(source)
+    area = None if source is None else search_area(source)
     names = (*(() if source is None else map(str, source.licenses)), *licenses)
     for name, child in list(children.items()):
         if isinstance(child, Surroundings):
@@ -230,7 +230,7 @@ def finished_map(
     return map_
 
 
-def _area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
+def search_area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
     """Return where the places of a source are, for the search of the page."""
     low, high = source.xy.min(axis=0), source.xy.max(axis=0)
     grid, edge = None, 0.0

@@ -21,6 +21,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.serve.ground import city_ground
 from semsig_gis.serve.page import policy, workbench_page
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
 from semsig_gis.storage.text import parse_json
@@ -100,6 +101,10 @@ class _Api:
 
     async def city(self, request: Request) -> Response:  # noqa: ARG002
         return await self._told(self.bench.about)
+
+    async def ground(self, request: Request) -> Response:  # noqa: ARG002
+        bench = self.bench
+        return await self._told(functools.partial(city_ground, bench.database, bench.store))
 
     async def photo(self, request: Request) -> Response:
         name = request.query_params.get("name", "the picture")[:200]
@@ -191,6 +196,7 @@ def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     routes = [
         Route("/", api.page),
         Route("/api/city", api.city),
+        Route("/api/ground", api.ground),
         *(Route(f"/api/{one.__name__}", one, methods=["POST"]) for one in asked),
     ]
     app = Starlette(

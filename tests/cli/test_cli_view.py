@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from PIL import Image
-from rendered import Scene
 from sentences import sentence
 
+from benchmarks.rendered import Scene
 from semsig_gis.core.view import Photo, View
 from semsig_gis.queries.detections.camera import Camera
 from semsig_gis.queries.file import read_queries

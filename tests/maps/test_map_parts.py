@@ -40,7 +40,7 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import ground_map, objects_map
-from semsig_gis.maps.parts import _area, layers_of, page_element, to_latlon
+from semsig_gis.maps.parts import layers_of, page_element, search_area, to_latlon
 from semsig_gis.matching.search import localize
 from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.queries.distortions import MissingClasses
@@ -318,7 +318,7 @@ def test_the_search_places_x_and_y_to_the_centimetre(
     table = gpd.GeoDataFrame(
         {"class_code": np.array([1, 1], np.uint8)}, geometry=shapely.points(corners), crs=system
     )
-    area = _area(StreetObjects(table, paper_taxonomy(), ()))
+    area = search_area(StreetObjects(table, paper_taxonomy(), ()))
     place = corners[0] + size * np.array([across, along])
     u, v = (place - area["middle"]) / area["half"]
     found = sum(u**i * v**j * np.array(weights) for i, j, *weights in area["terms"])

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 from map_pages import IMAGES
 from small_city import chances_of, small_city, small_evaluation, small_location
 
-from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+from semsig_gis.maps.cells import Cells, ambiguity_map, identifiability_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import location_map
 from semsig_gis.maps.objects import objects_map
+from semsig_gis.maps.parts import layers_of
 
 if TYPE_CHECKING:
     import folium
@@ -83,3 +84,13 @@ def test_a_click_tells_of_what_is_coloured(page: MapPage) -> None:
     assert page.click(CITY, 950)["title"] == "A cell that sees nothing any more"
     page.switch("Same types")
     assert page.click(CITY, 950)["title"] == both["title"]
+
+
+def test_numbers_that_two_layers_have_are_in_the_page_once() -> None:
+    drawn = story()
+    layers = [one for one in layers_of(drawn).values() if isinstance(one, Cells)]
+    (groups, change), text = layers, drawn.get_root().render()
+    for name in ("types", "levels", "x"):
+        assert groups.arrays[f"now.{name}"] == change.arrays[f"before.{name}"]
+        assert text.count(groups.arrays[f"now.{name}"][1]) == 1
+    assert text.count(groups.arrays["metres"][1]) == 1

@@ -119,16 +119,17 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("browser", "carried")
-def test_pictures_of_a_map_are_taken(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "each"), [("ambiguity", 1), ("workbench", 2)])
+def test_pictures_of_a_page_are_taken(tmp_path: Path, name: str, each: int) -> None:
     subprocess.run(
-        f"{sys.executable} -m benchmarks.pictures --size small --map ambiguity "
+        f"{sys.executable} -m benchmarks.pictures --size small --map {name} "
         f"--out {tmp_path}".split(),
         cwd=Path(__file__).parents[2],
         check=False,  # it fails on frames that take long
         timeout=300,
     )
     rows = json.loads((tmp_path / "pictures.json").read_text(encoding="utf-8"))
-    assert len(rows) == len(list(tmp_path.glob("ambiguity-*.png"))) == 4
+    assert (len(rows), len(list(tmp_path.glob(f"{name}-*.png")))) == (4, 4 * each)
     assert not any(row["errors"] or row["requests"] or row["violations"] for row in rows)
 
 

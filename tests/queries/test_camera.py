@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rendered import Scene
 from sentences import refused
 
+from benchmarks.rendered import Scene
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance
 from semsig_gis.queries.detections.camera import Camera

@@ -2,7 +2,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import geopandas as gpd
 import pytest
+import shapely
 from small_city import small_city
 from workbench import serving
 
@@ -19,7 +21,10 @@ if TYPE_CHECKING:
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Workbench:
     database, objects = small_city()
     path = tmp_path_factory.mktemp("serve") / "town.parquet"
-    save_with_store(database, ObjectStore.of(objects), path)
+    (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
+    line = shapely.LineString([(west, south), (east, north)])
+    streets = gpd.GeoDataFrame({"name": ["Rue de l'École"]}, geometry=[line], crs=database.crs)
+    save_with_store(database, ObjectStore.of(objects, streets=streets), path)
     city = open_city(path)
     return Workbench(city=city, store=city.store)
 

@@ -7,6 +7,7 @@ import shlex
 import struct
 import sys
 import zlib
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -21,6 +22,7 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.view import View
 from semsig_gis.database.views import views_at
 from semsig_gis.queries.detections.camera import Camera
+from semsig_gis.serve.ground import city_ground
 from semsig_gis.serve.question import Question
 
 if TYPE_CHECKING:
@@ -93,6 +95,18 @@ def picture(form: str = "JPEG", **told: dict[int, Any]) -> bytes:
     content = io.BytesIO()
     Image.new("RGB", (400, 300)).save(content, form, exif=exif)
     return content.getvalue()
+
+
+def test_the_page_is_told_of_streets_where_there_are_some(page: Page, bench: Workbench) -> None:
+    told = page.ask("/api/ground")
+    assert told["area"]["crs"] == "EPSG:32631"
+    assert list(told["ground"][0]) == ["streets"]
+    assert city_ground(bench.database, None)["ground"] is None
+    store = bench.store
+    assert store is not None
+    assert store.streets is not None
+    away = store.streets.set_geometry(store.streets.translate(9000.0))
+    assert city_ground(bench.database, replace(store, streets=away))["ground"] is None
 
 
 def test_a_photo_tells_of_its_camera(page: Page) -> None:

@@ -14,18 +14,20 @@ from map_pages import HOSTILE
 from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from selenium.webdriver.common.keys import Keys
-from street_photos import street_photo
 from workbench_pages import STAGE, WorkbenchPage
 
+from benchmarks.street_photos import street_photo
 from semsig_gis.maps.parts import to_latlon
+from semsig_gis.queries.sight import Sight
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from selenium.webdriver import Chrome
-    from street_photos import StreetPhoto
     from workbench import Page
+
+    from benchmarks.street_photos import StreetPhoto
 
 PLACE, HEADING = 475, 180.0  # a cell from which five objects are seen ahead, and four behind
 
@@ -47,11 +49,12 @@ def shown(
 @pytest.fixture
 def photos(page: Page, tmp_path: Path) -> list[StreetPhoto]:
     """Return two photos of one place, of which no file tells where the camera looks."""
-    store = page.bench.store
-    assert store
-    x, y = page.bench.database.xy[PLACE].tolist()
+    database = page.bench.database
+    sight = Sight.of_cell(database, PLACE)
     return [
-        street_photo(store.objects, (x, y), heading=HEADING + turn, file=tmp_path / f"{name}.jpg")
+        street_photo(
+            sight, database.taxonomy, heading=HEADING + turn, file=tmp_path / f"{name}.jpg"
+        )
         for name, turn in (("ahead", 0.0), ("behind", 180.0))
     ]
 
@@ -412,7 +415,26 @@ def test_files_are_dropped_on_the_page(shown: WorkbenchPage, photos: list[Street
     assert shown.all("body.dark")
 
 
+def test_streets_are_drawn_and_found_as_are_cells(shown: WorkbenchPage, page: Page) -> None:
+    assert shown.all("#map canvas.semsig-ground")
+    search = ".semsig-search input"
+    shown.one(search).send_keys("ecole", Keys.ENTER)
+    assert shown.text(".leaflet-tooltip") == "Rue de l'École"
+    shown.one(search).clear()
+    shown.one(search).send_keys(str(page.bench.database.cell_ids[PLACE]), Keys.ENTER)
+    database = page.bench.database
+    place = to_latlon(database.xy[[PLACE]], database.crs)[0]
+    there = "const {lat, lng} = semsig.map.getCenter(); return [lat, lng]"
+    assert shown.ask(there) == pytest.approx(place.tolist(), abs=1e-4)
+    shown.ask("semsig.map.fire('click', {latlng: semsig.map.getCenter()})")
+    shown.until("return !document.querySelector('.leaflet-tooltip')")
+
+
 def test_a_server_that_has_ended_is_told(shown: WorkbenchPage) -> None:
-    shown.ask("window.fetch = () => Promise.reject(new TypeError('gone'))")
+    shown.ask("window.fetch = () => new Promise((_, fail) => { window.fail = fail; })")
     shown.press("#add-compass")
-    assert "is semsig serve still running?" in shown.press("#add-mark")
+    shown.one("#add-mark").click()
+    assert shown.one("#answer").get_attribute("aria-busy") == "true"
+    shown.ask("fail(new TypeError('gone'))")
+    assert "is semsig serve still running?" in shown.settle()
+    assert shown.one("#answer").get_attribute("aria-busy") is None

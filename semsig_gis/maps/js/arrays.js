@@ -1,3 +1,5 @@
+// What several layers have is unpacked once.
+semsig.unpacked = new WeakMap();
 semsig.arrays = async (packed) => {
   const kinds = {
     u1: Uint8Array, u2: Uint16Array, i4: Int32Array, f8: Float64Array,
@@ -21,6 +23,10 @@ semsig.arrays = async (packed) => {
     return values;
   };
   const names = Object.keys(packed);
-  const arrays = await Promise.all(names.map((name) => read(packed[name])));
+  const once = (one) => {
+    if (!semsig.unpacked.has(one)) semsig.unpacked.set(one, read(one));
+    return semsig.unpacked.get(one);
+  };
+  const arrays = await Promise.all(names.map((name) => once(packed[name])));
   return Object.fromEntries(names.map((name, at) => [name, arrays[at]]));
 };

@@ -3,7 +3,7 @@ semsig.cellFacts.change = (city, cell) => {
   const [before, after] = ["before", "now"].map((part) => city.signature(part, cell));
   const title = {same: "A cell that sees what it saw", changed: "A cell that sees something else",
     appeared: "A new cell: it saw nothing", vanished: "A cell that sees nothing any more"}[kind];
-  if (kind === "same") return {title, rows: [["It sees", after]]};
+  if (kind === "same") return {title, rows: [["It sees", before]]};
   const count = {};
   for (const symbol of after[0]) count[symbol] = (count[symbol] || 0) + 1;
   for (const symbol of before[0]) count[symbol] = (count[symbol] || 0) - 1;

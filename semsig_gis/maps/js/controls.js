@@ -13,7 +13,7 @@ semsig.colours = (map) => {
       }
     };
     let choice = remembered();
-    const button = semsig.mapButton(bar, "semsig-colours", "\u25d0", "", () => {
+    const button = semsig.mapButton(bar, "semsig-colours", "", "", () => {
       choice = remembered(semsig.isDark(map) ? "light" : "dark");
       show();
       map.fire("semsig-state");
@@ -21,6 +21,8 @@ semsig.colours = (map) => {
     const show = () => {
       const is = choice ? choice === "dark" : dark.matches;
       map.getContainer().classList.toggle("semsig-dark", is);
+      // A sun or a moon, as a sign and not as a picture.
+      button.textContent = is ? "\u2600\ufe0e" : "\u263e\ufe0e";
       button.title = is ? "Light colours" : "Dark colours";
       button.setAttribute("aria-label", button.title);
       map.fire("semsig-colours");

@@ -20,7 +20,7 @@ semsig.sentence = ({answer, scenes}) => {
     ? `Within ${radius} m of ${semsig.coordinates(estimate.place)} with a chance of `
       + `${semsig.percent(mass)}.`
     : `Cannot tell yet: ${left < 1.5 ? "one place is" : `about ${semsig.rounded(left)} places are`}`
-      + ` left, and the best has a chance of ${semsig.percent(mass)}.`;
+      + ` left, and within ${radius} m of the best the chance is ${semsig.percent(mass)}.`;
   if (!answer.truth) return told;
   const {found, metres, rank} = answer.truth;
   const verdict = given ? (found ? "Found" : "Wrong") : "Not found";

@@ -87,6 +87,8 @@ semsig.Session = class extends EventTarget {
   async ask() {
     if (this.asking) return;
     this.asking = true;
+    const box = document.getElementById("answer");
+    box.ariaBusy = "true";
     let asked = null;
     while (asked !== this.changedAt) {
       asked = this.changedAt;
@@ -105,6 +107,7 @@ semsig.Session = class extends EventTarget {
       Object.assign(this, {answer, chosen: 0, answeredAt: asked});
       this.tell("answer");
     }
+    box.ariaBusy = null;
     this.asking = false;
   }
   saved() {

@@ -352,6 +352,21 @@ semsig.cityMap = (city) => {
   semsig.colours(map);
   return map;
 };
+// The streets, where they are known, and the search of maps.
+semsig.showGround = async (map) => {
+  const told = await (await semsig.api("ground")).json();
+  map.semsigArea = told.area;
+  semsig.search(map, told.area);
+  if (told.ground) semsig.ground(...told.ground).addTo(map);
+};
+// There is no panel here: what is found is pointed at, and named, until the map is clicked.
+semsig.show = (map, box, place, {drawn}) => {
+  semsig.found?.remove();
+  semsig.found = L.layerGroup([drawn, L.tooltip(place, {
+    content: box.querySelector("h2"), permanent: true, direction: "top", offset: [0, -10]})])
+    .addTo(map);
+  map.once("click", () => semsig.found.remove());
+};
 semsig.start = semsig.trying(async () => {
   const city = await (await semsig.api("city")).json();
   const session = new semsig.Session(city);
@@ -387,5 +402,6 @@ semsig.start = semsig.trying(async () => {
   session.show(null);
   session.tell("answer");
   Object.assign(semsig, {session, map});
+  await semsig.showGround(map);
 });
 semsig.start();

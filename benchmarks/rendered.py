@@ -26,6 +26,7 @@ class Scene:
 
     @classmethod
     def random(cls, seed: int, number: int = 60) -> Scene:
+        """Return things that stand anywhere around the camera."""
         rng = np.random.default_rng(seed)
         return cls(
             rng.uniform(4, 30, number),
@@ -35,6 +36,7 @@ class Scene:
         )
 
     def select(self, rows: NDArray[np.int64]) -> Scene:
+        """Return some of the things."""
         columns = (self.distances, self.bearings, self.heights, self.widths)
         return Scene(*(column[rows] for column in columns))
 
@@ -47,7 +49,7 @@ class Scene:
         right = away * np.sin(angle) + aside * np.cos(angle)
         ahead = away * np.cos(angle) - aside * np.sin(angle)
         points = np.broadcast_arrays(right, EYE_M - rise, ahead)
-        pixels = camera.pixels(np.stack(points, axis=-1)).reshape(len(away), -1, 2)
+        pixels = camera.pixels(np.stack(points, axis=-1)).reshape(len(away), 5 * 41, 2)
         boxes = np.concatenate([pixels.min(axis=1), pixels.max(axis=1)], axis=-1)
         size = np.array([camera.width, camera.height])
         # Across the seam of a panorama, a thing is in two pieces.

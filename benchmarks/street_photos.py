@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw
-from rendered import Scene
 
+from benchmarks.rendered import Scene
 from semsig_gis.core.signs import class_signs
 from semsig_gis.queries.detections.camera import Camera
 from semsig_gis.queries.detections.views import with_heights
@@ -16,7 +16,8 @@ from semsig_gis.queries.detections.views import with_heights
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.queries.sight import Sight
 
 SKY, WALLS, GROUND = "#b9d3ea", "#c9bba7", "#9a9a94"
 TRUNK, METAL = "#6b4a2b", "#4a4f55"
@@ -42,24 +43,23 @@ class StreetPhoto:
 
 
 WIDTH, HEIGHT = 960, 720
+NEAREST_M = 3.0
 
 
 def street_photo(
-    objects: StreetObjects, xy: tuple[float, float], *, heading: float, file: Path, fov: float = 90
+    sight: Sight, taxonomy: Taxonomy, *, heading: float, file: Path, fov: float = 90
 ) -> StreetPhoto:
     """Draw what is seen from a place, and write it as a picture without any EXIF."""
     camera = Camera(width=WIDTH, height=HEIGHT, fov=fov)
-    away = objects.xy - np.array(xy)
-    distances = np.hypot(*away.T)
-    bearings = (np.degrees(np.arctan2(*away.T)) - heading + 180) % 360 - 180
-    near = np.flatnonzero((distances > 3) & (distances < 30) & (np.abs(bearings) < fov / 2))
-    near = near[np.argsort(-distances[near])]
-    signs, taxonomy = class_signs(objects.taxonomy), with_heights(objects.taxonomy)
-    kinds = [signs[int(code)] for code in objects.codes[near]]
-    heights = np.array([taxonomy.by_code(code).height_m or 2.0 for code in objects.codes[near]])
+    bearings = (sight.bearings - heading + 180) % 360 - 180
+    ahead = np.flatnonzero((sight.distances > NEAREST_M) & (np.abs(bearings) < fov / 2))
+    near = ahead[np.argsort(-sight.distances[ahead])]
+    signs, sizes = class_signs(taxonomy), with_heights(taxonomy)
+    kinds = [signs[int(code)] for code in sight.codes[near]]
+    heights = np.array([sizes.by_code(code).height_m or 2.0 for code in sight.codes[near]])
     trees = np.array([kind.symbol == "B" for kind in kinds])
     widths = np.where(trees, 4.0, np.minimum(heights / 3, 0.6))
-    scene = Scene(distances[near], bearings[near], heights, widths)
+    scene = Scene(sight.distances[near], bearings[near], heights, widths)
     boxes = scene.boxes(camera)  # of what is whole in the picture
     picture = Image.new("RGB", (WIDTH, HEIGHT), SKY)
     draw = ImageDraw.Draw(picture)

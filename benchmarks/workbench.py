@@ -1,0 +1,121 @@
+"""The workbench in a browser: a photo is dropped, objects are marked, each change is answered."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+
+from benchmarks.street_photos import WIDTH, street_photo
+from semsig_gis.cli.options import object_store
+from semsig_gis.queries.sight import Sight
+from semsig_gis.serve import server
+from semsig_gis.serve.workbench import Workbench
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from selenium.webdriver import Chrome
+
+    from benchmarks.street_photos import StreetPhoto
+    from semsig_gis.database.city import City
+
+__all__ = ["asked", "photo_in", "serving"]
+
+_TURNS = range(0, 360, 45)
+_PATIENCE_S = 60.0
+_STAGE = "#picture .stage"
+_DROP = """
+const files = new DataTransfer();
+files.items.add(new File([new Uint8Array(arguments[0])], arguments[1], {type: "image/jpeg"}));
+for (const kind of ["dragover", "drop"]) {
+  document.body.dispatchEvent(
+    new DragEvent(kind, {dataTransfer: files, bubbles: true, cancelable: true}));
+}
+"""
+_ANSWERED = """
+const {session} = semsig;
+return Boolean(session) && !session.asking && !document.body.ariaBusy
+  && Number(document.body.dataset.answered) === session.changedAt
+  && (session.scenes.length > 0 || !arguments[0]);
+"""
+_SLIDE = """
+const slider = document.getElementById("fov");
+slider.value = arguments[0];
+slider.dispatchEvent(new Event("input"));
+"""
+_TIMES = "return performance.getEntriesByName('semsig-answer').map((one) => one.duration)"
+
+
+@contextlib.contextmanager
+def serving(city: City) -> Iterator[str]:
+    """Serve the workbench of a city for as long as the block runs; return its address."""
+    bench = Workbench(city=city, store=object_store(city, None, needed=False))
+    bench.prepare()
+    token = secrets.token_urlsafe(32)
+    with server.listening(0) as listener:
+        running = server.served(bench, listener, token=token)
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield server.address(listener, token)
+        finally:
+            running.should_exit = True
+            thread.join()
+
+
+def photo_in(city: City, folder: Path) -> StreetPhoto:
+    """Draw a photo from the cell that sees most classes, of the side where most can be marked."""
+    database = city.database
+    types = database.type_sequences
+    cell = int((types.histogram > 0).sum(axis=1)[types.inverse].argmax())
+    sight = Sight.of_cell(database, cell)
+    file = folder / "street.jpg"
+    draw = {
+        turn: street_photo(sight, database.taxonomy, heading=turn, file=file) for turn in _TURNS
+    }
+    best = max(draw, key=lambda turn: len({symbol for symbol, _ in draw[turn].things}))
+    return street_photo(sight, database.taxonomy, heading=best, file=file)
+
+
+def asked(browser: Chrome, address: str, photo: StreetPhoto, *, marks: int) -> list[float]:
+    """Open the page, drop a photo, mark some objects; return milliseconds from change to answer."""
+    browser.get(address)
+    _settle(browser)
+    browser.execute_script(_DROP, list(photo.file.read_bytes()), photo.file.name)
+    _settle(browser, seen=True)
+    browser.execute_script(_SLIDE, photo.fov)
+    _settle(browser)
+    for symbol, (left, top, right, bottom) in photo.things[:marks]:
+        stage = browser.find_element(By.CSS_SELECTOR, _STAGE)
+        browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", stage)
+        size = stage.size
+        scale = size["width"] / WIDTH
+        x, y = (
+            round(corner * scale - size[side] / 2)
+            for corner, side in ((left, "width"), (top, "height"))
+        )
+        wide, high = (max(round(edge * scale), 9) for edge in (right - left, bottom - top))
+        chain = ActionChains(browser, duration=0)
+        chain.move_to_element_with_offset(stage, x, y).click_and_hold()
+        chain.move_by_offset(wide, high).release().perform()
+        ActionChains(browser).send_keys(symbol).perform()
+        _settle(browser)
+    return list(browser.execute_script(_TIMES))
+
+
+def _settle(browser: Chrome, *, seen: bool = False) -> None:
+    """Wait until what changed is answered and, if `seen`, a photo is there."""
+    end = time.monotonic() + _PATIENCE_S
+    while not browser.execute_script(_ANSWERED, seen):
+        if time.monotonic() > end:
+            said = browser.find_element(By.ID, "notice").text
+            msg = f"the workbench did not answer within {_PATIENCE_S:g} s: {said}"
+            raise TimeoutError(msg)
+        time.sleep(0.02)
