@@ -40,7 +40,7 @@ _LOADING = 1 / 0.7
 _MOST_HELP_MS = 500.0
 _EXPLAINED = 3
 _IMPORTS = "import numba, pandas, geopandas, pyarrow, typer, rich"
-_LIKELIHOOD = ("--method", "likelihood")
+_DISTANCE = ("--method", "edit+edit")
 # The command, which tells at last how many seconds it answered and how many MB it needed.
 _TOLD = """
 import sys, time
@@ -132,7 +132,7 @@ def _batch_row(city: Path, database: SignatureDatabase, queries: Sequence[Signat
     asked = [json.loads(line)["types"] for line in lines]
     return compare(
         f"a process that answers {len(queries):,} queries by likelihood, {len(database):,} cells",
-        lambda _: _process(*_localize(city), "--queries", str(file), *_LIKELIHOOD),
+        lambda _: _process(*_localize(city), "--queries", str(file)),
         lambda _: cdist(asked, texts, scorer=Levenshtein.distance, dtype=np.uint8),
         peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
         repeats=1,
@@ -150,13 +150,13 @@ def _cold_rows(
     before = sorted(city.parent.iterdir())
     yield compare(
         f"cold: semsig localize by likelihood, {cells}",
-        lambda _: _process(*plain, *_LIKELIHOOD),
         lambda _: _process(*plain),
+        lambda _: _process(*plain, *_DISTANCE),
         peer_name="semsig localize by edit+edit",
         repeats=repeats,
         bar=_COLD,
     )
-    told = [[_told(*plain[2:], *method) for _ in range(repeats)] for method in (_LIKELIHOOD, ())]
+    told = [[_told(*plain[2:], *method) for _ in range(repeats)] for method in ((), _DISTANCE)]
     by_likelihood, by_distance = (statistics.median(peak for _, peak in runs) for runs in told)
     yield Comparison(
         name=f"peak memory of semsig localize by likelihood, {cells}",
@@ -176,7 +176,7 @@ def _cold_rows(
     )
     whole = compare(
         f"cold: semsig localize by edit+edit but for answering, {cells}",
-        lambda _: _process(*plain),
+        lambda _: _process(*plain, *_DISTANCE),
         lambda _: _process("-c", _IMPORTS),
         peer_name="python that imports numba, pandas, geopandas, pyarrow, typer and rich",
         repeats=repeats,

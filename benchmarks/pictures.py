@@ -25,6 +25,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, open_city, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identify.identify import identify
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
@@ -36,7 +37,6 @@ from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import objects_map
 from semsig_gis.maps.page import available, save_map
 from semsig_gis.matching.method import Method
-from semsig_gis.matching.search import localize
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.sources.synthetic.city import CitySpec
 
@@ -160,7 +160,8 @@ def _maps(objects: StreetObjects, queries: int) -> Iterator[tuple[str, folium.Ma
     yield "everything", everything
     yield "objects", objects_map(objects, database=database)
     query = database.signature(int(np.argsort(database.lengths)[-len(database) // 10]))
-    yield "localization", localization_map(localize(database, query), database)
+    ranked = localize(database, query, method=Method(), top=100)
+    yield "localization", localization_map(ranked, database)
     store = ObjectStore.of(objects)
     yield "location", location_map(locate(index, query, store=store, refined=True, explained=3))
 

@@ -79,7 +79,7 @@ _VIEW_BARS = """The figures that views were to reach, and what came out.
 _REAL = """## Chances in real cities
 
 `make chances` asks for what is seen from anywhere in a city, {queries} queries at each of `light`,
-`medium` and `strong`, and answers as `semsig localize --method likelihood` does: generic noise,
+`medium` and `strong`, and answers as `semsig localize` does: generic noise,
 refined places. "Stated" is the mean chance, of the queries in a tenth, to be within 50 m; "came
 true" how often it was. Queries of which nothing remains are not among them.
 """

@@ -63,8 +63,8 @@ EXPORT = (
     "build objects.parquet --out city.parquet",
     "export city.parquet --objects objects.parquet --out city.gpkg",
 )
-DISTANCE = "localize city.parquet --types BB --bearings 10,80"
-LIKELIHOOD = f"{DISTANCE} --method likelihood"
+LIKELIHOOD = "localize city.parquet --types BB --bearings 10,80"
+DISTANCE = f"{LIKELIHOOD} --method edit+edit"
 WALKS = {
     "trees to GeoPackage": EXPORT,
     "query, by distance": (DISTANCE,),

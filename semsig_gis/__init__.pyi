@@ -71,7 +71,7 @@ from .database.update import update_database as update_database, update_file as 
 from .database.views import ViewpointSpec as ViewpointSpec
 from .matching.method import Method as Method
 from .matching.scores import score_cells as score_cells
-from .matching.search import Localization as Localization, localize as localize
+from .matching.search import Localization as Localization
 from .likelihood.posterior import open_posterior as open_posterior
 from .likelihood.rule import (
     AnswerRule as AnswerRule,
@@ -134,7 +134,7 @@ from .evaluation.identify.result import (
     save_identifiability as save_identifiability,
 )
 from .evaluation.identify.trials import leave_class_out as leave_class_out
-from .evaluation.methods import parse_method as parse_method
+from .evaluation.methods import localize as localize, parse_method as parse_method
 from .evaluation.result import Evaluation as Evaluation
 from .evaluation.spec import (
     ExperimentSpec as ExperimentSpec,

@@ -11,10 +11,11 @@ import numpy as np
 from semsig_gis.database.build import build_database
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identify.result import BANDS, ClassGain, Identifiability
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.method import Method
 from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence
 from semsig_gis.sources.catalog import paper_taxonomy
@@ -39,7 +40,7 @@ def small_city() -> tuple[SignatureDatabase, StreetObjects]:
 @functools.cache
 def small_evaluation(distortion: str = "strong") -> Evaluation:
     """Return an evaluation in which some queries are found, some missed and, if strong, empty."""
-    return evaluate(small_city()[0], queries=60, distortion=distortion)
+    return evaluate(small_city()[0], queries=60, method=Method(), distortion=distortion)
 
 
 @functools.cache
@@ -51,7 +52,7 @@ def small_location() -> Location:
 @functools.cache
 def small_localization() -> Localization:
     database, _ = small_city()
-    return localize(database, database.signature(7), top=20)
+    return localize(database, database.signature(7), top=20, method=Method())
 
 
 def chances_of(database: SignatureDatabase, *, seed: int = 0) -> Identifiability:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.method import DEFAULT_METHOD, PAPER_METHOD
 from semsig_gis.core.terminal import visible
 
 if TYPE_CHECKING:
@@ -194,13 +195,17 @@ Database = Annotated[Path, typer.Argument(help="Signature database written by `s
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 MethodText = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--method",
         help="Rank by likelihood, or by distance as TYPES+ANGLES (edit, histogram, jaccard), "
         "types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
-        ":weights=INSERT/DELETE/SUBSTITUTE.",
+        f":weights=INSERT/DELETE/SUBSTITUTE.  [default: {DEFAULT_METHOD}]",
+        show_default=False,
     ),
+]
+Paper = Annotated[
+    bool, typer.Option("--paper", help=f"Rank as the paper does: --method {PAPER_METHOD}.")
 ]
 
 # The ranges of numbers are those of the core (`core.ranges` and the specs), which loads slowly.
@@ -210,7 +215,14 @@ Workers = Annotated[
     int, typer.Option(min=0, max=MOST_WORKERS, help="Number of processes on this machine.")
 ]
 Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HOST:PORT.")]
-LIKELIHOOD = "likelihood"  # as a value of --method
+
+
+def chosen_method(method: str | None, *, paper: bool) -> str:
+    """Return the text of the method that the options name."""
+    if method is not None and paper:
+        msg = f"--paper was given with --method {method}; give one of them."
+        raise InputError(msg)
+    return PAPER_METHOD if paper else method or DEFAULT_METHOD
 
 
 def command_line() -> str:

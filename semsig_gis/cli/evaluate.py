@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from semsig_gis.cli.console import (
-    LIKELIHOOD,
     MOST_METRES,
     MOST_QUERIES,
     MOST_SEED,
@@ -17,9 +16,11 @@ from semsig_gis.cli.console import (
     AsJson,
     Database,
     MethodText,
+    Paper,
     Scheduler,
     Workers,
     app,
+    chosen_method,
     city_name,
     command_line,
     keep_inputs,
@@ -40,6 +41,7 @@ from semsig_gis.cli.options import (
     read_noise,
 )
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.method import LIKELIHOOD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,7 +71,8 @@ def evaluate(
         Literal["uniform", "frequency"] | None,
         typer.Option(help="How the class of a false object is drawn; uniform by default."),
     ] = None,
-    method: MethodText = "edit+edit",
+    method: MethodText = None,
+    paper: Paper = False,
     noise: NoiseName = "generic",
     map_age: MapAge = 0.0,
     drift_report: DriftReport = None,
@@ -88,14 +91,15 @@ def evaluate(
     """Ask queries from known places and measure the errors."""
     require_suffix(".html", report)
     keep_inputs(report, read=[database, drift_report])
-    if method != LIKELIHOOD:
+    ranking = chosen_method(method, paper=paper)
+    if ranking != LIKELIHOOD:
         given = {
             "--noise": noise != "generic",
             "--map-age": map_age,
             "--drift-report": drift_report,
         }
         for option in (name for name, value in given.items() if value):
-            msg = f"{option} is for --method likelihood, not for {method!r}; leave it out."
+            msg = f"{option} is for the method likelihood, not for {ranking!r}; leave it out."
             raise InputError(msg)
     import dataclasses
 
@@ -124,8 +128,8 @@ def evaluate(
             city.database,
             read_noise(noise, city.database, map_age=map_age, drift_report=drift_report),
         )
-        if method == LIKELIHOOD
-        else Method.parse(method)
+        if ranking == LIKELIHOOD
+        else Method.parse(ranking)
     )
     with progress("evaluating") as advance:
         evaluation = run(

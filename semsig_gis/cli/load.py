@@ -256,7 +256,7 @@ def _save_loaded(
 
 
 @app.command()
-def suggest(
+def draft(
     file: Annotated[Path, typer.Argument(help="Vector file to draft a catalogue for.")],
     *,
     crs: Annotated[

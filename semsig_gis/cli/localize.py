@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from semsig_gis.cli.console import (
-    LIKELIHOOD,
     MOST_METRES,
     AsJson,
     Database,
     MethodText,
+    Paper,
+    chosen_method,
     keep_inputs,
     numbers,
     print_json,
@@ -28,6 +29,7 @@ from semsig_gis.cli.console import (
 from semsig_gis.cli.maps import draw_ground
 from semsig_gis.cli.options import SearchOptions, command
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
+from semsig_gis.core.method import LIKELIHOOD
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -104,7 +106,13 @@ class QueryOptions:
         str | None,
         typer.Option(help="Day of the view, as 2024-05-31, for magnetic north.  [default: today]"),
     ] = None
-    method: MethodText = "edit+edit"
+    method: MethodText = None
+    paper: Paper = False
+
+    @property
+    def ranking(self) -> str:
+        """The text of the method."""
+        return chosen_method(self.method, paper=self.paper)
 
     def seen_north(self, city: City) -> North:
         """Return what the bearings count from."""
@@ -212,7 +220,7 @@ class LocalizeOptions(SearchOptions, QueryOptions):
                 "--within are for; leave them out, or write a GeoPackage."
             )
             raise InputError(msg)
-        if self.method != LIKELIHOOD:
+        if self.ranking != LIKELIHOOD:
             self._refuse_likelihood()
 
     @property
@@ -231,9 +239,8 @@ class LocalizeOptions(SearchOptions, QueryOptions):
         ]
         if options:
             msg = (
-                f"{' and '.join(options)} {'is' if len(options) == 1 else 'are'} for --method "
-                f"likelihood, not for {self.method!r}; give that method, or leave out what is for "
-                "it."
+                f"{' and '.join(options)} {'is' if len(options) == 1 else 'are'} for the method "
+                f"likelihood, not for {self.ranking!r}; leave out the one or the other."
             )
             raise InputError(msg)
 
@@ -242,15 +249,15 @@ class LocalizeOptions(SearchOptions, QueryOptions):
 def localize(options: LocalizeOptions) -> None:
     """Rank the cells of a database for a query, or for many.
 
-    The options --route, --share and those from --noise to --objects are for --method likelihood.
+    The options --route, --share and those from --noise to --objects are for likelihood alone.
     """
     from semsig_gis.database.city import open_city
 
     method = None
-    if options.method != LIKELIHOOD:
+    if options.ranking != LIKELIHOOD:
         from semsig_gis.matching.method import Method
 
-        method = Method.parse(options.method)
+        method = Method.parse(options.ranking)
     city = open_city(options.database)
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = options.seen_north(city)
@@ -314,7 +321,7 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
         from semsig_gis.maps.page import save_map
 
         with progress("drawing the map"):
-            if options.method == LIKELIHOOD:
+            if options.ranking == LIKELIHOOD:
                 map_ = location_map(answer)
             else:
                 map_ = localization_map(answer, city.database)

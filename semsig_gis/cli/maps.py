@@ -101,10 +101,7 @@ def map_(
     ] = None,
     location: Annotated[
         Path | None,
-        typer.Option(
-            help="Draw an answer: the .tif file that `semsig localize --method likelihood --out` "
-            "wrote."
-        ),
+        typer.Option(help="Draw an answer: the .tif file that `semsig localize --out` wrote."),
     ] = None,
     objects: Annotated[
         Path | None, typer.Option(help="Draw street objects written by `semsig load`.")
@@ -152,7 +149,7 @@ def map_(
     if location is not None and location.suffix.lower() not in {".tif", ".tiff"}:
         msg = (
             f"{location} does not hold the chance of every cell; give the .tif file that semsig "
-            "localize --method likelihood --out wrote."
+            "localize --out wrote."
         )
         raise InputError(msg)
     results = None if evaluation is None else open_evaluation(evaluation)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import platform
+from dataclasses import replace
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +19,12 @@ from semsig_gis import __version__
 from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance, cell_ids, wrap_degrees
+from semsig_gis.core.method import DEFAULT_METHOD
+from semsig_gis.evaluation.methods import make_locator, parse_method
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.matching.method import DEFAULT_METHOD, Method
+from semsig_gis.matching.method import Method
 from semsig_gis.matching.search import DistanceLocator
 from semsig_gis.matching.ties import (
     NEAR_METRES,
@@ -66,7 +69,7 @@ def evaluate(
     database: SignatureDatabase,
     *,
     queries: int = 500,
-    method: Method | LikelihoodIndex = DEFAULT_METHOD,
+    method: str | Method | LikelihoodIndex = DEFAULT_METHOD,
     distortion: str | QueryDistortion | Sequence[QueryDistortion] = "medium",
     top: int = 1,
     seed: int = 0,
@@ -80,9 +83,10 @@ def evaluate(
         What to search.
     queries : int, default 500
         How many cells to draw as queries, without replacement; 1 to the number of cells.
-    method : Method or LikelihoodIndex, optional
-        What ranks the cells: distances, or the likelihood with this index of the database;
-        metric fusion of two edit distances by default.
+    method : str, Method or LikelihoodIndex, default "likelihood"
+        What ranks the cells: distances, or the likelihood with this index of the database; or the
+        text of a method (see `parse_method`), such as ``"edit+edit:5%"``. Queries are from the
+        middles of cells, and so the likelihood takes them.
     distortion : str, distortion or sequence of distortions, default "medium"
         What happens to the signatures: one of the paper's levels, or any of `queries.chain`,
         as text or as values.
@@ -130,7 +134,12 @@ def evaluate(
     spec = QuerySpec(number=queries, seeds=(seed,), distortions=chain)
     used: AnyMethod
     locator: Locator[Answer]
-    if isinstance(method, Method):
+    if isinstance(method, str):
+        used = parse_method(method)
+        if isinstance(used, LikelihoodMethod):
+            used = replace(used, on_grid=True)
+        locator = make_locator(database, used)
+    elif isinstance(method, Method):
         used, locator = method, DistanceLocator(database=database, method=method)
     elif method.database is database:
         used = LikelihoodMethod(noise=method.noise, on_grid=True)

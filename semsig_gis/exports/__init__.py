@@ -276,7 +276,7 @@ def export_answer(
     --------
     >>> import tempfile
     >>> from semsig_gis import localize
-    >>> answer = localize(demo_database, demo_database.signature(0), top=5)
+    >>> answer = localize(demo_database, demo_database.signature(0), method="edit+edit", top=5)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
     5

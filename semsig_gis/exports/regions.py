@@ -40,7 +40,7 @@ class SearchRegions(Displayed):
     Examples
     --------
     >>> from semsig_gis import localize
-    >>> answer = localize(demo_database, demo_database.signature(0), top=5)
+    >>> answer = localize(demo_database, demo_database.signature(0), method="edit+edit", top=5)
     >>> regions = search_regions(answer, demo_database)
     >>> regions.table["cells"].tolist(), regions.to_dict()["regions"]
     ([5], 1)
@@ -103,7 +103,7 @@ def search_regions(
     Examples
     --------
     >>> from semsig_gis import localize
-    >>> answer = localize(demo_database, demo_database.signature(0), top=5)
+    >>> answer = localize(demo_database, demo_database.signature(0), method="edit+edit", top=5)
     >>> search_regions(answer, demo_database).to_dict()["cells"]
     5
     """

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core.method import LIKELIHOOD
 from semsig_gis.core.view import check_north
 from semsig_gis.likelihood.noise.model import NOISES
 
@@ -14,9 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.likelihood.noise.model import Noise
-
-
-LIKELIHOOD = "likelihood"  # what the text of a likelihood method begins with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

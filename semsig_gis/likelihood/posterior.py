@@ -200,7 +200,7 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     if not (chances >= 0).all() or not math.isclose(total, 1.0, abs_tol=ROUNDING):
         msg = (
             f"{path} does not hold the chances of the cells of this database, which add up to 1; "
-            "give a .tif file that semsig localize --method likelihood --out wrote for it."
+            "give a .tif file that semsig localize --out wrote for it."
         )
         raise InputError(msg)
     return Posterior(database=database, chances=chances / total)

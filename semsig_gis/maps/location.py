@@ -460,7 +460,7 @@ def localization_map(
     Examples
     --------
     >>> from semsig_gis import localize
-    >>> localization = localize(demo_database, demo_database.signature(0), top=5)
+    >>> localization = localize(demo_database, demo_database.signature(0), method="edit+edit")
     >>> localization_map(localization, demo_database).options["maxZoom"]
     20
     """

@@ -162,7 +162,7 @@ class Method:
         return "+".join(parts)
 
 
-DEFAULT_METHOD: Method = Method()
+FUSION: Method = Method()
 """Metric fusion of two edit distances in equal shares."""
 
 

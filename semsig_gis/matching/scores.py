@@ -14,7 +14,7 @@ import numpy as np
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.answer import DistanceMemo
 from semsig_gis.database.file import PartitionedDatabase
-from semsig_gis.matching.method import ANGLES, BOTH, DEFAULT_METHOD, TYPES
+from semsig_gis.matching.method import ANGLES, BOTH, FUSION, TYPES
 from semsig_gis.matching.metrics import metric
 from semsig_gis.matching.metrics.edit import EditWeights
 
@@ -45,7 +45,7 @@ _CELLS_AT_ONCE = 1 << 16  # scores of so many cells stay in a near cache
 def score_cells(
     database: SignatureDatabase,
     queries: Sequence[Signature],
-    method: Method = DEFAULT_METHOD,
+    method: Method = FUSION,
     *,
     memo: DistanceMemo | None = None,
 ) -> Iterator[NDArray[np.float32]]:

@@ -26,7 +26,7 @@ from semsig_gis.database.answer import (
 from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
 from semsig_gis.database.north import GRID_NORTH
-from semsig_gis.matching.method import DEFAULT_METHOD
+from semsig_gis.matching.method import FUSION
 from semsig_gis.matching.scores import score_cells, score_parts
 from semsig_gis.matching.ties import top_candidates
 
@@ -66,8 +66,9 @@ class Localization(Answer):
 
     Examples
     --------
-    >>> from semsig_gis import localize
-    >>> localization = localize(demo_database, demo_database.signature(0), top=3)
+    >>> from semsig_gis import Method, localize
+    >>> query = demo_database.signature(0)
+    >>> localization = localize(demo_database, query, method=Method.parse("edit+edit"), top=3)
     >>> len(localization.candidates)
     3
     """
@@ -126,7 +127,7 @@ class DistanceLocator:
     """Measures of distance, and the cells that they rank."""
 
     database: SignatureDatabase | PartitionedDatabase
-    method: Method = DEFAULT_METHOD
+    method: Method = FUSION
     requirement: Requirement | None = None
     top: int = 100
     north: North = GRID_NORTH
@@ -264,55 +265,3 @@ class Shortlist:
         high, tied = np.cumsum(sizes)[place], sizes[place]
         ranks = {"rank_low": high - tied + 1, "rank_high": high, "tied": tied}
         return {**ranks, **self.listed}, int(high[-1]) - len(high)
-
-
-def localize(
-    database: SignatureDatabase | PartitionedDatabase,
-    query: Signature,
-    *,
-    method: Method = DEFAULT_METHOD,
-    requirement: Requirement | None = None,
-    top: int = 100,
-    north: North = GRID_NORTH,
-) -> Localization:
-    """Find the cells whose signature is most like a query.
-
-    Parameters
-    ----------
-    database : SignatureDatabase or PartitionedDatabase
-        The cells. Of a database in parts, one part at a time is in memory.
-    query : Signature
-        What a person or a detector saw, perhaps nothing; types or bearings may be unknown.
-        Objects of a class that no cell sees are left out as false detections, and the answer
-        says so.
-    method : Method
-        How the cells are ranked. A fusion uses the part that the query has.
-    requirement : Requirement, optional
-        What a cell must see to be a candidate; nothing by default.
-    top : int
-        How many cells to list, at least 1.
-    north : North, optional
-        What the bearings of the query count from; grid north by default.
-
-    Returns
-    -------
-    Localization
-        The best cells, with ties told.
-
-    Raises
-    ------
-    InputError
-        If the query has no part that the method compares, or `top` is below 1.
-    EmptyResultError
-        If no cell meets the requirement.
-
-    Examples
-    --------
-    >>> answer = localize(demo_database, demo_database.signature(10), top=3)
-    >>> answer.used, answer.candidates["distance"][0]
-    ('types+angles', np.float64(0.0))
-    """
-    locator = DistanceLocator(
-        database=database, method=method, requirement=requirement, top=top, north=north
-    )
-    return locator.locate(query)

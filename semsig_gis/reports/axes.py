@@ -275,7 +275,8 @@ def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) 
     Examples
     --------
     >>> from semsig_gis import localize
-    >>> plot_answer(localize(demo_database, demo_database.signature(0), top=5)).get_title()
+    >>> answer = localize(demo_database, demo_database.signature(0), method="edit+edit", top=5)
+    >>> plot_answer(answer).get_title()
     'The best 5 of 955 cells'
     """
     if isinstance(answer, Location):

@@ -82,7 +82,7 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
     >>> from semsig_gis import evaluate
     >>> evaluation = evaluate(demo_database, queries=5)
     >>> evaluation_tables(evaluation)[0].rows[0]
-    ('Method', 'edit+edit')
+    ('Method', 'likelihood:generic:on_grid')
     """
     tables = (
         Table("Settings", ("Setting", "Value"), tuple(evaluation_settings(evaluation).items())),

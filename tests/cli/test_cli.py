@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 DATA = Path(__file__).with_name("data")
 X, Y = 770_000.0, 6_280_000.0
 LOAD = "load . --catalog tiny.toml --out o.parquet"
-LIKELIHOOD = "localize city.parquet --method likelihood"
+LIKELIHOOD = "localize city.parquet"
 REFUSALS = [
     row.replace("LOAD", LOAD).replace("LIKELIHOOD", LIKELIHOOD)
     for row in (DATA / "refusals.txt").read_text(encoding="utf-8").splitlines()
@@ -65,13 +65,14 @@ def test_the_road_from_files_to_a_place(done: Done) -> None:
     assert "Nobody (CC0-1.0): lights, crossings" in out
 
     query = "localize c.parquet --types DX --bearings 200,20"
-    answer = json.loads(done(query, "--top", 3, "--json"))
+    answer = json.loads(done(query, "--paper", "--top", 3, "--json"))
+    assert answer["method"] == "edit+edit:5%"
     assert answer["query"]["types"] == "XD"
     assert len(answer["candidates"]) == 3
     best = answer["candidates"][0]
     # The only crossing stands at x = 770010, y = 6280010.
     assert max(abs(best["x"] - 770010), abs(best["y"] - 6280010)) <= 30
-    assert "rank" in done(query, "--map", "query.html")
+    assert "by likelihood (generic noise)" in done(query, "--map", "query.html")
     assert "leaflet" in text("query.html").lower()
 
 
@@ -162,7 +163,7 @@ def test_sources(done: Done) -> None:
         "sources opendata_paris": ("les-arbres",),
         "sources montpellier": ("ETAT = en fonction", "taxi_station"),
         "sources tiny.toml --json": ('"title": "A tiny city"',),
-        "suggest lights.gpkg": ("[[layers]]", 'files = ["lights.gpkg"]'),
+        "draft lights.gpkg": ("[[layers]]", 'files = ["lights.gpkg"]'),
     }.items():
         out = done(line)
         assert all(word in out for word in words), line
@@ -339,7 +340,7 @@ def test_the_console_script_is_installed() -> None:
 
 @pytest.mark.usefixtures("city")
 def test_the_likelihood_is_evaluated_and_drawn(run: Run, done: Done) -> None:
-    line = "evaluate city.parquet --queries 20 --method likelihood --noise light"
+    line = "evaluate city.parquet --queries 20 --noise light"
     summary = json.loads(done(line, "--out", "eval", "--json"))
     assert summary["settings"]["method"] == "likelihood:light:on_grid"
     assert 0 <= summary["results"]["coverage"] <= 1
@@ -494,7 +495,7 @@ def test_a_warning_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", suggest)
     with warnings.catch_warnings(action="always"):
-        assert run("suggest x.gpkg") == (0, "draft", "semsig: the file is old\n")
+        assert run("draft x.gpkg") == (0, "draft", "semsig: the file is old\n")
 
 
 def test_usage_errors_exit_2(run: Run) -> None:
@@ -533,7 +534,7 @@ def test_a_file_without_a_crs_needs_one(city: Path, run: Run, done: Done) -> Non
         ("load . --out o.parquet --catalog", ".toml"),
         ("load --catalog tiny.toml --out o.parquet", ".gpkg"),
         ("experiment --out x", ".toml"),
-        ("suggest", ".csv"),
+        ("draft", ".csv"),
         ("info", ".parquet"),
         ("build --out c.parquet", ".parquet"),
         ("import --out c.parquet", ".gpkg"),
@@ -556,7 +557,7 @@ def test_a_pipe_is_not_waited_for(line: str, suffix: str, city: Path, run: Run) 
         (f"{LIKELIHOOD} --types D --rule", "huge.json", '{"threshold": 1e999}'),
         ("load . --out o.parquet --catalog", "deep.toml", "a = " + "[" * 100_000),
         ("load --catalog tiny.toml --out o.parquet", "crossings.geojson", '{"type": ' * 100_000),
-        ("suggest", "deep.geojson", '{"type": ' * 100_000),
+        ("draft", "deep.geojson", '{"type": ' * 100_000),
         ("experiment --out x", "deep.toml", "a = " + "[" * 100_000),
     ],
 )

@@ -34,7 +34,7 @@ def failing(
             raise error
 
         monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", suggest)
-        return [*run("suggest x.gpkg")]
+        return [*run("draft x.gpkg")]
 
     return call
 

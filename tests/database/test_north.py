@@ -19,10 +19,11 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import Photo, View
 from semsig_gis.database.file import PartitionedDatabase, save_database
 from semsig_gis.database.north import GRID_NORTH, North, declination
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.method import Method
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -74,7 +75,7 @@ def test_a_city_where_north_differs_is_told_of() -> None:
     wide = North.of("true", moved("EPSG:32635", 386_000.0, 6_672_000.0, step=5000.0))
     (note,) = wide.notes
     assert f"true north differs by up to {wide.spread:.1f}" in note
-    assert localize(CITY, CITY.signature(CELL), north=wide).notes == (note,)
+    assert localize(CITY, CITY.signature(CELL), north=wide, method=Method()).notes == (note,)
 
 
 def test_bearings_are_turned_and_told_in_their_north() -> None:
@@ -97,7 +98,7 @@ def test_bearings_are_turned_and_told_in_their_north() -> None:
             for part in (rows, others)
         )
         assert np.allclose(np.sort((here + 12.0) % 360.0), there)
-    ranked = localize(CITY, query, north=north)
+    ranked = localize(CITY, query, north=north, method=Method())
     assert ranked.candidates["cell"][0] == CELL
     assert ranked.candidates["distance"][0] == 0.0
     # A view is turned with all that is known of it.

@@ -45,7 +45,7 @@ FOUR_ALIKE = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
 
 
 def test_hand_computed_rows_curve_and_recall_of_equal_cells() -> None:
-    result = evaluate(FOUR_ALIKE, queries=5, distortion="none")
+    result = evaluate(FOUR_ALIKE, queries=5, method=Method(), distortion="none")
     table = result.queries.set_index("cell").sort_index()
     expected: dict[str, Any] = {
         "error_m": [15, 10, 10, 15, 0],
@@ -69,7 +69,7 @@ def test_hand_computed_rows_curve_and_recall_of_equal_cells() -> None:
     recalls = [result.recall(percent) for percent in (19, 20, 39, 40, 60, 80, 100)]
     assert recalls == pytest.approx([0, 0.4, 0.4, 0.6, 0.8, 1, 1])
     assert result.successful.all()
-    two = evaluate(FOUR_ALIKE, queries=5, distortion="none", top=2)
+    two = evaluate(FOUR_ALIKE, queries=5, method=Method(), distortion="none", top=2)
     # Two of the four tied cells are drawn: (0 x 3 + 10 x 2 + 20) / 6 for a cell at the end.
     errors = two.queries.set_index("cell").sort_index()["error_m"]
     assert errors.to_list() == pytest.approx([40 / 6, 30 / 6, 30 / 6, 40 / 6, 0])
@@ -79,7 +79,8 @@ def test_diagonal_distances_are_exact() -> None:
     # Cells (0, 0) and (3, 4) are alike: 50 m apart, whatever the origin of the grid.
     cells = [("B", [0])] * 25
     cells[0] = cells[19] = ("DDD", [10, 100, 300])
-    result = evaluate(database_of(cells, height=5), queries=25, distortion="none").queries
+    city = database_of(cells, height=5)
+    result = evaluate(city, queries=25, method=Method(), distortion="none").queries
     twins = result[result["types"] == "DDD"]
     assert twins["p40"].to_list() == [0.5, 0.5]
     assert twins["p50"].to_list() == [1, 1]
@@ -145,8 +146,10 @@ def test_columns_tell_the_view() -> None:
 
 
 def test_methods_on_sequences_take_types_and_bearings_alone() -> None:
-    told = evaluate(DATABASE, queries=20, distortion="light, ranges:25, view:100").queries
-    untold = evaluate(DATABASE, queries=20, distortion="light, view:100:told=false").queries
+    told, untold = (
+        evaluate(DATABASE, queries=20, method=Method(), distortion=distortion).queries
+        for distortion in ("light, ranges:25, view:100", "light, view:100:told=false")
+    )
     columns = ["best_cell_id", "distance", "error_m", "rank_low", "rank_high"]
     assert told[columns].equals(untold[columns])
 
@@ -299,7 +302,7 @@ def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
 
 def test_the_queries_are_those_of_the_other_methods() -> None:
     same = ["cell", "query_types", "query_bearings", "query_length", "geometry"]
-    other = evaluate(DATABASE, queries=QUERIES, seed=2)
+    other = evaluate(DATABASE, queries=QUERIES, method="edit+edit", seed=2)
     assert other.queries[same].equals(LIKELY.queries[same])
     assert other.queries[["chance", "right", "in_region"]].isna().all(axis=None)
     assert other.answers() == {}

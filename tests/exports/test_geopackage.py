@@ -45,6 +45,7 @@ from semsig_gis.evaluation.identify.result import Identifiability
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.geopackage import read_geopackage
 from semsig_gis.exports.styles import CLASS_MARKERS, by_class
+from semsig_gis.matching.method import Method
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -68,7 +69,7 @@ DATABASE = build_database(
     OBJECTS, grid=GridSpec(12.5, (3.0, -4.0)), spec=SignatureSpec(25.0, levels=12)
 )
 CHANCES = chances_of(DATABASE)
-EVALUATION = evaluate(DATABASE, queries=60, distortion="strong")
+EVALUATION = evaluate(DATABASE, queries=60, distortion="strong", method=Method())
 
 
 @pytest.fixture(scope="module")

@@ -22,6 +22,7 @@ from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import page_of_map
 from semsig_gis.maps.parts import OUTLINES
+from semsig_gis.matching.method import Method
 
 if TYPE_CHECKING:
     from map_pages import MapPage
@@ -213,7 +214,7 @@ def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
 
 
 def test_wheels_show_what_queries_looked_at(page: MapPage) -> None:
-    seen = evaluate(CITY, queries=3, distortion="view:120, ranges:25")
+    seen = evaluate(CITY, queries=3, distortion="view:120, ranges:25", method=Method())
     longest = int(seen.queries["query_length"].argmax())
     page.open(evaluation_map(seen, CITY))
     page.search(f"Query {longest + 1:,}: ", Keys.ENTER)

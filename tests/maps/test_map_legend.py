@@ -16,6 +16,7 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.update import CellChanges
 from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
@@ -25,7 +26,7 @@ from semsig_gis.maps.drift import drift_legend
 from semsig_gis.maps.evaluation import evaluation_legend
 from semsig_gis.maps.location import localization_legend, location_legend
 from semsig_gis.maps.objects import objects_legend
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.method import Method
 from semsig_gis.objects.changes import ClassChange, ObjectChanges
 from semsig_gis.objects.table import Licence
 from semsig_gis.queries.distortions import MissingClasses
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
 HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}{{7*7}}&\\é\u202eabc"
 CITY, OBJECTS = small_city()
-EVALUATION = evaluate(CITY, queries=40, distortion="errors:3, view:200")
+EVALUATION = evaluate(CITY, queries=40, distortion="errors:3, view:200", method=Method())
 QUERY = Signature.parse("DB", [10, 359.7], taxonomy=CITY.taxonomy)
 TYPES, BEARINGS = Signature(QUERY.codes, None), Signature(None, QUERY.bearings)
 SIZES = np.array([1, 1, 2, 2, 9, 10, 12_345, 12_345])
@@ -58,9 +59,12 @@ CHANGES = ObjectChanges(
 def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[str, str]:
     """Return every legend, with the texts of a city and the name of a noise model and a class."""
     noise = dataclasses.replace(named_noise("light"), name=name)
-    exact = evaluate(city, queries=5, distortion="none", top=3)
+    exact = evaluate(city, queries=5, distortion="none", top=3, method=Method())
     asked = dataclasses.replace(EVALUATION.asked, distortions=(MissingClasses(classes=(name,)),))
-    by_types, by_both = localize(city, TYPES, top=7), localize(city, QUERY, top=7)
+    by_types, by_both = (
+        localize(city, TYPES, top=7, method=Method()),
+        localize(city, QUERY, top=7, method=Method()),
+    )
     index = build_index(city, noise)
     query = city.signature(int(city.lengths.argmax()))
     drift = functools.partial(
@@ -75,7 +79,9 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
         "evaluation_without_distortion": evaluation_legend(exact, radius=1000.0, licenses=()),
         "localization": localization_legend(by_both),
         "localization_by_types": localization_legend(dataclasses.replace(by_types, tied_beyond=1)),
-        "localization_by_bearings": localization_legend(localize(city, BEARINGS, top=7)),
+        "localization_by_bearings": localization_legend(
+            localize(city, BEARINGS, top=7, method=Method())
+        ),
         "location": location_legend(locate(index, query, explained=1)),
         "location_unsure": location_legend(locate(index, query, rule=AnswerRule(threshold=2.0))),
         "identifiability": identifiability_legend(
@@ -100,7 +106,7 @@ def test_what_a_legend_says(name: str, snapshot: Callable[[str, str], None]) -> 
 
 def test_the_numbers_are_those_of_the_results() -> None:
     facts = chances_of(CITY).summary()
-    distances = localize(CITY, QUERY, top=7).candidates["distance"]
+    distances = localize(CITY, QUERY, top=7, method=Method()).candidates["distance"]
     for name, words in (
         ("evaluation", f"P(error ≤ 50 m) {EVALUATION.cdf([50])[0]:.1%}"),
         ("evaluation", f"{int(EVALUATION.successful.sum())} successful"),

@@ -17,12 +17,13 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.core.signs import ANSWERS, CANDIDATE_RAMP, VERDICTS
 from semsig_gis.core.view import Photo, View
 from semsig_gis.database.city import ObjectStore
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.maps.location import SECTOR, localization_map, location_map
 from semsig_gis.maps.parts import OUTLINES
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.method import Method
 
 if TYPE_CHECKING:
     from map_pages import MapPage
@@ -116,7 +117,7 @@ def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
     view = View.of(seen, ranges=np.append(metres[:-1], np.nan), photos=(photo,))
     outside = ~photo.sees(seen.bearings)
     assert 0 < outside.sum() < len(view)
-    page.open(localization_map(localize(CITY, view, top=1), CITY))
+    page.open(localization_map(localize(CITY, view, top=1, method=Method()), CITY))
     assert "Looked at: " in page.text(LEGEND)
     page.ask("shown((one) => one instanceof L.CircleMarker)[0].fire('click')")
     assert page.panel()
@@ -170,7 +171,9 @@ def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
 
 
 def test_a_localization_in_a_browser(page: MapPage) -> None:
-    page.open(localization_map(localize(CITY, CITY.signature(LONGEST), top=50), CITY))
+    page.open(
+        localization_map(localize(CITY, CITY.signature(LONGEST), top=50, method=Method()), CITY)
+    )
     assert page.browser.title == "Candidate places"
     texts = """
     return shown((one) => one instanceof L.CircleMarker).map((one) => content(one));
@@ -200,7 +203,11 @@ def test_signs_on_a_map_of_vectors(page: MapPage) -> None:
 
 def test_what_has_bearings_alone_is_drawn_as_dots(page: MapPage) -> None:
     seen = CITY.signature(LONGEST)
-    page.open(localization_map(localize(CITY, Signature(None, seen.bearings), top=1), CITY))
+    page.open(
+        localization_map(
+            localize(CITY, Signature(None, seen.bearings), top=1, method=Method()), CITY
+        )
+    )
     page.panel_of(CANDIDATE_RAMP[0])
     asked, cell = page.all(".semsig-wheels figure")
     assert len(asked.find_elements(By.CSS_SELECTOR, ".object .north")) == len(seen)

@@ -19,11 +19,12 @@ from worlds import random_town
 
 from semsig_gis.core.signs import class_signs
 from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.maps.location import localization_map
 from semsig_gis.maps.objects import ground_map, objects_map
 from semsig_gis.maps.page import page_of_map
 from semsig_gis.maps.parts import to_latlon
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.method import Method
 from semsig_gis.objects.table import Licence, StreetObjects
 
 if TYPE_CHECKING:
@@ -280,7 +281,7 @@ def test_maps_lie_over_each_other_and_the_ground_below_all(page: MapPage) -> Non
     house = table(shapely.box(x - 50, y - 50, x + 50, y + 50))
     house.attrs["licenses"] = ["Mapper (CC0)"]
     map_ = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
-    localization_map(localize(CITY, CITY.signature(0), top=3), CITY, map_=map_)
+    localization_map(localize(CITY, CITY.signature(0), top=3, method=Method()), CITY, map_=map_)
     for _ in range(2):
         objects_map(OBJECTS, map_=map_)
     ground_map(buildings=house, map_=map_)

@@ -32,6 +32,7 @@ from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import named_noise
@@ -41,7 +42,7 @@ from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import ground_map, objects_map
 from semsig_gis.maps.parts import layers_of, page_element, search_area, to_latlon
-from semsig_gis.matching.search import localize
+from semsig_gis.matching.method import Method
 from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.queries.distortions import MissingClasses
 from semsig_gis.queries.draw import QuerySpec
@@ -61,8 +62,8 @@ CITY, OBJECTS = WORLD.database, WORLD.street_objects
 HOUSE = gpd.GeoDataFrame(geometry=[shapely.box(765_300, 6_275_100, 765_320, 6_275_120)], crs=2154)
 NO_PLACE = gpd.GeoDataFrame(geometry=[None], crs=2154)
 LANE = gpd.GeoDataFrame(geometry=[shapely.LineString([(3.0, 43.0), (3.1, 43.0)])], crs=4326)
-EVALUATION = evaluate(CITY, queries=5)
-LOCALIZATION = localize(CITY, CITY.signature(0), top=5)
+EVALUATION = evaluate(CITY, queries=5, method=Method())
+LOCALIZATION = localize(CITY, CITY.signature(0), top=5, method=Method())
 OTHER_CHANCES = chances_of(CITY.select(slice(1, None)))
 OTHER_CITY = dataclasses.replace(CITY, rows=CITY.rows + 10_000)
 OTHER_SIGHT = dataclasses.replace(CITY, codes=CITY.codes[::-1].copy())
@@ -89,7 +90,9 @@ def maps_of(
     dates: dict[str, Any] = {"objects_before": objects, "objects_after": later}
     return {
         "evaluation": partial(evaluation_map, evaluation, city),
-        "localization": partial(localization_map, localize(city, query, top=5), city),
+        "localization": partial(
+            localization_map, localize(city, query, top=5, method=Method()), city
+        ),
         "location": partial(location_map, location),
         "ambiguity": partial(ambiguity_map, city),
         "identifiability": partial(identifiability_map, chances),

@@ -21,9 +21,10 @@ from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.answer import Requirement
 from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
+from semsig_gis.evaluation.methods import localize
 from semsig_gis.matching.method import Method
 from semsig_gis.matching.scores import score_cells
-from semsig_gis.matching.search import DistanceLocator, localize
+from semsig_gis.matching.search import DistanceLocator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +39,7 @@ TOWN = random_town().database
 @pytest.mark.parametrize("top", [1, 2, 7, 100, 400, 1000])
 def test_candidates_are_the_best_cells_with_their_ranks(top: int) -> None:
     query = CITY.signature(11)
-    found = localize(CITY, query, top=top)
+    found = localize(CITY, query, top=top, method=Method())
     (scores,) = score_cells(CITY, [query])
     ranked = sorted(range(len(CITY)), key=lambda cell: (scores[cell], cell))[:top]
     table = found.candidates
@@ -72,21 +73,23 @@ def test_a_fusion_falls_back_to_what_the_query_has(
     types: str | None, bearings: list[float] | None, text: str, used: str
 ) -> None:
     query, method = asked(types, bearings), Method.parse(text)
-    found = localize(CITY, query, method=method)
+    found = localize(CITY, query, method=method, top=100)
     assert found.used == used
     if used != "types+angles":
-        alone = localize(CITY, query, method=Method.parse(f"{used}:{method.measures[used]}"))
+        alone = localize(
+            CITY, query, method=Method.parse(f"{used}:{method.measures[used]}"), top=100
+        )
         assert found.candidates.equals(alone.candidates)
 
 
 def test_what_cannot_be_searched_is_refused() -> None:
     for top in (0, -1):
         with refused(InputError, f"{top} candidates were asked for; give a whole number from 1"):
-            localize(CITY, asked("D"), top=top)
+            localize(CITY, asked("D"), top=top, method=Method())
 
 
 def test_candidates_as_points_in_the_crs_of_the_database() -> None:
-    found = localize(CITY, asked("DD"), top=5)
+    found = localize(CITY, asked("DD"), top=5, method=Method())
     points = found.to_geodataframe()
     assert points.crs == CITY.crs
     assert points.get_coordinates().equals(found.candidates[["x", "y"]])
@@ -202,7 +205,7 @@ def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.Mon
         return database
 
     monkeypatch.setattr("semsig_gis.database.file.open_database", watched)
-    localize(parted, CITY.signature(3), method=Method(keep=5))
+    localize(parted, CITY.signature(3), method=Method(keep=5), top=100)
     assert len(opened) == 16  # twice in two stages
 
 
@@ -216,9 +219,9 @@ def test_cells_in_parts_are_ranked_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", METHODS)
 def test_a_class_that_no_part_sees_is_a_false_detection(tmp_path: Path, text: str) -> None:
     parted, method = in_parts(CITY, np.arange(len(CITY)) % 3, tmp_path), Method.parse(text)
-    alone = localize(CITY, asked("D", [1.0]), method=method)
+    alone = localize(CITY, asked("D", [1.0]), method=method, top=100)
     for database in (parted, CITY):
-        found = localize(database, asked("MD", [0.5, 1.0]), method=method)
+        found = localize(database, asked("MD", [0.5, 1.0]), method=method, top=100)
         pd.testing.assert_frame_equal(found.candidates, alone.candidates)
         assert len(found.query) == 2
         (note,) = found.notes
@@ -239,14 +242,16 @@ def test_nothing_tells_no_cell_from_another(query: Signature, text: str) -> None
 def test_a_requirement_leaves_cells_out_and_changes_nothing_else(seed: int, text: str) -> None:
     cell = int(np.random.default_rng(seed).integers(len(TOWN)))
     requirement = Requirement.parse(text, TOWN.taxonomy)
-    everything = localize(TOWN, TOWN.signature(cell), top=len(TOWN)).candidates
+    everything = localize(TOWN, TOWN.signature(cell), top=len(TOWN), method=Method()).candidates
     met = requirement.met(TOWN.type_sequences)
     wanted = everything[met[everything["cell"].to_numpy()]]
     if wanted.empty:
         with pytest.raises(EmptyResultError):
-            localize(TOWN, TOWN.signature(cell), requirement=requirement)
+            localize(TOWN, TOWN.signature(cell), requirement=requirement, method=Method(), top=100)
         return
-    found = localize(TOWN, TOWN.signature(cell), requirement=requirement, top=len(TOWN))
+    found = localize(
+        TOWN, TOWN.signature(cell), requirement=requirement, top=len(TOWN), method=Method()
+    )
     assert found.candidates["cell"].tolist() == wanted["cell"].tolist()
     assert found.candidates["distance"].tolist() == wanted["distance"].tolist()
     assert found.cells == int(met.sum())
@@ -259,4 +264,4 @@ def test_an_object_of_unknown_class_may_be_any() -> None:
     best = localize(TOWN, query, method=Method.parse("types:edit"), top=1).candidates
     assert best["distance"].tolist() == [0.0]
     with refused(InputError, "unknown class", "jaccard"):
-        localize(TOWN, query, method=Method.parse("types:jaccard"))
+        localize(TOWN, query, method=Method.parse("types:jaccard"), top=100)

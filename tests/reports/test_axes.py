@@ -15,7 +15,7 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis import build_index, evaluate, identify, localize, locate, named_noise
+from semsig_gis import Method, build_index, evaluate, identify, localize, locate, named_noise
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 from semsig_gis.core.signs import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
 from semsig_gis.maps.page import MapFrame
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 TOWN = random_town()
 CITY, OBJECTS = TOWN.database, TOWN.street_objects
-FOUND, WORSE = (evaluate(CITY, queries=40, distortion=level) for level in ("light", "strong"))
+FOUND, WORSE = (
+    evaluate(CITY, queries=40, method=Method(), distortion=level) for level in ("light", "strong")
+)
 INDEX = build_index(CITY, named_noise("light"))
 
 
@@ -165,7 +167,7 @@ def test_an_answer_by_likelihood_shows_chances_and_the_place(ax: Axes, cell: int
 
 
 def test_an_answer_by_distance_shows_the_candidates(ax: Axes) -> None:
-    localization = localize(CITY, CITY.signature(3), top=7)
+    localization = localize(CITY, CITY.signature(3), top=7, method=Method())
     localization.plot(ax=ax)
     points = np.asarray(ax.collections[0].get_offsets())[::-1]
     assert np.array_equal(points, localization.candidates[["x", "y"]])
@@ -208,7 +210,10 @@ def test_where_queries_failed(ax: Axes) -> None:
 
 @pytest.mark.usefixtures("carried")
 def test_results_are_shown_on_maps() -> None:
-    location, localization = locate(INDEX, CITY.signature(3)), localize(CITY, CITY.signature(3))
+    location, localization = (
+        locate(INDEX, CITY.signature(3)),
+        localize(CITY, CITY.signature(3), method=Method()),
+    )
     told = identify(INDEX, trials=5, class_trials=2)
     for frame, title in (
         (CITY.explore(), "Cells that look the same"),
