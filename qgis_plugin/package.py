@@ -8,19 +8,30 @@ from __future__ import annotations
 import argparse
 import configparser
 import io
+import re
 import subprocess
 import sys
 import tempfile
+import tomllib
 import zipfile
 from pathlib import Path
+from urllib.parse import urlsplit
 
-__all__ = ["build_wheel", "files", "write_zip"]
+__all__ = ["build_wheel", "faults", "files", "metadata", "write_zip"]
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 KINDS = {".html", ".py", ".qm", ".qml", ".svg", ".txt"}
 # The first moment that a zip file can tell, so that the same files make the same bytes.
 MOMENT = (1980, 1, 1, 0, 0, 0)
+# What the official repository of plugins asks of metadata.txt, and how large a zip file it takes.
+REQUIRED = (
+    *("name", "description", "version", "qgisMinimumVersion", "author", "email", "about"),
+    *("tracker", "repository", "homepage"),
+)
+MOST_BYTES = 25_000_000
+# What metadata.txt calls the addresses of the project, by their names in pyproject.toml.
+ADDRESSES = {"Homepage": "homepage", "Issues": "tracker", "Repository": "repository"}
 
 
 def files() -> dict[str, bytes]:
@@ -30,7 +41,61 @@ def files() -> dict[str, bytes]:
     found = {name: path for name, path in found.items() if path.suffix in KINDS}
     found["semsig/LICENSE"] = ROOT / "LICENSE"
     found["semsig/constraints.txt"] = ROOT / "constraints.txt"
-    return {name: path.read_bytes() for name, path in sorted(found.items())}
+    told = {name: path.read_bytes() for name, path in found.items()}
+    told["semsig/metadata.txt"] = metadata().encode()
+    return dict(sorted(told.items()))
+
+
+def metadata() -> str:
+    """Return metadata.txt, with the addresses of the project that pyproject.toml names."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    urls = project.get("urls", {})
+    told = {field: urls[name] for name, field in ADDRESSES.items() if name in urls}
+    told["email"] = next((one["email"] for one in project["authors"] if "email" in one), "none")
+    text = (HERE / "semsig" / "metadata.txt").read_text("utf-8")
+    return text + "".join(f"{name}={value}\n" for name, value in told.items())
+
+
+def faults(plugin: Path) -> list[str]:
+    """Return why the official repository of plugins would refuse a zip file.
+
+    That the addresses can be reached, which it tries, is left out.
+
+    Parameters
+    ----------
+    plugin : Path
+        The zip file.
+
+    Returns
+    -------
+    list of str
+        Sentences; none where it would take it.
+    """
+    found = []
+    if plugin.stat().st_size > MOST_BYTES:
+        found.append(f"It is larger than {MOST_BYTES:,} bytes.")
+    with zipfile.ZipFile(plugin) as archive:
+        names = archive.namelist()
+        told = configparser.ConfigParser()
+        told.read_string(archive.read("semsig/metadata.txt").decode())
+    general = told["general"]
+    missing = [name for name in REQUIRED if not general.get(name) or general[name] == "none"]
+    if missing:
+        found.append(
+            f"metadata.txt has no {', '.join(missing)}; name them in pyproject.toml, the addresses "
+            "as Homepage, Issues and Repository of [project.urls], the e-mail with the authors."
+        )
+    for name in set(ADDRESSES.values()) - set(missing):
+        parts = urlsplit(general[name])
+        if not (parts.scheme and parts.netloc):
+            found.append(f"The {name} {general[name]} is not an address.")
+    if "semsig/LICENSE" not in names:
+        found.append("It has no LICENSE.")
+    unwanted = re.compile(
+        r"\.\.|^/|\.pyc|__pycache__|__MACOSX|/\.|\.(exe|dll|so|dylib|bat|sh|cmd)$"
+    )
+    found += [f"It holds {name}." for name in names if unwanted.search(name)]
+    return found
 
 
 def build_wheel(folder: Path) -> Path:
@@ -74,9 +139,9 @@ def write_zip(folder: Path, wheel: Path | None = None) -> Path:
         with zipfile.ZipFile(wheel) as archive:
             held = {name: archive.read(name) for name in archive.namelist()}
         packed[f"semsig/{wheel.name}"] = _archive(held)
-    metadata = configparser.ConfigParser()
-    metadata.read(HERE / "semsig" / "metadata.txt", encoding="utf-8")
-    target = folder / f"semsig-qgis-{metadata['general']['version']}.zip"
+    told = configparser.ConfigParser()
+    told.read_string(metadata())
+    target = folder / f"semsig-qgis-{told['general']['version']}.zip"
     folder.mkdir(parents=True, exist_ok=True)
     target.write_bytes(_archive(packed))
     return target
@@ -102,4 +167,7 @@ if __name__ == "__main__":
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         engine = None if given.without_engine else build_wheel(Path(place))
-        print(write_zip(given.folder, engine))
+        plugin = write_zip(given.folder, engine)
+    print(plugin)
+    for fault in faults(plugin):
+        print(f"The official repository would refuse it: {fault}", file=sys.stderr)

@@ -14,7 +14,7 @@ import queue
 import re
 import shutil
 import signal
-import subprocess  # nosec B404 - the command is a process of its own
+import subprocess  # nosec B404
 import sys
 import threading
 from pathlib import Path

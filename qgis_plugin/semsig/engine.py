@@ -93,10 +93,10 @@ class Engine:
     def _state(self) -> dict[str, str]:
         try:
             state: dict[str, str] = json.loads((self.root / STATE).read_text("utf-8"))
-            folder, _version = state["folder"], state["version"]
+            folder, version = state["folder"], state["version"]
         except (OSError, ValueError, KeyError, TypeError):
             return {}
-        return state if folder in FOLDERS else {}
+        return {"folder": folder, "version": str(version)} if folder in FOLDERS else {}
 
     @property
     def command(self) -> str:
@@ -256,7 +256,7 @@ class _Packages:
         stripped = line.strip()
         named = FOUND.match(stripped)
         if stripped.startswith(INSTALLING):
-            self.wanted = len(stripped[len(INSTALLING) :].split(", "))
+            self.wanted = len(stripped.removeprefix(INSTALLING).split(", "))
         elif named is not None:
             self.found += 1
             share = min(1.0, self.found / USUAL)

@@ -6,6 +6,7 @@ import ast
 import configparser
 import json
 import os
+import re
 import runpy
 import shutil
 import subprocess
@@ -66,6 +67,47 @@ def test_the_zip_file_is_always_the_same_and_holds_what_a_plugin_needs(
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         code = {name for name in names if name.endswith(".py")}
     assert code == {f"semsig/{path.name}" for path in PLUGIN.glob("*.py")}
+
+
+def test_the_official_repository_would_take_it(
+    package: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project = (ROOT / "pyproject.toml").read_text("utf-8")
+    (fault,) = package.faults(package.write_zip(tmp_path))
+    assert fault.startswith("metadata.txt has no email, tracker, repository, homepage;")
+    named = project.replace(
+        "[project.scripts]",
+        '[project.urls]\nHomepage = "https://a.org"\nIssues = "https://a.org/issues"\n'
+        'Repository = "https://a.org/git"\n[project.scripts]',
+    ).replace('name = "semsig_gis authors" }', 'name = "semsig_gis authors", email = "a@a.org" }')
+    (tmp_path / "pyproject.toml").write_text(named)
+    for name in ("LICENSE", "constraints.txt"):
+        shutil.copy(ROOT / name, tmp_path)
+    monkeypatch.setitem(package.metadata.__globals__, "ROOT", tmp_path)
+    assert package.faults(package.write_zip(tmp_path)) == []
+
+
+QT = re.compile(r"^(Q[A-Z]\w*|Qt)$")
+
+
+def test_the_code_fits_the_qt_of_qgis_3_and_of_4() -> None:
+    for path in PLUGIN.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom | ast.Import):
+                told = ast.unparse(node)
+                assert "PyQt" not in told.replace("qgis.PyQt", ""), f"{path.name}: {told}"
+                # Qt 6 has them in another module than Qt 5.
+                assert not re.search(r"\b(QAction|QActionGroup|QShortcut)\b", told), path.name
+                assert "QVariant" not in told, path.name
+            # Qt 6 knows the members of an enumeration by its name alone: Qt.Key.Key_A.
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                member = node.attr[:1].isupper() and QT.match(node.value.id)
+                told = f"{node.value.id}.{node.attr}"
+                text = path.read_text(encoding="utf-8")
+                assert not member or re.search(rf"{told}(\.\w|\n|$|\))", text), (
+                    f"{path.name}: {told}"
+                )
+                assert ".exec_(" not in text, path.name
 
 
 def test_the_metadata_is_that_of_the_package() -> None:
