@@ -12,10 +12,11 @@ import re
 import subprocess
 import sys
 import tempfile
-import tomllib
 import zipfile
 from pathlib import Path
 from urllib.parse import urlsplit
+
+import tomllib
 
 __all__ = ["build_wheel", "faults", "files", "metadata", "write_zip"]
 

@@ -129,6 +129,9 @@ class _Api:
     async def suggest(self, request: Request) -> Response:
         return await self._told(functools.partial(self.bench.suggest, await _json(request)))
 
+    async def cell(self, request: Request) -> Response:
+        return await self._told(functools.partial(self.bench.cell, await _json(request)))
+
     async def simulate(self, request: Request) -> Response:
         return await self._told(functools.partial(self.bench.simulate, await _json(request)))
 
@@ -192,7 +195,7 @@ async def _failed(request: Request, error: Exception) -> Response:
 def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     """Return the application that serves the page of a workbench."""
     api = _Api(bench)
-    asked = (api.photo, api.boxes, api.answer, api.suggest, api.simulate, api.export)
+    asked = (api.photo, api.boxes, api.answer, api.suggest, api.cell, api.simulate, api.export)
     routes = [
         Route("/", api.page),
         Route("/api/city", api.city),

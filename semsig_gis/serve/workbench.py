@@ -26,7 +26,15 @@ from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
-from semsig_gis.maps.parts import MAX_ZOOM, OUTLINES, corners_of, data_url, panel_signs, to_metres
+from semsig_gis.maps.parts import (
+    MAX_ZOOM,
+    OUTLINES,
+    corners_of,
+    data_url,
+    exact_latlon,
+    panel_signs,
+    to_metres,
+)
 from semsig_gis.queries.chain import ready_chain
 from semsig_gis.queries.detections.exif import picture_shot
 from semsig_gis.queries.detections.formats import read_pictures
@@ -353,15 +361,35 @@ class Workbench:
             )
         return sorted(found, key=lambda one: -one["gain"])
 
-    def simulate(self, told: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what would be seen from a place, and spoiled as a noise model says, as a view."""
+    def cell(self, told: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what is seen from the middle of the cell at a place, and how many see alike."""
         database = self.database
+        _, _, cell = self._there(told)
+        sight, types = Sight.of_cell(database, cell), database.type_sequences
+        alike = int((types.inverse == types.inverse[cell]).sum()) - 1
+        return {
+            "cell": int(database.cell_ids[cell]),
+            "place": exact_latlon(database.xy[cell : cell + 1], database.crs)[0],
+            "types": database.types(cell),
+            "view": {"compass": self._compass(sight), "heading_error": None, "step": None},
+            "distances": np.round(sight.distances, 1).tolist(),
+            "alike": alike,
+        }
+
+    def _there(self, told: Mapping[str, Any]) -> tuple[list[float], NDArray[np.float64], int]:
+        """Return a place in degrees and in metres, and its cell."""
         lat, lon = degrees(told.get("place"))
-        place = to_metres((lat, lon), database.crs)
-        cell = int(database.cells_at(place)[0])
+        place = to_metres((lat, lon), self.database.crs)
+        cell = int(self.database.cells_at(place)[0])
         if cell < 0:
             msg = "no cell of the city is there; choose a place in one that is shaded."
             raise InputError(msg)
+        return [lat, lon], place, cell
+
+    def simulate(self, told: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what would be seen from a place, and spoiled as a noise model says, as a view."""
+        database = self.database
+        latlon, place, cell = self._there(told)
         sight = self._sight(place, cell)
         look: dict[str, Any] = {"sectors": None}
         if (fov := told.get("fov")) is not None:
@@ -389,7 +417,7 @@ class Workbench:
             },
             "cell": int(database.cell_ids[cell]),
             "objects": len(sight),
-            "truth": {"place": [lat, lon]},
+            "truth": {"place": latlon},
         }
 
     def _compass(self, seen: Sight) -> list[dict[str, Any]]:

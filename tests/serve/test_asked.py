@@ -366,6 +366,23 @@ def test_what_to_look_for_next_is_a_question(page: Page) -> None:
     assert len(by_name) == len(page.bench.database.present_codes)
 
 
+def test_a_cell_tells_what_is_seen_from_its_middle(page: Page) -> None:
+    database, cell = page.bench.database, longest(page.bench)
+    place = latlon(page.bench, cell)
+    told = page.ask("/api/cell", {"place": place})
+    assert told["cell"] == database.cell_ids[cell]
+    assert told["place"] == pytest.approx(place)
+    assert told["types"] == database.types(cell)
+    seen = database.select(slice(cell, cell + 1))
+    bearings = [mark["bearing"] for mark in told["view"]["compass"]]
+    assert bearings == pytest.approx(seen.bearings, abs=0.01)
+    assert told["distances"] == pytest.approx(seen.distances, abs=0.06)
+    types = [database.types(one) for one in range(len(database))]
+    assert told["alike"] == types.count(told["types"]) - 1
+    code, text = page.refused("/api/cell", {"place": [0.0, 0.0]})
+    assert (code, "no cell" in text) == (422, True), text
+
+
 @pytest.mark.parametrize("fov", [None, 120.0])
 def test_a_view_is_simulated_and_found(page: Page, fov: float | None) -> None:
     cell = longest(page.bench)
