@@ -106,7 +106,7 @@ def load(
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
     from semsig_gis.objects.unread import passed_by, read_small
-    from semsig_gis.sources.area import clip_layers
+    from semsig_gis.sources.area import BOX, clip_layers, parse_area
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
     keep_inputs(out, buildings, streets, read=[*files, *names, clip])
@@ -121,7 +121,12 @@ def load(
     others = passed_by(catalog, specs)
     with progress("reading") as advance:
         found, absent = read_files(
-            [*specs, *others], files, filters=filters, crs=crs, progress=advance
+            [*specs, *others],
+            files,
+            filters=filters,
+            crs=crs,
+            area=None if clip in {None, BOX} else parse_area(clip),
+            progress=advance,
         )
         found += read_small(catalog, [*specs, *others], files, filters=filters, crs=crs)
     notes = [
@@ -180,7 +185,7 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """Download the street objects of an area."""
-    from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
+    from semsig_gis.objects.fetch import TILED, fetch_layers, find_area, open_cache
     from semsig_gis.objects.load import assemble, choose_layers
     from semsig_gis.sources.catalog import load_catalog
 
@@ -194,7 +199,7 @@ def fetch(
         surroundings=bool(buildings or streets),
     )
     kept, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
-    unit: Literal["steps", "bytes"] = "steps" if catalog.reader == "osm_file" else "bytes"
+    unit: Literal["steps", "bytes"] = "steps" if catalog.reader in TILED else "bytes"
     with progress("fetching", unit=unit) as advance:
         place = find_area(area, catalog, cache=kept, http=http)
         layers = fetch_layers(

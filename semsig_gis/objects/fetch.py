@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.sources import overture
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
@@ -15,11 +16,15 @@ from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.osm.overpass import find_place
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import Catalog, LayerSpec
+
+# Readers whose service sends an area in parts, each a file.
+TILED: Mapping[str, ModuleType] = {"osm_file": overpass, "overture": overture}
 
 
 def fetch_layers(
@@ -73,17 +78,18 @@ def fetch_layers(
     semsig_gis.core.errors.InputError: catalogue 'montpellier' has no service to fetch from; use
     `semsig load` on files.
     """
-    if not catalog.endpoints or catalog.reader not in {"opendatasoft", "osm_file"}:
+    if not catalog.endpoints or catalog.reader not in {"opendatasoft", *TILED}:
         msg = (
             f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
         )
         raise InputError(msg)
     layers: list[RawLayer] = []
-    if catalog.reader == "osm_file":
-        tiles = overpass.fetch_layers(
+    service = TILED.get(catalog.reader)
+    if service is not None:
+        tiles = service.fetch_layers(
             specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
         )
-        for layer in overpass.read_layers(tiles, specs, filters=filters):
+        for layer in service.read_layers(tiles, specs, filters=filters):
             layers.append(clip_layer(layer, area))
             tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows")
         return tuple(layers)

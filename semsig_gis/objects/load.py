@@ -27,7 +27,7 @@ from semsig_gis.objects.conflate import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
-from semsig_gis.sources import MERGING, find_files, reader
+from semsig_gis.sources import MERGING, PRUNING, find_files, reader
 from semsig_gis.sources.area import note_outside
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.sources import RawLayer, RowCounts
+    from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import Catalog, LayerSpec, Role
 
 
@@ -391,6 +392,7 @@ def read_files(
     *,
     filters: bool = True,
     crs: str | None = None,
+    area: Area | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
     """Read layers from local files, each file once, and extracts of OpenStreetMap as one.
@@ -406,6 +408,8 @@ def read_files(
         Whether the filters of the layers apply.
     crs : str, optional
         CRS of files that state none.
+    area : Area, optional
+        What is wanted: of large files, what lies elsewhere need not be read (see `clip_layers`).
     progress : callable, optional
         Takes the number of files done and in all.
 
@@ -437,7 +441,8 @@ def read_files(
     layers: list[RawLayer] = []
     for done, ((name, (first, *more)), layers_of_files) in enumerate(by_files.items(), start=1):
         path = (first, *more) if more else first
-        layers.extend(reader(name)(path, layers_of_files, filters=filters, crs=crs))
+        within = {"area": area} if name in PRUNING else {}
+        layers.extend(reader(name)(path, layers_of_files, filters=filters, crs=crs, **within))
         if progress is not None:
             progress(done, len(by_files))
     order = {spec.name: number for number, spec in enumerate(specs)}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import SemsigError
 from semsig_gis.objects.load import read_files
-from semsig_gis.sources import find_files
+from semsig_gis.sources import MERGING, find_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -23,13 +23,11 @@ SMALL_BYTES = 2**21
 def passed_by(catalog: Catalog, specs: Sequence[LayerSpec]) -> tuple[LayerSpec, ...]:
     """Return the other layers that a reading of `specs` passes by anyway.
 
-    These are those of the same extracts of OpenStreetMap, of which every element is looked at.
+    These are those of the same extracts of a map, of which every element is looked at.
     """
-    files = {spec.files for spec in specs if spec.reader == "osm_file"}
+    files = {spec.files for spec in specs if spec.reader in MERGING}
     return tuple(
-        spec
-        for spec in _others(catalog, specs)
-        if spec.reader == "osm_file" and spec.files in files
+        spec for spec in _others(catalog, specs) if spec.reader in MERGING and spec.files in files
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 from dataclasses import astuple, dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -25,11 +26,14 @@ READERS = {
     "opendatasoft": "opendatasoft.reader",
     "osm_file": "osm.file",
     "overpass": "osm.overpass",
+    "overture": "overture",
     "vector_file": "vector",
 }
 
-# Those of them that take several files at once, which are extracts of one map.
-MERGING = frozenset({"osm_file"})
+# Those of them that take several files at once, which are extracts of one map, and those that need
+# not read what is outside an `area`.
+MERGING = frozenset({"osm_file", "overture"})
+PRUNING = frozenset({"overture"})
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
@@ -119,7 +123,7 @@ class RawLayer(Displayed):
 class Reader(Protocol):
     """What a reader is: a function that reads layers from one file in one pass.
 
-    Those of `MERGING` take several files, too.
+    Those of `MERGING` take several files, too, and those of `PRUNING` an `area`.
     """
 
     def __call__(
@@ -129,6 +133,7 @@ class Reader(Protocol):
         *,
         filters: bool = True,
         crs: str | None = None,
+        **within: Area | None,
     ) -> tuple[RawLayer, ...]:
         """Return one layer for each of `specs`; `crs` is for a file that states none."""
 
@@ -167,9 +172,10 @@ def find_files(
     specs : iterable of LayerSpec
         Layers to look for, by the file-name patterns in ``files`` (in upper or lower case).
     paths : iterable of str or Path
-        Files, and folders to look in (not in the folders below them). A file given by itself goes
-        before one found in a folder. Of a folder's files, a layer takes those that match the
-        first of its patterns that any matches; of OpenStreetMap's, all that match.
+        Files, and folders to look in, not in the folders below them but for partitions such as
+        ``theme=base``. A file given by itself goes before one found in a folder. Of a folder's
+        files, a layer takes those that match the first of its patterns that any matches; of
+        extracts of a map, all that match.
 
     Returns
     -------
@@ -191,7 +197,7 @@ def find_files(
     in_folders: list[Path] = []
     for path in dict.fromkeys(Path(item) for item in paths):
         if path.is_dir():
-            inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in FILE_SUFFIXES]
+            inside = [p for p in _files_in(path) if p.suffix.lower() in FILE_SUFFIXES]
             _require_match(path, inside, specs)
             in_folders.extend(inside)
         elif path.is_file():
@@ -216,6 +222,12 @@ def find_files(
         if not candidates:
             missing.append(spec)
     return tuple(pairs), tuple(missing)
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """Return what is in a folder, and in the partitions of a dataset that it is, sorted."""
+    parts = (_files_in(p) if "=" in p.name and p.is_dir() else [p] for p in folder.iterdir())
+    return sorted(itertools.chain.from_iterable(parts))
 
 
 def _matches(path: Path, patterns: Iterable[str]) -> bool:
