@@ -153,7 +153,7 @@ from .exports.geopackage import (
     GeopackageContents as GeopackageContents,
     read_geopackage as read_geopackage,
 )
-from .exports.files import export_geotiff as export_geotiff
+from .exports.rasters import export_geotiff as export_geotiff
 from .exports.regions import SearchRegions as SearchRegions, search_regions as search_regions
 from .reports.axes import (
     plot_answer as plot_answer,

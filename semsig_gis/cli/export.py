@@ -29,7 +29,8 @@ def export(
         Path,
         typer.Option(
             help="File to write: a GeoPackage of all layers, for QGIS (.gpkg), one layer as "
-            "GeoParquet (.parquet) or CSV (.csv), or numbers of places as a Cloud-Optimised "
+            "GeoParquet (.parquet), FlatGeobuf (.fgb), GeoJSON (.geojson) or CSV (.csv), the cells "
+            "by zoom for maps of the web (.pmtiles), or numbers of places as a Cloud-Optimised "
             "GeoTIFF (.tif)."
         ),
     ],
@@ -41,13 +42,23 @@ def export(
     layer: Annotated[
         list[str] | None,
         typer.Option(
-            help="What the file holds: cells, objects, evaluation or evaluation_lines, by default "
-            "the first, in a GeoPackage all that there are (give the option once for each); in a "
-            "GeoTIFF ambiguity (the default), identifiability, error, or field: which share of the "
-            "queries around fails."
+            help="What the file holds: cells, objects, evaluation, evaluation_lines or hexagons, "
+            "by default the first, in a GeoPackage all that there are (give the option once for "
+            "each); in a GeoTIFF ambiguity (the default), identifiability, error, or field: which "
+            "share of the queries around fails."
         ),
     ] = None,
     smooth: Smooth = None,
+    h3: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=15,
+            help="Add up the cells, objects and queries in hexagons of H3 of a resolution, such as "
+            "9; the file then holds these.",
+            show_default=False,
+        ),
+    ] = None,
     geometry: Annotated[
         Literal["polygon", "point"] | None,
         typer.Option(
@@ -78,6 +89,7 @@ def export(
             identifiability=known_identifiability(city),
             geometry=geometry,
             smooth=smooth,
+            h3=h3,
             progress=advance,
         )
     say(f"exported: {out}")

@@ -1,8 +1,9 @@
 """Files for other programs, by their suffix.
 
-``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet`` and ``.csv``
-(`exports.files`) hold one; ``.tif`` (`exports.files`) holds one number a cell; ``.geojson`` and
-``.kml`` (`exports.files`) hold an answer in degrees.
+``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``, ``.fgb``,
+``.geojson`` and ``.csv`` (`exports.files`) hold one; ``.pmtiles`` (`exports.tiles`) holds the cells
+by zoom, and ``.tif`` (`exports.rasters`) one number a cell. An answer goes into the same files, and
+whole into ``.geojson`` and ``.kml`` (`exports.answers`).
 """
 
 from __future__ import annotations
@@ -17,18 +18,15 @@ from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.database import require_same_place
 from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import geopackage
-from semsig_gis.exports.files import (
-    cell_errors,
-    export_field,
-    export_geotiff,
-    write_csv,
-    write_degrees,
-    write_geoparquet,
-)
+from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
+from semsig_gis.exports.files import write_csv, write_flatgeobuf, write_geojson, write_geoparquet
 from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
+from semsig_gis.exports.rasters import cell_errors, export_field, export_geotiff
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
@@ -41,21 +39,42 @@ if TYPE_CHECKING:
 
     Progress = Callable[[int, int], None]
 
-LAYERS = ("cells", "objects", "evaluation", "evaluation_lines")
+LAYERS = ("cells", "objects", "evaluation", "evaluation_lines", "hexagons")
 """What may be written of a database as layers."""
 
 RASTERS = ("ambiguity", "identifiability", "error", "field")
 """What may be written of a database as a raster."""
 
-_ONE_LAYER: Mapping[str, Callable[..., None]] = {".parquet": write_geoparquet, ".csv": write_csv}
+_MANY_LAYERS = {".gpkg": geopackage.write_layers}
+_ONE_LAYER: Mapping[str, Callable[..., None]] = {
+    ".parquet": write_geoparquet,
+    ".fgb": write_flatgeobuf,
+    ".geojson": write_geojson,
+    ".csv": write_csv,
+}
 _RASTER = frozenset({".tif", ".tiff"})
-_DEGREES = frozenset({".geojson", ".kml"})
+_TILES = ".pmtiles"
+# What a file may hold of a database, the first by default.
+_CONTENT: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys((*_MANY_LAYERS, *_ONE_LAYER), LAYERS),
+    _TILES: ("cells",),
+    **dict.fromkeys(sorted(_RASTER), RASTERS),
+}
+# All layers of an answer, in one file.
+_ANSWER: Mapping[str, Callable[..., None]] = {
+    **_MANY_LAYERS,
+    ".geojson": write_answer_geojson,
+    ".kml": write_answer_kml,
+}
 # What a layer or a raster is made from, beside the cells.
 _NEEDS = {
     "objects": "objects",
     **dict.fromkeys(("evaluation", "evaluation_lines", "error", "field"), "evaluation"),
     "identifiability": "identifiability",
+    "hexagons": "resolution",
 }
+# What is told in a layer where it is given.
+_USES = {"cells": {"geometry"}, "field": {"smoothing"}, "hexagons": {"objects", "evaluation"}}
 
 
 def export_database(
@@ -68,6 +87,7 @@ def export_database(
     evaluation: Evaluation | None = None,
     geometry: CellGeometry | None = None,
     smooth: float | None = None,
+    h3: int | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write a database, and what else there is of the city, in the format of the file's suffix.
@@ -77,10 +97,12 @@ def export_database(
     database : SignatureDatabase
         The cells.
     path : str or Path
-        File to write: ``.gpkg``, ``.parquet``, ``.csv`` or ``.tif``; it appears whole, by rename.
+        File to write: ``.gpkg``, ``.parquet``, ``.fgb``, ``.geojson``, ``.csv``, ``.pmtiles`` or
+        ``.tif``; it appears whole, by rename.
     layers : str or sequence of str, optional
-        What the file holds: some of `LAYERS` in a GeoPackage, by default all that is given; one of
-        `LAYERS` in GeoParquet and CSV, one of `RASTERS` in a GeoTIFF, by default the first.
+        What the file holds: some of `LAYERS` in a GeoPackage, by default all that is given; the
+        cells in PMTiles; one of `RASTERS` in a GeoTIFF; one of `LAYERS` in the others, by default
+        the hexagons if `h3` is given, else the first.
     objects : StreetObjects, optional
         The objects that the cells see.
     identifiability : Identifiability, optional
@@ -92,6 +114,8 @@ def export_database(
     smooth : float, optional
         How far away a query counts in the raster ``field``, in metres (see
         `evaluation.field.error_field`).
+    h3 : int, optional
+        Resolution of the layer ``hexagons``, from 0 to 15 (the finest; 9 is a block of houses).
     progress : callable, optional
         Called with the number of rows written and in all.
 
@@ -124,9 +148,20 @@ def export_database(
     ``outcome``: ``successful`` (the best place is within 50 m with a probability of 0.5 or more)
     or ``failed``.
 
+    Layer ``hexagons``, those of H3 that hold a cell, an object or a query: ``h3`` (index),
+    ``cells`` (their number), ``mean_length`` (objects seen from the mean cell), ``ambiguous``
+    (share of the cells that look like another one, by types), ``type_group_size`` (median), and,
+    where given, ``chance_found`` (mean), ``objects`` and ``queries`` (their numbers) and ``found``
+    (share of the queries that are ``successful``).
+
+    PMTiles hold the layer ``cells`` from the zoom at which a cell is four pixels wide, and farther
+    out the layer ``squares`` with the same columns as ``hexagons``, but for the index, the objects
+    and the queries. GeoJSON has longitude and latitude (WGS 84). The specs and the licences are in
+    the metadata of every format but CSV.
+
     Raster ``field``: what became of the queries around every place, in three bands: ``failed`` (the
     share that failed), ``error`` (their mean error in metres) and ``queries`` (how many speak). A
-    file beside it that ends in ``.qml`` has QGIS draw it as on the map.
+    file beside a raster that ends in ``.qml`` has QGIS draw it as on the maps.
 
     Examples
     --------
@@ -140,13 +175,14 @@ def export_database(
     True
     ['cells', 'objects', 'layer_styles']
     """
-    suffix = _suffix(path)
+    suffix = _suffix(path, _CONTENT)
     options = {
         "objects": objects,
         "identifiability": identifiability,
         "evaluation": evaluation,
         "geometry": geometry,
         "smoothing": smooth,
+        "resolution": h3,
     }
     names = _content(
         path,
@@ -159,12 +195,13 @@ def export_database(
         export_field(error_field(evaluation, database, radius=smooth), database, path)
         return
     if suffix in _RASTER:
-        values, unit = database.type_group_sizes.astype(np.float64), "cells"
-        if names == ["error"] and evaluation is not None:
-            values, unit = cell_errors(evaluation, database), "m"
-        elif names == ["identifiability"] and identifiability is not None:
-            values, unit = identifiability.found, ""
+        values, unit = _numbers(names[0], database, identifiability, evaluation)
         export_geotiff(database, values, path, name=names[0], unit=unit)
+        return
+    if suffix == _TILES:
+        from semsig_gis.exports.tiles import write_pmtiles  # noqa: PLC0415 - where it is used
+
+        write_pmtiles(database, path, identifiability=identifiability, progress=progress)
         return
     by_name: dict[str, Layer] = {}
     if "cells" in names:
@@ -174,10 +211,31 @@ def export_database(
         by_name["objects"] = objects_layer(objects)
     if evaluation is not None:
         by_name |= {one.name: one for one in evaluation_layers(evaluation, database.licenses)}
-    if suffix == ".gpkg":
-        geopackage.write_layers([by_name[name] for name in names], path, progress=progress)
+    if h3 is not None:
+        from semsig_gis.exports.areas import hexagons_layer  # noqa: PLC0415 - where it is used
+
+        by_name["hexagons"] = hexagons_layer(
+            database, h3, objects=objects, identifiability=identifiability, evaluation=evaluation
+        )
+    written = [by_name[name] for name in names]
+    if suffix in _MANY_LAYERS:
+        _MANY_LAYERS[suffix](written, path, progress=progress)
     else:
-        _ONE_LAYER[suffix](by_name[names[0]], path, progress=progress)
+        _ONE_LAYER[suffix](written[0], path, progress=progress)
+
+
+def _numbers(
+    name: str,
+    database: SignatureDatabase,
+    identifiability: Identifiability | None,
+    evaluation: Evaluation | None,
+) -> tuple[NDArray[np.float64], str]:
+    """Return the numbers of the cells in a raster, and their unit."""
+    if name == "error" and evaluation is not None:
+        return cell_errors(evaluation, database), "m"
+    if name == "identifiability" and identifiability is not None:
+        return identifiability.found, ""
+    return database.type_group_sizes.astype(np.float64), "cells"
 
 
 def _require_one_city(
@@ -205,13 +263,13 @@ def _require_one_city(
 
 def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[str]) -> list[str]:
     """Return what a file holds, and refuse what lacks its data, or data that it would not hold."""
-    accepted = RASTERS if suffix in _RASTER else LAYERS
+    accepted = _CONTENT[suffix]
     for name in names:
         if name not in accepted:
             hint = nearest_name(name, accepted)
             msg = f"{path} cannot hold {name!r}; give one of {', '.join(accepted)}{hint}."
             raise UnknownNameError(msg)
-    many = suffix == ".gpkg"
+    many = suffix in _MANY_LAYERS
     if len(names) > 1 and not many:
         msg = (
             f"{path} holds one layer, but {' and '.join(names)} were asked for; name one of them, "
@@ -219,15 +277,17 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
         )
         raise InputError(msg)
     possible = [name for name in accepted if _NEEDS.get(name) in {None, *given}]
-    content = list(dict.fromkeys(names)) or (possible if many else [accepted[0]])
+    # Who gives the resolution of hexagons wants them.
+    default = [name for name in accepted if _NEEDS.get(name) == "resolution" and name in possible]
+    content = list(dict.fromkeys(names)) or (possible if many else [*default, accepted[0]][:1])
     for name in content:
         if name not in possible:
             msg = f"{path} is to hold the {name}, but there is no {_NEEDS[name]}; give that too."
             raise InputError(msg)
     # Identifiability is part of a database, wherever it is not asked for.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
-    used |= {"geometry"} if "cells" in content else set()
-    used |= {"smoothing"} if "field" in content else set()
+    used.update(*(_USES.get(name, ()) for name in content))
+    used -= {"geometry"} if suffix == _TILES else set()
     unused = sorted(given - used)
     if unused:
         msg = (
@@ -255,9 +315,10 @@ def export_answer(
     database : SignatureDatabase
         The database that was searched.
     path : str or Path
-        File to write: ``.gpkg`` holds the regions to search and the candidates, as do ``.geojson``
-        and ``.kml`` in degrees (WGS 84); ``.parquet`` and ``.csv`` hold the regions, ``.tif`` the
-        chance of every cell, of the likelihood method only.
+        File to write: ``.gpkg`` holds the regions to search, the candidates and, of the likelihood
+        method, the place, as do ``.geojson`` and ``.kml`` in degrees (WGS 84); ``.parquet``,
+        ``.fgb`` and ``.csv`` hold the regions, ``.tif`` the chance of every cell, of the likelihood
+        method only.
     share, within : float, optional
         Which cells the regions hold (see `exports.regions.search_regions`).
 
@@ -281,7 +342,7 @@ def export_answer(
     ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
     5
     """
-    suffix = _suffix(path, *sorted(_DEGREES))
+    suffix = _suffix(path, {**_ONE_LAYER, **_ANSWER, **dict.fromkeys(sorted(_RASTER))})
     if suffix in _RASTER and answer.chances is None:
         msg = (
             f"{path} is to hold the chance of every cell, which the method does not tell; use the "
@@ -295,20 +356,22 @@ def export_answer(
         facts = answer.to_dict()
         facts = {name: facts[name] for name in ("query", "north", "prior", "notes")}
         export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
-    elif suffix == ".gpkg":
-        geopackage.write_layers(answer_layers(answer, regions), path)
-    elif suffix in _DEGREES:
-        write_degrees({"region": regions.table, "candidate": answer.to_geodataframe()}, path)
+    elif suffix in _ANSWER:
+        _ANSWER[suffix](answer_layers(answer, regions), path)
     else:
         _ONE_LAYER[suffix](answer_layers(answer, regions)[0], path)
     return regions
 
 
-def _suffix(path: str | Path, *more: str) -> str:
-    """Return the suffix of a file, in lower case; some formats are for a few kinds of data."""
+def _suffix(path: str | Path, accepted: Collection[str]) -> str:
+    """Return the suffix of a file, in lower case, if it is one of some."""
     suffix = Path(path).suffix.lower()
-    if suffix not in {".gpkg", *_ONE_LAYER, *_RASTER, *more}:
-        names = ", ".join((".gpkg", ".parquet", *more, ".csv"))
-        msg = f"{path} does not end in {names} or .tif; give a name that says the format."
+    if suffix not in accepted:
+        # One of each format.
+        names = [name for name in accepted if name != ".tiff"]
+        msg = (
+            f"{path} does not end in {', '.join(names[:-1])} or {names[-1]}; give a name that says "
+            "the format."
+        )
         raise InputError(msg)
     return suffix

@@ -1,4 +1,4 @@
-"""One layer a file: GeoParquet, GeoTIFF, GeoJSON, KML, and CSV that is safe in a spreadsheet.
+"""One layer a file: GeoParquet, FlatGeobuf, GeoJSON, GeoTIFF, and CSV safe in a spreadsheet.
 
 Spreadsheets run a cell that begins with ``=``, ``+``, ``-``, ``@``, a tab or a line end as a
 formula. A text from open data may begin so, or have such a part after a sign that the spreadsheet
@@ -7,22 +7,22 @@ of another country takes for the end of a cell. An apostrophe before it keeps it
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import json
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyogrio
 import shapely
 from pyarrow import csv
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GEOMETRY
 from semsig_gis.exports.layers import GEOMETRY_TYPES
-from semsig_gis.exports.styles import by_failures
 from semsig_gis.storage.geoparquet import (
     BBOX,
     COVERING,
@@ -30,18 +30,12 @@ from semsig_gis.storage.geoparquet import (
     geo_metadata,
     write_geoparquet_blocks,
 )
-from semsig_gis.storage.raster import write_cells
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterator, Mapping
+    from pathlib import Path
 
-    import geopandas as gpd
-    from numpy.typing import ArrayLike, NDArray
-
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.field import ErrorField
-    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.layers import Layer
 
 
@@ -131,125 +125,99 @@ def write_geoparquet(
     write_geoparquet_blocks(blocks(), path, geo=geo, specs=specs)
 
 
-def write_degrees(tables: Mapping[str, gpd.GeoDataFrame], path: str | Path) -> None:
-    """Write the rows of several tables, which have a rank first, as one GeoJSON or KML file.
-
-    Coordinates are longitude and latitude (WGS 84); ``layer`` names the table of a row, and
-    ``Name`` says it with the rank. The file appears whole, by rename.
-    """
-    parts = [
-        table.assign(Name=[f"{name} {rank}" for rank in table.iloc[:, 0]], layer=name)
-        for name, table in tables.items()
-    ]
-    joined = pd.concat([part.to_crs("EPSG:4326") for part in parts], ignore_index=True)
-    driver = "KML" if str(path).lower().endswith(".kml") else "GeoJSON"
-    options = {} if driver == "KML" else {"RFC7946": "YES"}
-    with whole_file(path) as partial:
-        joined.to_file(partial, driver=driver, engine="pyogrio", **options)
-
-
-def export_geotiff(
-    database: SignatureDatabase,
-    values: ArrayLike,
-    path: str | Path,
-    *,
-    name: str,
-    unit: str = "",
-    facts: Mapping[str, Any] | None = None,
+def write_flatgeobuf(
+    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Write one number a cell as a Cloud-Optimised GeoTIFF.
+    """Write a layer as one FlatGeobuf with a spatial index, which appears whole, by rename.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    values : array_like of float, shape (n,)
-        Numbers such as ``database.type_group_sizes`` or ``identifiability.found``; NaN where there
-        is none.
-    path : str or Path
-        File to write; it appears whole, by rename.
-    name : str
-        What the numbers are.
-    unit : str, optional
-        Their unit.
-    facts : mapping of str, optional
-        Plain values on the numbers, which go to the tags of the file as JSON.
-
-    Raises
-    ------
-    InputError
-        If there is not one number a cell, the cells span too wide an area, or the file cannot be
-        written.
-
-    Notes
-    -----
-    A pixel is a cell of the grid of the database, in its CRS, as float32; NaN is no data. The
-    overviews hold means, so that it is read fast from afar.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/objects.tif"
-    ...     export_geotiff(demo_database, demo_database.lengths, path, name="objects seen")
+    Its metadata hold the specs, the classes and the licences as JSON, by name.
     """
-    numbers = np.asarray(values, dtype=np.float64)
-    if numbers.shape != (len(database),):
-        msg = f"{numbers.size} numbers were given for {len(database)} cells; give one a cell."
-        raise InputError(msg)
-    write_cells(
-        path,
-        {name: (numbers, unit)},
-        grid=database.grid,
-        columns=database.columns,
-        rows=database.rows,
-        crs=database.crs,
-        notes=_notes(database, facts or {}),
+    notes = {
+        name: json.dumps(value, allow_nan=False)
+        for name, value in {**layer.facts, **layer.credits}.items()
+    }
+    options = {"TITLE": layer.title, "DESCRIPTION": _described(layer)}
+    _write_features(
+        layer, path, "FlatGeobuf", progress, layer_metadata=notes, layer_options=options
     )
 
 
-def _notes(database: SignatureDatabase, facts: Mapping[str, Any]) -> dict[str, str]:
+def write_geojson(
+    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Write a layer as one GeoJSON of RFC 7946, which appears whole, by rename.
+
+    Coordinates are longitude and latitude (WGS 84) to a centimetre. The member ``semsig`` holds the
+    specs, the classes and the licences.
+    """
+    options = geojson_options(_described(layer), {**layer.facts, **layer.credits})
+    _write_features(layer, path, "GeoJSON", progress, layer_options=options)
+
+
+def geojson_options(description: str, about: Mapping[str, Any]) -> dict[str, str]:
+    """Return with which options GDAL writes GeoJSON of RFC 7946 that tells what it is."""
+    native = {"type": "FeatureCollection", "semsig": about}
     return {
-        "licenses": "\n".join(database.licenses),
-        "semsig_version": database.version,
-        **{key: json.dumps(value) for key, value in facts.items()},
+        "RFC7946": "YES",
+        "DESCRIPTION": description,
+        "NATIVE_DATA": json.dumps(native, allow_nan=False),
+        "NATIVE_MEDIA_TYPE": "application/vnd.geo+json",
     }
 
 
-def export_field(field: ErrorField, database: SignatureDatabase, path: str | Path) -> None:
-    """Write an error field as a GeoTIFF of three bands; NaN where no query is near.
+def _described(layer: Layer) -> str:
+    return "\n".join([layer.description, *layer.licenses])
 
-    ``failed`` is the share of the queries around a pixel that failed, ``error`` their mean error in
-    metres, and ``queries`` how many speak; the radius is in the tags. A file beside it, ``.qml``,
-    has QGIS draw it as on the map.
-    """
-    columns, rows = np.nonzero(np.isfinite(field.failed.T))
-    unit = {"failed": "", "error": "m", "queries": "queries"}
-    bands = zip(unit, (field.failed, field.errors, field.speaking), strict=True)
-    write_cells(
-        path,
-        {name: (values[rows, columns], unit[name]) for name, values in bands},
-        grid=field.grid,
-        columns=columns.astype(np.int32),
-        rows=rows.astype(np.int32),
-        crs=database.crs,
-        notes=_notes(database, {"radius_m": field.radius}),
+
+def _write_features(
+    layer: Layer,
+    path: str | Path,
+    driver: str,
+    progress: Callable[[int, int], None] | None,
+    **options: Any,  # noqa: ANN401 - as pyogrio has
+) -> None:
+    """Write a layer block by block by one of GDAL's drivers, whole."""
+    with whole_file(path) as partial, whole_by_gdal(path):
+        pyogrio.write_arrow(
+            feature_stream(layer, progress),
+            partial,
+            layer=layer.name,
+            driver=driver,
+            geometry_name=GEOMETRY,
+            geometry_type=GEOMETRY_TYPES[layer.geometry],
+            crs=layer.crs.to_wkt(),
+            **options,
+        )
+        if pyogrio.read_info(partial, force_feature_count=True)["features"] != layer.rows:
+            msg = "some features are not in the file"
+            raise DataSourceError(msg)
+
+
+def feature_stream(
+    layer: Layer,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    without: Collection[str] = (),
+) -> pa.RecordBatchReader:
+    """Return the rows of a layer as a stream, without some of the columns."""
+    blocks = (
+        block.drop_columns([name for name in block.column_names if name in without])
+        for block in layer.blocks(progress)
     )
-    with whole_file(Path(path).with_suffix(".qml")) as partial:
-        partial.write_text(by_failures(), encoding="utf-8")
+    first = next(blocks)
+    every = itertools.chain([first], blocks)
+    batches = (batch for block in every for batch in block.to_batches())
+    return pa.RecordBatchReader.from_batches(first.schema, batches)
 
 
-def cell_errors(evaluation: Evaluation, database: SignatureDatabase) -> NDArray[np.float64]:
-    """Return the mean expected error in metres of the queries from each cell (float64, n).
-
-    NaN where no query is from; queries of which the distortion left nothing do not count. Raises
-    `InputError` if another database was searched.
-    """
-    errors = evaluation.queries["error_m"].to_numpy(np.float64)
-    rows = evaluation.rows_in(database)
-    kept = np.isfinite(errors) & (rows >= 0)
-    counts = np.bincount(rows[kept], minlength=len(database))
-    sums = np.bincount(rows[kept], errors[kept], minlength=len(database))
-    means = np.full(len(database), np.nan)
-    np.divide(sums, counts, out=means, where=counts > 0)
-    return means
+@contextlib.contextmanager
+def whole_by_gdal(path: str | Path) -> Iterator[None]:
+    """Tell in one sentence of a file that GDAL could not write; its own words are the cause."""
+    try:
+        yield
+    except (DataSourceError, DataLayerError, FeatureError) as error:
+        msg = (
+            f"{path} could not be written whole, so what was there before is unchanged; free "
+            "some space or choose another folder."
+        )
+        raise InputError(msg) from error

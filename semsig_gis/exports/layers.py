@@ -6,6 +6,7 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -28,6 +29,7 @@ from semsig_gis.exports.styles import (
     AMBIGUITY,
     IDENTIFIABILITY,
     by_amount,
+    by_answer,
     by_class,
     by_outcome,
     by_rank,
@@ -37,7 +39,6 @@ from semsig_gis.objects.table import objects_specs
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    import geopandas as gpd
     from pyproj import CRS
 
     from semsig_gis.database.answer import Answer
@@ -183,7 +184,7 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     lines = lines[lines["off_m"] > 0]  # a line has a length
     summary = evaluation.summary()
     facts = {name: summary[name] for name in ("settings", "database", "versions")}
-    layer = functools.partial(_table_layer, licenses=licenses, facts=facts)
+    layer = functools.partial(table_layer, licenses=licenses, facts=facts)
     return [
         layer(
             queries,
@@ -209,13 +210,13 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
 
 
 def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
-    """Return the regions that must be searched, and the candidates of a query."""
+    """Return the regions that must be searched, the candidates and, if estimated, the place."""
     facts = answer.to_dict()
-    licenses = tuple(facts["licenses"])
+    licenses, place = tuple(facts["licenses"]), facts.get("place")
     facts = {name: facts[name] for name in facts if name not in {"candidates", "crs", "licenses"}}
     facts["searched"] = regions.to_dict()
-    layer = functools.partial(_table_layer, licenses=licenses, facts=facts)
-    return [
+    layer = functools.partial(table_layer, licenses=licenses, facts=facts)
+    layers = [
         layer(
             regions.table,
             name="regions",
@@ -233,9 +234,27 @@ def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
             styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
     ]
+    if place is None:
+        return layers
+    told: dict[str, Any] = {"answer": "given" if facts["answered"] else "withheld"}
+    told |= {name: value for name, value in place.items() if isinstance(value, (bool, int, float))}
+    frame = gpd.GeoDataFrame(
+        pd.DataFrame([told]),
+        geometry=gpd.points_from_xy([place["x"]], [place["y"]]),
+        crs=answer.crs,
+    )
+    estimate = layer(
+        frame,
+        name="place",
+        title="Place",
+        description="Where the query was most probably seen from, and how sure that is.",
+        geometry="point",
+        styles=(by_answer(),),
+    )
+    return [*layers, estimate]
 
 
-def _table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN401 - as `Layer` has
+def table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN401 - as `Layer` has
     """Return a layer of a table that is in memory; what is not finite is missing in it."""
     shapes = frame.geometry
     columns = {}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree as ET
 
 from semsig_gis.core.signs import (
-    FAILURES,
+    ANSWERS,
     FOUND_RAMP,
     GROUP_COLOURS,
     OUTCOMES,
@@ -173,6 +173,15 @@ def by_outcome(*, geometry: str) -> Style:
     return Style("Outcome", _document("outcome", entries, geometry))
 
 
+def by_answer() -> Style:
+    """Return a style of the best place, whether it is given as the answer or not."""
+    entries = {
+        str(number): Entry({"value": name}, name, _outcome_point(mark))
+        for number, (name, mark) in enumerate(ANSWERS.items())
+    }
+    return Style("Answer", _document("answer", entries, "point"))
+
+
 def _outcome_point(mark: Mark) -> tuple[SymbolLayer, ...]:
     shape = CLASS_MARKERS[mark.shape][0]
     return (_marker(shape, mark.colour, 12.0, smallest=1.8, outline="#222222"),)
@@ -182,22 +191,6 @@ def _outcome_line(mark: Mark) -> tuple[SymbolLayer, ...]:
     line = {"line_color": _rgba(mark.colour, 150), "line_width": 0.26, "line_style": "solid"}
     end = _marker("cross2", mark.colour, 10.0, smallest=1.4, outline=mark.colour)
     return ("SimpleLine", line), ("MarkerLine", {"placement": "lastvertex", "rotate": 0}, end)
-
-
-def by_failures() -> str:
-    """Return a document by which QGIS draws the first band of a raster: which share failed."""
-    root = ET.Element("qgis", version="3.22.0", styleCategories="Symbology")
-    band = {"type": "singlebandpseudocolor", "band": "1", "opacity": "1", "alphaBand": "-1"}
-    look = {**band, "classificationMin": "0", "classificationMax": "1"}
-    renderer = ET.SubElement(ET.SubElement(root, "pipe"), "rasterrenderer", look)
-    steps = {"colorRampType": "DISCRETE", "classificationMode": "1", "clip": "0"}
-    shader = ET.SubElement(ET.SubElement(renderer, "rastershader"), "colorrampshader", steps)
-    ends = [*list(FAILURES)[1:], 1.0]
-    for (low, colour), high in zip(FAILURES.items(), ends, strict=True):
-        value = "inf" if high == 1.0 else f"{high:g}"
-        said = {"value": value, "label": f"failed: {low:.0%} to {high:.0%}"}
-        ET.SubElement(shader, "item", {**said, "color": colour, "alpha": "255"})
-    return ET.tostring(root, encoding="unicode")
 
 
 def _ranges(classes: Classes, symbols: Sequence[SymbolLayer]) -> dict[str, Entry]:

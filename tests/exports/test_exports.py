@@ -36,33 +36,43 @@ CITY, OBJECTS = small_city()
 CHANCES = chances_of(CITY)
 OF_OBJECTS: dict[str, Any] = {"objects": OBJECTS}
 OF_QUERIES: dict[str, Any] = {"evaluation": small_evaluation()}
-TABLES, ALL = (".gpkg", ".parquet", ".csv"), (".gpkg", ".parquet", ".csv", ".tif")
+TABLES = (".gpkg", ".parquet", ".fgb", ".geojson", ".csv")
+ALL = (*TABLES, ".pmtiles", ".tif")
+GIVEN: dict[str, dict[str, Any]] = {
+    "cells": {},
+    "objects": OF_OBJECTS,
+    "evaluation": OF_QUERIES,
+    "evaluation_lines": OF_QUERIES,
+    "hexagons": {"h3": 11},
+}
 
 
 def test_a_geopackage_holds_all_or_what_is_named(tmp_path: Path) -> None:
-    everything = {**OF_OBJECTS, **OF_QUERIES, "identifiability": CHANCES}
+    everything = {**OF_OBJECTS, **OF_QUERIES, "identifiability": CHANCES, "h3": 9}
     export_database(CITY, tmp_path / "CITY.GPKG", geometry="point", **everything)
     layers = dict(pyogrio.list_layers(tmp_path / "CITY.GPKG").tolist())
-    assert [layers[name] for name in LAYERS] == ["Point", "Point", "Point", "LineString"]
+    assert [layers[name] for name in LAYERS] == [*["Point"] * 3, "LineString", "Polygon"]
     file, names = tmp_path / "queries.gpkg", ["evaluation", "evaluation_lines"]
     export_database(CITY, file, layers=names, **OF_QUERIES)
     assert pyogrio.list_layers(file)[:, 0].tolist() == [*names, "layer_styles"]
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 @pytest.mark.parametrize("layer", LAYERS)
-def test_other_files_hold_one(layer: str, suffix: str, tmp_path: Path) -> None:
-    given = {"cells": {}, "objects": OF_OBJECTS}.get(layer, OF_QUERIES)
-    for name in ("a.gpkg", f"a{suffix}"):
-        export_database(CITY, tmp_path / name, layers=[layer], **given)
-    expected = gpd.read_file(tmp_path / "a.gpkg", layer=layer).drop(columns="geometry")
-    read = pd.read_csv if suffix == ".csv" else gpd.read_parquet
-    table = read(tmp_path / f"a{suffix}")
-    assert set(expected.columns) <= set(table.columns)
-    assert len(table) == len(expected) > 10
+def test_other_files_hold_one(layer: str, tmp_path: Path) -> None:
+    for suffix in TABLES:
+        export_database(CITY, tmp_path / f"a{suffix}", layers=[layer], **GIVEN[layer])
+    expected = gpd.read_file(tmp_path / "a.gpkg", layer=layer)
+    readers = {".csv": pd.read_csv, ".parquet": gpd.read_parquet}
+    for suffix in TABLES[1:]:
+        table = readers.get(suffix, gpd.read_file)(tmp_path / f"a{suffix}")
+        assert set(expected.columns) - {"geometry"} <= set(table.columns)
+        assert len(table) == len(expected) > 10
 
 
-@pytest.mark.parametrize("answer", [small_location(), small_localization()])
+LOCATION = small_location()
+
+
+@pytest.mark.parametrize("answer", [LOCATION, small_localization()])
 def test_answers(answer: Location | Localization, tmp_path: Path) -> None:
     file = tmp_path / "a.gpkg"
     for path in (file, tmp_path / "a.parquet", tmp_path / "a.csv"):
@@ -76,7 +86,9 @@ def test_answers(answer: Location | Localization, tmp_path: Path) -> None:
         assert read.geometry.geom_equals(found.table.geometry).all()
         for column in ("searched_km2", "searched_percent"):
             assert read[column].tolist() == found.table[column].tolist()
-    assert pyogrio.list_layers(file)[:, 0].tolist() == ["regions", "candidates", "layer_styles"]
+    assert pyogrio.list_layers(file)[:, 0].tolist() == [
+        *("regions", "candidates"), *(["place"] if answer is LOCATION else []), "layer_styles",
+    ]  # fmt: skip
     listed = gpd.read_file(file, layer="candidates")
     assert listed["cell_id"].tolist() == answer.candidates["cell_id"].tolist()
     facts = pyogrio.read_info(file, layer="regions")["layer_metadata"]
@@ -99,12 +111,17 @@ def answer(one: Location | Localization, share: float = 0.9) -> Callable[[Path],
 MADE_WITH = "give the database that it was made with"
 PLACES = OBJECTS.table
 REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
-    (city(), "city.shp", ("city.shp", ".gpkg, .parquet, .csv or .tif")),
+    (city(), "city.shp", ("city.shp", ".gpkg, .parquet, .fgb, .geojson, .csv, .pmtiles or .tif")),
     (city(), "city", ("does not end in",)),
     (city(layers=["cell"]), "city.gpkg", ("'cell'", "the nearest is 'cells'")),
     (city(layers=["cells", "objects"]), "city.gpkg", ("no objects",)),
     (city(layers=["cells"], **OF_OBJECTS), "city.gpkg", ("cells alone", "no objects")),
     (city(layers=LAYERS[:2], **OF_OBJECTS), "city.csv", ("one layer", "GeoPackage")),
+    (city(h3=16), "city.fgb", ("resolution 16", "0 to 15")),
+    (city(layers="hexagons"), "city.fgb", ("no resolution",)),
+    (city(layers="cells", h3=9), "city.fgb", ("cells alone", "no resolution")),
+    (city(layers="objects"), "city.pmtiles", ("cannot hold 'objects'", "give one of cells")),
+    (city(geometry="point"), "city.pmtiles", ("cells alone", "no geometry")),
     (city(layers=["object"]), "city.csv", ("'object'", "the nearest is 'objects'")),
     (city(layers=["ambiguity"]), "city.csv", ("'ambiguity'", *LAYERS)),
     (city(layers=["cells"]), "city.tif", ("'cells'", *RASTERS)),
@@ -163,8 +180,8 @@ def test_a_folder_that_cannot_be_written(suffix: str, tmp_path: Path) -> None:
 def test_a_full_disk_leaves_the_old_file(suffix: str, share: float, tmp_path: Path) -> None:
     file, layers = tmp_path / f"city{suffix}", OF_OBJECTS if suffix == ".gpkg" else {}
     export_database(CITY, file, **layers)
-    before = file.read_bytes()
+    before, there = file.read_bytes(), {*tmp_path.iterdir()}
     with largest_file(round(share * len(before))), refused(InputError, file.name, "unchanged"):
         export_database(CITY, file, **layers)
     assert file.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [file]
+    assert {*tmp_path.iterdir()} == there

@@ -13,6 +13,7 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
+import pyogrio
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -119,3 +120,31 @@ def test_the_metadata_of_geoparquet_say_what_it_is(layer: str, kind: str, tmp_pa
     assert np.allclose(column["bbox"], gpd.read_parquet(file).total_bounds, rtol=0, atol=1e-6)
     assert specs["licenses"] == list(map(str, OBJECTS.licenses))
     assert specs["taxonomy"] == OBJECTS.taxonomy.to_list()
+
+
+def test_layers_come_back_from_flatgeobuf_and_geojson(tmp_path: Path) -> None:
+    told = chances_of(CITY)
+    for name in ("a.fgb", "a.geojson"):
+        export_database(CITY, tmp_path / name, identifiability=told)
+    # The rows of a FlatGeobuf stand along a curve.
+    exact, degrees = (
+        gpd.read_file(tmp_path / name).sort_values("cell_id", ignore_index=True)
+        for name in ("a.fgb", "a.geojson")
+    )
+    assert (exact.crs, degrees.crs) == (CITY.crs, "EPSG:4326")
+    degrees = degrees.to_crs(CITY.crs)
+    for cells in (exact, degrees):
+        assert cells["cell_id"].tolist() == CITY.cell_ids.tolist()
+        assert cells["types"].tolist() == [CITY.types(cell) for cell in range(len(CITY))]
+        assert cells["chance_found"].tolist() == told.found.tolist()
+    assert np.array_equal(exact.geometry.area, np.full(len(CITY), 100.0))
+    middles = degrees.geometry.centroid
+    assert np.abs(np.stack([middles.x, middles.y], axis=1) - CITY.xy).max() < 0.02
+    about = pyogrio.read_info(tmp_path / "a.fgb")["layer_metadata"]
+    semsig = json.loads((tmp_path / "a.geojson").read_text())["semsig"]
+    for facts in (semsig, {key: json.loads(about[key]) for key in semsig}):
+        assert facts["licenses"] == list(map(str, OBJECTS.licenses))
+        assert facts["taxonomy"] == OBJECTS.taxonomy.to_list()
+        assert facts["crs"] == CITY.crs.to_json_dict()
+    around = gpd.read_file(tmp_path / "a.fgb", bbox=(*CITY.xy[0], *CITY.xy[0]))
+    assert around["cell_id"].tolist() == [CITY.cell_ids[0]]

@@ -20,7 +20,7 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signs import FAILURES
 from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.files import cell_errors, export_geotiff
+from semsig_gis.exports.rasters import cell_errors, export_geotiff
 from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
