@@ -254,6 +254,7 @@ def test_every_layer_has_a_style_of_its_own(file: Path, tmp_path: Path) -> None:
         ("evaluation_lines", "geom", "Outcome", 1),
         ("regions", "geom", "Rank", 1),
         ("candidates", "geom", "Rank", 1),
+        ("place", "geom", "Answer", 1),
     ]
     for source, layer, _, _, _, qml, updated in styles:
         root = ET.fromstring(qml)  # noqa: S314 - our own
