@@ -185,7 +185,7 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """Download the street objects of an area."""
-    from semsig_gis.objects.fetch import TILED, fetch_layers, find_area, open_cache
+    from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
     from semsig_gis.objects.load import assemble, choose_layers
     from semsig_gis.sources.catalog import load_catalog
 
@@ -199,7 +199,7 @@ def fetch(
         surroundings=bool(buildings or streets),
     )
     kept, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
-    unit: Literal["steps", "bytes"] = "steps" if catalog.reader in TILED else "bytes"
+    unit: Literal["steps", "bytes"] = "bytes" if catalog.reader == "opendatasoft" else "steps"
     with progress("fetching", unit=unit) as advance:
         place = find_area(area, catalog, cache=kept, http=http)
         layers = fetch_layers(

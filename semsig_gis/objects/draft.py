@@ -35,10 +35,10 @@ from semsig_gis.sources.catalog import LayerSpec, catalog_names, load_catalog, p
 from semsig_gis.sources.conditions import ANY_VALUE, BETWEEN_SLASHES, Condition
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.decimals import decimal
-from semsig_gis.sources.opendatasoft.reader import POINT, SHAPE, fold
-from semsig_gis.sources.opendatasoft.table import Record, open_table
 from semsig_gis.sources.osm.file import FORMATS
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84, off_the_globe
+from semsig_gis.sources.services.layers import POINT, SHAPE, fold
+from semsig_gis.sources.services.table import Record, open_table
 from semsig_gis.sources.vector import LayerInfo, first_rows
 
 if TYPE_CHECKING:

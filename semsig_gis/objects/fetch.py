@@ -11,9 +11,10 @@ from semsig_gis.sources import overture
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
-from semsig_gis.sources.opendatasoft import reader as opendatasoft
 from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.osm.overpass import find_place
+from semsig_gis.sources.services import pages
+from semsig_gis.sources.services.pages import SERVICES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -56,7 +57,7 @@ def fetch_layers(
         Whether the filters of the layers apply.
     progress : callable, optional
         Takes how much has arrived and how much there is, 0 where nobody knows: bytes of a portal's
-        file, tiles of OpenStreetMap.
+        file, rows of a service that sends pages, tiles of OpenStreetMap.
     tell : callable, optional
         Takes a line about each layer that has arrived: rows, size and date.
 
@@ -78,7 +79,7 @@ def fetch_layers(
     semsig_gis.core.errors.InputError: catalogue 'montpellier' has no service to fetch from; use
     `semsig load` on files.
     """
-    if not catalog.endpoints or catalog.reader not in {"opendatasoft", *TILED}:
+    if not catalog.endpoints or catalog.reader not in {*SERVICES, *TILED}:
         msg = (
             f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
         )
@@ -93,15 +94,23 @@ def fetch_layers(
             layers.append(clip_layer(layer, area))
             tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows")
         return tuple(layers)
-    for spec, file in opendatasoft.fetch_layers(
-        specs, endpoints=catalog.endpoints, area=area, cache=cache, spec=http, progress=progress
+    for download in pages.fetch_layers(
+        catalog.reader,
+        specs,
+        endpoints=catalog.endpoints,
+        area=area,
+        cache=cache,
+        spec=http,
+        progress=progress,
     ):
-        (layer,) = opendatasoft.read_layers(file.path, [spec], filters=filters)
+        layer = download.read(filters=filters)
         layers.append(clip_layer(layer, area))
-        origin = "the cache" if file.from_cache else "the portal"
+        kept = all(file.from_cache for file in download.files)
         tell(
-            f"{spec.name}: {layer.counts.read:,} rows, {file.bytes / 1e6:.2f} MB, from {origin}, "
-            f"fetched {file.fetched_at}"
+            f"{layer.spec.name}: {layer.counts.read:,} rows, "
+            f"{sum(file.bytes for file in download.files) / 1e6:.2f} MB, "
+            f"from {'the cache' if kept else 'the portal'}, "
+            f"fetched {min(file.fetched_at for file in download.files)}; {layer.spec.terms}"
         )
     return tuple(layers)
 

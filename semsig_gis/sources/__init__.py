@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 # The module of this package that reads what a catalogue's `reader` names.
 READERS = {
-    "opendatasoft": "opendatasoft.reader",
+    "arcgis": "services.layers",
+    "opendatasoft": "services.layers",
     "osm_file": "osm.file",
     "overpass": "osm.overpass",
     "overture": "overture",

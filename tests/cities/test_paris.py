@@ -14,7 +14,7 @@ import shapely
 from semsig_gis.objects.load import build_objects
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.opendatasoft.reader import read_layers
+from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -26,13 +26,9 @@ from servers import Answer, published
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError
 from semsig_gis.sources.area import Area
 from semsig_gis.sources.catalog import ClassBy, LayerSpec
-from semsig_gis.sources.opendatasoft.reader import (
-    _outline,
-    fetch_layers,
-    find_field,
-    fold,
-    read_layers,
-)
+from semsig_gis.sources.services.layers import find_field, fold, read_layers
+from semsig_gis.sources.services.opendatasoft import _outline
+from semsig_gis.sources.services.pages import fetch_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -489,8 +485,9 @@ def fetched(server: Server, cache: Cache, quick: HttpSpec) -> Fetch:
 
     def fetch(layer: LayerSpec = TREES, **options: Any) -> Fetched:  # noqa: ANN401
         given = {"endpoints": [server.url], "cache": cache, "spec": quick, **options}
-        ((spec, file),) = fetch_layers([layer], **given)
-        assert spec is layer
+        (download,) = fetch_layers("opendatasoft", [layer], **given)
+        assert download.spec is layer
+        (file,) = download.files
         return file
 
     return fetch
@@ -606,7 +603,7 @@ def test_the_name_of_a_dataset_is_part_of_the_path(
     server: Server, cache: Cache, fetched: Fetch
 ) -> None:
     files_only = replace(TREES, dataset=None)
-    assert fetch_layers([files_only], endpoints=[server.url], cache=cache) == []
+    assert fetch_layers("opendatasoft", [files_only], endpoints=[server.url], cache=cache) == []
     with pytest.raises(CatalogError):
         fetched(replace(TREES, dataset="a/../b?c"))
     assert server.paths() == [f"{DATASETS}/a%2F..%2Fb%3Fc"]

@@ -102,6 +102,10 @@ class Cache:
         """Return the entry of a request, which may hold nothing yet."""
         return Entry(Path(self.folder), key)
 
+    def forget(self, file: Fetched) -> None:
+        """Have a file fetched anew the next time; it stays for those who read it."""
+        Entry(Path(self.folder), file.path.name.partition("-")[0]).sidecar.unlink(missing_ok=True)
+
     @contextlib.contextmanager
     def locked(self, key: str) -> Iterator[Entry]:
         """Give the entry of a request while no other process works on it."""

@@ -32,8 +32,8 @@ from semsig_gis.sources.http.deadline import (
     PunctualAdapter,
     SlowError,
 )
+from semsig_gis.sources.http.errors import error_text
 from semsig_gis.sources.packed import bomb, swells
-from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -47,6 +47,7 @@ TOO_SLOWLY = "sent too slowly"
 RETRIED = frozenset({408, 429, 500, 502, 503, 504})
 MOVED = frozenset({301, 302, 303, 307, 308})
 BLOCK = 2**16
+ANYTHING = "*/*;q=0.1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,20 +218,19 @@ def require_success(response: requests.Response) -> None:
 
 
 def _detail(response: requests.Response) -> str:
-    """Return what a service says in JSON about an error, as part of a sentence."""
+    """Return what a service says about an error, as part of a sentence."""
     body = b""
     with contextlib.suppress(PassingError):
         for block in blocks_of(response):
             body += block
             if len(body) > BLOCK:
                 break
-    with contextlib.suppress(ValueError, AttributeError, zlib.error):
+    with contextlib.suppress(zlib.error):
         if response.headers.get("Content-Encoding", "") == "gzip":
             body = zlib.decompressobj(wbits=31).decompress(body, BLOCK)
-        reply = parse_json(body)
-        text = " ".join(str(reply.get("message") or reply.get("error") or "").split())
+        text = error_text(body)
         if text:
-            return f" ({text[:200].rstrip('.')})".replace(". ", ", ")
+            return f" ({text})"
     return ""
 
 
@@ -433,6 +433,8 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
     request, entry, spec = job.request, job.entry, job.spec
     have, begun = entry.resumable() if request.method == "GET" else (0, Edition())
     headers = job.held.condition if job.held and request.method == "GET" else {}
+    if job.accept:
+        headers |= {"Accept": ", ".join((*job.accept, ANYTHING))}
     if have:
         headers |= {"Range": f"bytes={have}-", "If-Range": begun.if_range}
     with answer_to(session, request, headers, spec) as response:

@@ -1,4 +1,4 @@
-"""The records of a file that an Opendatasoft portal exports: JSON of each kind, CSV, Parquet."""
+"""The records of a file that a service sends: JSON of each kind, GML, CSV, Parquet."""
 
 from __future__ import annotations
 
@@ -15,16 +15,28 @@ from pyproj.exceptions import CRSError
 from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.csv_file import open_csv
-from semsig_gis.sources.raw_layer import WGS84
+from semsig_gis.sources.http.errors import error_text
+from semsig_gis.sources.raw_layer import WGS84, BadFeatureError
+from semsig_gis.sources.services.gml import (
+    features,
+    local_name,
+    parse_xml,
+    read_feature,
+    stated_crs,
+)
 from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
+    from xml.etree import ElementTree as ET
 
     from semsig_gis.sources.csv_file import CsvFile
 
 BATCH = 10_000
+ESRI_CODES = 37_000  # from which on codes are Esri's own
+# How services call the number of all rows: Opendatasoft 2.1 and 1, WFS and OGC API Features, CKAN.
+TOTALS = ("total_count", "nhits", "numberMatched", "totalFeatures", "total")
 
 
 class Record(NamedTuple):
@@ -43,8 +55,8 @@ class Table:
     """A file that has been opened.
 
     `records` takes the fields that are wanted and returns an iterator over the rows, which may have
-    a geometry that is not a field (`has_geometry`). `crs` is what the file states, which those of a
-    portal never do, and `notes` what is to be told of it. `empty`: no rows, and so nothing to know
+    a geometry that is not a field (`has_geometry`). `crs` is what the file states, if it does,
+    and `notes` what is to be told of it. `empty`: no rows, and so nothing to know
     the fields by. `rest`: rows that the portal has beyond these, where the file is a page of a
     longer answer.
     """
@@ -60,13 +72,15 @@ class Table:
 
 def open_table(path: Path) -> Table:
     """Open a file by what is in it, whatever its name; SourceError if it cannot be used."""
-    require_file(path, "a file that a portal exports")
+    require_file(path, "a file that a service sends")
     with path.open("rb") as stream:
         begin = stream.read(256).removeprefix(b"\xef\xbb\xbf").lstrip()
     if begin.startswith(b"PAR1"):
         return _parquet(path)
     if begin.startswith((b"{", b"[")):
         return _json(path)
+    if begin.startswith(b"<"):
+        return _gml(path)
     return _csv(path)
 
 
@@ -78,11 +92,14 @@ def _json(path: Path) -> Table:
     except (ValueError, RecursionError) as error:
         msg = f"{path} is not whole JSON ({error}); get it again."
         raise SourceError(msg) from error
-    features = isinstance(content, dict) and content.get("type") == "FeatureCollection"
-    items = content
+    if isinstance(content, dict) and isinstance(content.get("result"), dict):
+        content = content["result"]  # of CKAN, in an envelope
+    collection = isinstance(content, dict) and content.get("type") == "FeatureCollection"
+    items, system = content, None
     if isinstance(content, dict):
-        keys = ("features",) if features else ("results", "records")
+        keys = ("features",) if collection else ("features", "results", "records")
         items = next((content[key] for key in keys if key in content), None)
+        system = _member_crs(content, path) if collection else _esri_crs(content, path)
     records = [_record(item) for item in items] if isinstance(items, list) else [""]
     good = [record for record in records if isinstance(record, Record)]
     if records and not good:
@@ -94,24 +111,26 @@ def _json(path: Path) -> Table:
     return Table(
         fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
         records=lambda _: iter(records),
-        has_geometry=features or any(record.geometry for record in good),
-        crs=_member_crs(content, path) if features else None,
+        has_geometry=collection or any(record.geometry for record in good),
+        crs=system,
         empty=not records,
         rest=_rest(content, len(records)),
     )
 
 
 def _rest(content: object, rows: int) -> int:
-    """Return how many rows more a page says that there are, by version 2.1 or 1 of the API."""
+    """Return how many rows more a page says that there are, in the words of each service."""
     page = content if isinstance(content, dict) else {}
-    total = page.get("total_count", page.get("nhits"))
+    total = next((page[name] for name in TOTALS if name in page), None)
     return max(total - rows, 0) if isinstance(total, int) else 0
 
 
 def _record(item: object) -> Record | str:
-    """Return a feature, a record of version 1 or 2.0, or a plain one of version 2.1."""
+    """Return a feature, one of Esri, a record of Opendatasoft 1 or 2.0, or a plain one."""
     if not isinstance(item, dict):
         return f"is {json.dumps(item)[:40]}, not a record"
+    if isinstance(item.get("attributes"), dict):
+        return Record(item["attributes"], item.get("geometry"))
     if item.get("type") == "Feature":
         fields = item.get("properties") or {}
         good = isinstance(fields, dict)
@@ -133,13 +152,60 @@ def _member_crs(content: dict[str, Any], path: Path) -> CRS | None:
     return _stated_crs(name, path)
 
 
+def _esri_crs(content: Mapping[str, Any], path: Path) -> CRS | None:
+    """Return the CRS that the ArcGIS REST API states by its number."""
+    stated = content.get("spatialReference")
+    if not isinstance(stated, dict):
+        return None
+    code = stated.get("latestWkid", stated.get("wkid"))
+    if code is None:
+        return None if "wkt" not in stated else _stated_crs(stated["wkt"], path)
+    return _stated_crs(f"{'ESRI' if code >= ESRI_CODES else 'EPSG'}:{code}", path)
+
+
 def _stated_crs(definition: object, path: Path) -> CRS:
     try:
         system = CRS.from_user_input(definition)
     except CRSError as error:
         msg = f"{path} states a CRS that is unknown ({str(definition)[:60]}); correct it."
         raise CrsError(msg) from error
+    return _usual(system)
+
+
+def _usual(system: CRS) -> CRS:
     return WGS84 if system.equals(WGS84, ignore_axis_order=True) else system
+
+
+def _gml(path: Path) -> Table:
+    content = path.read_bytes()
+    try:
+        root = parse_xml(content)
+    except ValueError as error:
+        msg = f"{path} is not whole GML ({error}); get it again."
+        raise SourceError(msg) from error
+    said = error_text(content)
+    found = list(features(root))
+    if said or not (found or local_name(root) == "FeatureCollection"):
+        what = f"holds the error {said}" if said else "has no features"
+        msg = f"{path} {what}; give GML as a Web Feature Service sends it."
+        raise SourceError(msg)
+    crs, swap = stated_crs(content)
+    records = [_feature(item, swap=swap) for item in found]
+    good = (record for record in records if isinstance(record, Record))
+    return Table(
+        fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
+        records=lambda _: iter(records),
+        has_geometry=True,
+        crs=None if crs is None else _usual(crs),
+        empty=not records,
+    )
+
+
+def _feature(item: ET.Element, *, swap: bool) -> Record | str:
+    try:
+        return Record(*read_feature(item, swap=swap))
+    except BadFeatureError as error:
+        return str(error)
 
 
 def _csv(path: Path) -> Table:

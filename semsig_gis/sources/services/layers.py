@@ -1,46 +1,42 @@
-"""Opendatasoft portals, such as Open Data Paris: their files, and their Explore API v2.1."""
+"""Layers out of the files that services send, or that people download from them."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 import unicodedata
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
 import numpy as np
 import shapely
 import shapely.geometry
 from shapely.errors import ShapelyError
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core.errors import SourceError
 from semsig_gis.sources import vector as vector_file
+from semsig_gis.sources.csv_layer import KNOWN_NAMES, SHAPE_NAMES
 from semsig_gis.sources.decimals import decimal
-from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch
-from semsig_gis.sources.opendatasoft.table import open_table
 from semsig_gis.sources.raw_layer import (
     WGS84,
     BadFeatureError,
     RowRules,
     Rows,
     raw_layer,
-    require_field,
     settle_crs,
 )
+from semsig_gis.sources.services.table import open_table
 from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from shapely.geometry.base import BaseGeometry
+    from collections.abc import Iterator, Mapping, Sequence
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import LayerSpec
-    from semsig_gis.sources.http.cache import Cache, Fetched
-    from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.opendatasoft.table import Record, Table
+    from semsig_gis.sources.http.cache import Fetched
     from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.services.table import Record, Table
 
 
 def fold(name: str) -> str:
@@ -96,6 +92,10 @@ class Positions:
 
         self._shape, self._point = own(SHAPE), own(POINT)
         self._x, self._y = own(spec.x_field), own(spec.y_field)
+        named = spec.x_field or (self._shape or self._point) or table.has_geometry
+        if not named:
+            self._x, self._y = _known_coordinates(table.fields)
+            self._shape = None if self._x else known_field(SHAPE_NAMES, table.fields)
         columns = (self._shape, self._point, self._x, self._y)
         self.fields = tuple(field for field in columns if field is not None)
         coordinates = self._x and self._y
@@ -125,26 +125,60 @@ class Positions:
         return None
 
 
+def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
+    """Return the first field that has one of some names, in upper or lower case."""
+    return next((field for field in fields if field.lower() in names), None)
+
+
+def _known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
+    """Return two fields whose names say that they are coordinates."""
+    for xs, ys in KNOWN_NAMES:
+        x, y = known_field(xs, fields), known_field(ys, fields)
+        if x and y:
+            return x, y
+    return None, None
+
+
 def _shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
-    """Return a shape that is GeoJSON, such JSON as text, or WKB."""
-    if value is None or value == "":
-        return None
+    """Return a shape that is built, GeoJSON, JSON of Esri, such JSON as text, WKT, or WKB."""
+    if value is None or value == "" or isinstance(value, shapely.Geometry):
+        return value or None
     try:
-        if isinstance(value, bytes):
-            return shapely.from_wkb(value)
-        geometry = parse_json(value) if isinstance(value, str) else value
-        if geometry.get("type") == "Feature":
-            geometry = geometry["geometry"]
-        if geometry is None:
-            return None
-        if geometry["type"] == "Point" and geometry["coordinates"]:
-            x, y = geometry["coordinates"][:2]
-            return float(x), float(y)
-        with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
-            return shapely.geometry.shape(geometry)
+        return _built(value)
     except (AttributeError, LookupError, TypeError, ValueError, ShapelyError) as error:
-        msg = f"its shape {_shown(value)} is not a GeoJSON geometry"
+        msg = f"its shape {_shown(value)} is not a geometry"
         raise BadFeatureError(msg) from error
+
+
+def _built(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
+    if isinstance(value, bytes):
+        return shapely.from_wkb(value)
+    if isinstance(value, str) and value.lstrip()[:1].isalpha():
+        return shapely.from_wkt(value)
+    geometry = parse_json(value) if isinstance(value, str) else value
+    if "type" not in geometry:
+        return esri_shape(geometry)
+    if geometry["type"] == "Feature":
+        geometry = geometry["geometry"]
+    if geometry is None:
+        return None
+    if geometry["type"] == "Point" and geometry["coordinates"]:
+        x, y = geometry["coordinates"][:2]
+        return float(x), float(y)
+    with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+        return shapely.geometry.shape(geometry)
+
+
+def esri_shape(geometry: Mapping[str, Any]) -> Position:
+    """Return a geometry that is written as the ArcGIS REST API does; its rings take turns."""
+    if "x" in geometry:
+        x, y = (math.nan if value is None else float(value) for value in map(geometry.get, "xy"))
+        return None if math.isnan(x) and math.isnan(y) else (x, y)
+    if "points" in geometry:
+        return shapely.MultiPoint([point[:2] for point in geometry["points"]])
+    parts = geometry["paths"] if "paths" in geometry else geometry["rings"]
+    lines = shapely.MultiLineString([[point[:2] for point in part] for part in parts])
+    return lines if "paths" in geometry else shapely.build_area(lines) or None
 
 
 def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
@@ -155,6 +189,10 @@ def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
         return _shape(value)
     try:
         if isinstance(value, dict):
+            if "longitude" in value:
+                value = {"lon": value["longitude"], "lat": value["latitude"]}
+            if value["lon"] is None and value["lat"] is None:
+                return None
             return float(value["lon"]), float(value["lat"])
         lat, lon = value.split(",") if isinstance(value, str) else value
         return float(lon), float(lat)
@@ -180,26 +218,58 @@ def _shown(value: object) -> str:
     return repr(text if len(text) <= 60 else f"{text[:60]}...")  # noqa: PLR2004 - fits a line
 
 
-# What people make of a portal's data with other programs, and leave beside its own files.
+# What people make of a service's data with other programs, and leave beside its own files.
 VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
-# Longer addresses are refused by some servers.
-LONGEST_OUTLINE = 2_000
-GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Download:
+    """What a service sent of a layer: files that are read one after the other as one table.
+
+    `fields` are those that it names, for rows may lack what they have no value for.
+    """
+
+    spec: LayerSpec
+    files: tuple[Fetched, ...]
+    fields: tuple[str, ...] = ()
+
+    def read(self, *, filters: bool = True) -> RawLayer:
+        """Return the layer; SourceError if it cannot be read."""
+        first, *others = (file.path for file in self.files)
+        if first.suffix.lower() in VECTOR_SUFFIXES:
+            return _read_vector(first, self.spec, filters=filters, crs=None)
+        table = open_table(first)
+
+        def records(wanted: Sequence[str]) -> Iterator[Record | str]:
+            yield from table.records(wanted)
+            for path in others:
+                yield from open_table(path).records(wanted)
+
+        whole = dataclasses.replace(table, records=records, rest=0)
+        if self.fields:
+            whole = dataclasses.replace(whole, fields=self.fields, empty=False)
+        return _read_table(whole, [self.spec], first, filters=filters, crs=None)[0]
 
 
 def read_layers(
     path: str | Path, specs: Sequence[LayerSpec], *, filters: bool = True, crs: str | None = None
 ) -> tuple[RawLayer, ...]:
-    """Read layers, in one pass, from a file that a portal exports, as it is.
+    """Read layers, in one pass, from a file that was downloaded from a service, as it is.
 
-    JSON of version 1, 2.0 or 2.1 of the API, GeoJSON, CSV and Parquet are told apart by what is in
-    the file; a vector file or archive made of such a file will do too. What portals publish is in
-    WGS 84; `crs` is for a file that states none.
+    JSON of Opendatasoft (version 1, 2.0 or 2.1 of its API), CKAN, Socrata and ArcGIS, GeoJSON, GML,
+    CSV and Parquet are told apart by what is in the file; a vector file or archive made of such a
+    file will do too. It is in WGS 84 if it states nothing else; `crs` is for a file that states
+    none.
     """
     path = Path(path)
     if path.suffix.lower() in VECTOR_SUFFIXES:
         return tuple(_read_vector(path, spec, filters=filters, crs=crs) for spec in specs)
-    table = open_table(path)
+    return _read_table(open_table(path), specs, path, filters=filters, crs=crs)
+
+
+def _read_table(
+    table: Table, specs: Sequence[LayerSpec], path: Path, *, filters: bool, crs: str | None
+) -> tuple[RawLayer, ...]:
     layers = [_TableLayer(spec, table, path, filters=filters, crs=crs) for spec in specs]
     for record in table.records([field for layer in layers for field in layer.fields]):
         for layer in layers:
@@ -262,137 +332,3 @@ class _TableLayer:
             self._rows, self._rules, self._crs, by_file=self._by_file, notes=self._notes
         )
         return dataclasses.replace(layer, spec=self._spec)
-
-
-# --- Live -------------------------------------------------------------------------------------
-
-
-def fetch_layers(
-    specs: Sequence[LayerSpec],
-    *,
-    endpoints: Sequence[str],
-    area: Area | None = None,
-    cache: Cache,
-    spec: HttpSpec = DEFAULT_HTTP,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[tuple[LayerSpec, Fetched]]:
-    """Fetch layers from the portal at the first address, as files for `read_layers`.
-
-    Layers without a dataset are left out, because the portal does not have them. For each dataset
-    its description is asked for, then one export (Explore API v2.1), whose ``where`` is the layer's
-    ``server_where`` and the area; for an outline of very many corners, a somewhat larger one. Where
-    a layer selects fields, those that its other keys name are selected too. CatalogError if the
-    portal lacks the dataset or a selected field, SourceError if it refuses or sends something else.
-    """
-    portal = endpoints[0]
-    files = []
-    for layer in specs:
-        if layer.dataset is None:
-            continue
-        dataset = quote(layer.dataset, safe="")
-        address = f"{portal.rstrip('/')}/api/explore/v2.1/catalog/datasets/{dataset}"
-        try:
-            types = _field_types(address, layer, portal, cache=cache, spec=spec)
-            file = fetch(
-                f"{address}/exports/geojson",
-                params=_query(layer, types, area, where=f"dataset {layer.dataset!r}"),
-                cache=cache,
-                spec=spec,
-                accept=GEOJSON,
-                suffix=".geojson",
-                check=_require_whole,
-                progress=progress,
-            )
-        except HttpError as error:
-            msg = f"layer {layer.name!r}: {error}"
-            raise HttpError(msg, error.status) from error
-        files.append((layer, file))
-    return files
-
-
-def _field_types(
-    address: str, layer: LayerSpec, portal: str, *, cache: Cache, spec: HttpSpec
-) -> Mapping[str, str]:
-    """Return the fields of a dataset and their types, as its description has them."""
-    try:
-        file = fetch(
-            address, cache=cache, spec=spec, accept=("application/json",), check=_described
-        )
-    except HttpError as error:
-        if error.status != 404:  # noqa: PLR2004 - not found
-            raise
-        msg = (
-            f"{portal} has no dataset {layer.dataset!r}, which the catalogue names for layer "
-            f"{layer.name!r}; look for it at {portal.rstrip('/')}/explore and correct `dataset` "
-            "in the catalogue."
-        )
-        raise CatalogError(msg) from error
-    return _described(file.path)
-
-
-def _described(path: Path) -> dict[str, str]:
-    try:
-        content: Any = parse_json(path.read_text(encoding="utf-8"))
-        return {field["name"]: field["type"] for field in content["fields"]}
-    except (KeyError, TypeError, ValueError) as error:
-        msg = (
-            "the portal does not describe its dataset as the Explore API v2.1 does; "
-            "check that the address is that of an Opendatasoft portal."
-        )
-        raise SourceError(msg) from error
-
-
-def _query(
-    layer: LayerSpec, types: Mapping[str, str], area: Area | None, *, where: str
-) -> dict[str, str | float]:
-    """Return the parameters of an export."""
-    fields = list(types)
-    places = [name for name, kind in types.items() if kind in {POINT, SHAPE}]
-    query: dict[str, str | float] = {"limit": -1}
-    conditions = [layer.server_where] if layer.server_where else []
-    if area is not None:
-        points = [name for name in places if types[name] == POINT] or places
-        if not points:
-            msg = f"{where} of layer {layer.name!r} has no positions to cut an area out of."
-            raise CatalogError(msg)
-        conditions.append(_inside(area, find_field(POINT, layer, points) or points[0]))
-    if conditions:
-        query["where"] = " and ".join(f"({condition})" for condition in conditions)
-    if layer.select:
-        own = settle_fields(layer, fields)
-        for field in own.select:
-            require_field(field, fields, where=where, key="select")
-        rules = RowRules(own, fields, filters=True, where=where)
-        query["select"] = ",".join(dict.fromkeys([*own.select, *rules.fields, *places]))
-    return query
-
-
-def _inside(area: Area, field: str) -> str:
-    """Return the condition that a position is in an area, in the portal's language (ODSQL)."""
-    west, south, east, north = area.bounds
-    if area.polygon.equals(shapely.box(west, south, east, north)):
-        return f"in_bbox({field}, {south:.7f}, {west:.7f}, {north:.7f}, {east:.7f})"
-    return f"intersects({field}, geom'{_outline(area.polygon)}')"
-
-
-def _outline(polygon: BaseGeometry) -> str:
-    """Return an outline as text, short enough for an address and never smaller than it was."""
-    text: str = shapely.to_wkt(polygon, rounding_precision=7)
-    room = 1e-5  # degrees: about a metre
-    while len(text) > LONGEST_OUTLINE:
-        # What is cut off is never wider than what was added, whose round corners are cut a little.
-        polygon = polygon.buffer(1.1 * room, quad_segs=2).simplify(room)
-        text = shapely.to_wkt(polygon, rounding_precision=7)
-        room *= 2
-    return text
-
-
-def _require_whole(path: Path) -> None:
-    """Refuse a file that does not begin and end as GeoJSON does."""
-    with path.open("rb") as stream:
-        begin = stream.read(16).lstrip()
-        stream.seek(max(0, path.stat().st_size - 16))
-        end = stream.read().rstrip()
-    if not (begin.startswith(b"{") and end.endswith(b"}")):
-        msg = "what the portal sent is not whole geojson; try again later."
-        raise SourceError(msg)

@@ -1,1 +1,0 @@
-"""Portals of Opendatasoft."""

@@ -1,0 +1,1 @@
+"""Services that send open data, each by the protocol that it speaks."""

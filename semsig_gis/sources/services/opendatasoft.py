@@ -1,0 +1,127 @@
+"""Opendatasoft portals, such as Open Data Paris, by their Explore API v2.1."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+import shapely
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.http.fetch import HttpError
+from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
+from semsig_gis.sources.services.pages import NOT_FOUND, Query
+from semsig_gis.storage.text import parse_json
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from shapely.geometry.base import BaseGeometry
+
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.services.pages import Client
+
+# Longer addresses are refused by some servers.
+LONGEST_OUTLINE = 2_000
+GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
+
+
+def fetch_layer(client: Client, area: Area | None) -> Download:
+    """Fetch a dataset from a portal, as one file.
+
+    Its description is asked for, then one export (Explore API v2.1), whose ``where`` is the layer's
+    ``server_where`` and the area; for an outline of very many corners, a somewhat larger one. Where
+    a layer selects fields, those that its other keys name are selected too.
+    """
+    dataset = quote(client.dataset, safe="")
+    address = f"{client.endpoint}/api/explore/v2.1/catalog/datasets/{dataset}"
+    file = client.file(
+        Query(f"{address}/exports/geojson", _query(client, _field_types(address, client), area)),
+        _require_whole,
+        accept=GEOJSON,
+        suffix=".geojson",
+        progress=client.progress,
+    )
+    return Download(spec=client.layer, files=(file,))
+
+
+def _field_types(address: str, client: Client) -> Mapping[str, str]:
+    """Return the fields of a dataset and their types, as its description has them."""
+    try:
+        return client.document(Query(address), _described, accept=("application/json",))
+    except HttpError as error:
+        if error.status != NOT_FOUND:
+            raise
+        msg = (
+            f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
+            f"layer {client.layer.name!r}; look for it at {client.endpoint}/explore and correct "
+            "`dataset` in the catalogue."
+        )
+        raise CatalogError(msg) from error
+
+
+def _described(reply: bytes) -> dict[str, str]:
+    try:
+        content: Any = parse_json(reply)
+        return {field["name"]: field["type"] for field in content["fields"]}
+    except (KeyError, TypeError, ValueError) as error:
+        msg = (
+            "the portal does not describe its dataset as the Explore API v2.1 does; "
+            "check that the address is that of an Opendatasoft portal."
+        )
+        raise SourceError(msg) from error
+
+
+def _query(client: Client, types: Mapping[str, str], area: Area | None) -> dict[str, str | float]:
+    """Return the parameters of an export."""
+    layer = client.layer
+    places = [name for name, kind in types.items() if kind in {POINT, SHAPE}]
+    query: dict[str, str | float] = {"limit": -1}
+    conditions = [layer.server_where] if layer.server_where else []
+    if area is not None:
+        points = [name for name in places if types[name] == POINT] or places
+        if not points:
+            msg = (
+                f"dataset {layer.dataset!r} of layer {layer.name!r} has no positions to cut an "
+                "area out of."
+            )
+            raise CatalogError(msg)
+        conditions.append(_inside(area, find_field(POINT, layer, points) or points[0]))
+    if conditions:
+        query["where"] = " and ".join(f"({condition})" for condition in conditions)
+    fields = client.fields(list(types))
+    if fields:
+        query["select"] = ",".join(dict.fromkeys([*fields, *places]))
+    return query
+
+
+def _inside(area: Area, field: str) -> str:
+    """Return the condition that a position is in an area, in the portal's language (ODSQL)."""
+    west, south, east, north = area.bounds
+    if area.polygon.equals(shapely.box(west, south, east, north)):
+        return f"in_bbox({field}, {south:.7f}, {west:.7f}, {north:.7f}, {east:.7f})"
+    return f"intersects({field}, geom'{_outline(area.polygon)}')"
+
+
+def _outline(polygon: BaseGeometry) -> str:
+    """Return an outline as text, short enough for an address and never smaller than it was."""
+    text: str = shapely.to_wkt(polygon, rounding_precision=7)
+    room = 1e-5  # degrees: about a metre
+    while len(text) > LONGEST_OUTLINE:
+        # What is cut off is never wider than what was added, whose round corners are cut a little.
+        polygon = polygon.buffer(1.1 * room, quad_segs=2).simplify(room)
+        text = shapely.to_wkt(polygon, rounding_precision=7)
+        room *= 2
+    return text
+
+
+def _require_whole(path: Path) -> None:
+    """Refuse a file that does not begin and end as GeoJSON does."""
+    with path.open("rb") as stream:
+        begin = stream.read(16).lstrip()
+        stream.seek(max(0, path.stat().st_size - 16))
+        end = stream.read().rstrip()
+    if not (begin.startswith(b"{") and end.endswith(b"}")):
+        msg = "what the portal sent is not whole geojson; try again later."
+        raise SourceError(msg)

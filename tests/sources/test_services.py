@@ -1,0 +1,216 @@
+"""Services that send pages, each played by a stand-in on this machine."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import shapely
+from sentences import refused
+from servers import Answer
+from stand_ins import PLACES, STAND_INS, ArcGIS, sent
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.area import Area
+from semsig_gis.sources.catalog import LayerSpec
+from semsig_gis.sources.http.fetch import HttpError
+from semsig_gis.sources.services.layers import read_layers
+from semsig_gis.sources.services.pages import PagingError, fetch_layers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from servers import Server
+    from stand_ins import StandIn
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources.http.fetch import HttpSpec
+    from semsig_gis.sources.services.layers import Download
+
+    Fetch = Callable[..., Download]
+
+LAMPS = LayerSpec(name="lamps", class_name="street_light", id_field="objectid")
+NEAR = Area(shapely.box(2.355, 48.8, 2.385, 48.9), "a box")
+
+
+@pytest.fixture(params=STAND_INS, ids=lambda kind: kind.__name__)
+def service(request: pytest.FixtureRequest, server: Server) -> StandIn:
+    stand_in: StandIn = request.param(server)
+    return stand_in
+
+
+@pytest.fixture
+def fetched(cache: Cache, quick: HttpSpec) -> Fetch:
+    """Fetch the layer of a stand-in."""
+
+    def call(service: StandIn, layer: LayerSpec = LAMPS, **options: Any) -> Download:  # noqa: ANN401
+        layer = replace(layer, dataset=layer.dataset or service.dataset)
+        given = {"endpoints": [service.endpoint], "cache": cache, "spec": quick, **options}
+        (download,) = fetch_layers(service.reader, [layer], **given)
+        return download
+
+    return call
+
+
+def ids(layer: RawLayer) -> list[str]:
+    texts: list[str] = layer.table["source_id"].tolist()
+    return texts
+
+
+def xy(layer: RawLayer) -> list[tuple[float, float]]:
+    return [(x, y) for x, y in shapely.get_coordinates(layer.table.geometry.array).round(9)]
+
+
+def test_pages_are_one_layer_and_kept(service: StandIn, fetched: Fetch, quick: HttpSpec) -> None:
+    steps: list[tuple[int, int]] = []
+    download = fetched(service, progress=lambda done, total: steps.append((done, total)))
+    layer = download.read()
+    assert (ids(layer), xy(layer)) == (["11", "12", "13", "14", "15"], PLACES)
+    assert (layer.table.crs, layer.errors, layer.notes) == ("EPSG:4326", (), ())
+    assert len(download.files) == len(service.pages_asked()) == 3
+    assert steps == [(2, 5), (4, 5), (5, 5)]
+    asked = len(service.server.seen)
+    again = fetched(service, spec=replace(quick, offline=True))
+    assert len(service.server.seen) == asked
+    assert ids(again.read()) == ids(layer)
+
+
+def test_the_service_cuts_out_the_area(service: StandIn, fetched: Fetch) -> None:
+    layer = fetched(service, area=NEAR).read()
+    assert (ids(layer), layer.counts.read) == (["12", "13", "14"], 3)
+    nowhere = Area(shapely.box(7.0, 48.0, 7.1, 48.1), "elsewhere")
+    layer = fetched(service, area=nowhere).read()  # which is no fault, and has all fields
+    assert (layer.counts.read, layer.notes) == (0, ("the layer has no rows",))
+
+
+def test_an_interrupted_run_goes_on_where_it_ended(service: StandIn, fetched: Fetch) -> None:
+    service.whole = 2
+    with refused(HttpError, "layer 'lamps'", "503", "try again later"):
+        fetched(service)
+    service.whole = None
+    before = len(service.pages_asked())
+    assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
+    assert len(service.pages_asked()) == before + 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ({"circles": True}, ["sends the same page again after 2 rows"]),
+        ({"surplus": 1}, ["sends 5 rows where it tells of 6"]),
+        ({"surplus": -1}, ["sends 5 rows where it tells of 4"]),
+    ],
+)
+def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(
+    service: StandIn, fetched: Fetch, *, fault: dict[str, Any], words: list[str]
+) -> None:
+    for name, value in fault.items():
+        setattr(service, name, value)
+    with refused(PagingError, "layer 'lamps'", "127.0.0.1", "run it again", *words):
+        fetched(service)
+    for name, value in fault.items():
+        setattr(service, name, type(value)())
+    assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
+
+
+@pytest.mark.parametrize(
+    ("page", "error", "words"),
+    [
+        (Answer(b"<!DOCTYPE html><html></html>", type="text/html"), SourceError, ["address"]),
+        (Answer(b'{"features": [{"type"'), HttpError, ["layer 'lamps'", "not whole", "3 times"]),
+        (Answer(b"{}"), SourceError, ["address"]),
+        (Answer(b"[1]"), SourceError, ["address"]),
+        (Answer(b'{"message": "Log in."}', status=403), HttpError, ["403", "(Log in)"]),
+    ],
+)
+def test_what_is_no_page_is_told(
+    service: StandIn, fetched: Fetch, *, page: Answer, error: type[Exception], words: list[str]
+) -> None:
+    service.page = page
+    with refused(error, *words):
+        fetched(service)
+
+
+def test_a_wrong_dataset_is_named_with_those_there_are(service: StandIn, fetched: Fetch) -> None:
+    with refused(CatalogError, "'lamps'", "`dataset`", "127.0.0.1", *service.others):
+        fetched(service, replace(LAMPS, dataset=service.wrong))
+
+
+def test_only_the_fields_that_are_used_are_asked_for(service: StandIn, fetched: Fetch) -> None:
+    layer = replace(LAMPS, select=("Note",), where=(("kind", ("lamp",)),))
+    found = fetched(service, layer).read()
+    assert ids(found) == ["11", "13", "15"]
+    assert found.counts.filtered == 2
+    with refused(CatalogError, "'noot'", "select", "'NOTE'"):
+        fetched(service, replace(LAMPS, select=("noot",)))
+
+
+# --- ArcGIS -----------------------------------------------------------------------------------
+
+
+def test_arcgis_filters_and_says_whom_to_name(server: Server, fetched: Fetch) -> None:
+    service = ArcGIS(server)
+    layer = fetched(service, replace(LAMPS, server_where="KIND='lamp'")).read()
+    assert ids(layer) == ["11", "13", "15"]
+    assert layer.spec.terms == "City of Somewhere (unknown)"
+    ours = replace(LAMPS, license="CC0", attribution="Us")
+    assert fetched(service, ours).read().spec.terms == "Us (CC0)"
+    with refused(HttpError, "layer 'lamps'", "Invalid query parameters", "'where' clause is"):
+        fetched(service, replace(LAMPS, server_where="KIND=lamp"))
+
+
+def test_an_old_arcgis_server_sends_its_own_json(server: Server, fetched: Fetch) -> None:
+    service = ArcGIS(server)
+    service.geojson = False
+    layer = fetched(service).read()
+    assert (ids(layer), xy(layer)) == (["11", "12", "13", "14", "15"], PLACES)
+
+
+def test_an_arcgis_server_without_pages_sends_what_fits_in_one(
+    server: Server, fetched: Fetch
+) -> None:
+    service = ArcGIS(server)
+    service.paging = False
+    with refused(SourceError, "'lamps'", "sends 2 rows at most", "smaller area"):
+        fetched(service)
+    few = Area(shapely.box(2.355, 48.8, 2.375, 48.9), "a box")
+    assert ids(fetched(service, area=few).read()) == ["12", "13"]
+
+
+@pytest.mark.parametrize(
+    ("geometry", "text"),
+    [
+        ({"x": 1, "y": 2, "z": 3}, "POINT (1 2)"),
+        ({"x": "NaN", "y": None}, None),
+        ({"points": [[1, 2], [3, 4]]}, "MULTIPOINT (1 2, 3 4)"),
+        ({"paths": [[[0, 0], [1, 1, 5]]]}, "MULTILINESTRING ((0 0, 1 1))"),
+        (
+            {"rings": [[[0, 0], [0, 4], [4, 4], [0, 0]], [[1, 2], [1, 3], [2, 3], [1, 2]]]},
+            "POLYGON ((0 0, 0 4, 4 4, 0 0), (1 2, 2 3, 1 3, 1 2))",
+        ),
+        ({"rings": []}, None),
+    ],
+)
+def test_geometries_of_esri(tmp_path: Path, geometry: dict[str, Any], text: str | None) -> None:
+    rows = [{"attributes": {"a": 1}, "geometry": geometry}]
+    content = {"spatialReference": {"wkid": 102100, "latestWkid": 3857}, "features": rows}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    (layer,) = read_layers(tmp_path / "a.json", [LayerSpec(name="a", class_name="bench")])
+    assert layer.table.crs == "EPSG:3857"
+    (found,) = layer.table.geometry
+    assert (found is None) == (text is None)
+    assert text is None or found.equals(shapely.from_wkt(text))
+
+
+def test_arcgis_errors_come_with_status_200(server: Server, fetched: Fetch) -> None:
+    service = ArcGIS(server)
+    path = "/arcgis/rest/services/Parks/FeatureServer"
+    server.on(path, sent({"error": {"code": 400, "message": "Invalid URL", "details": []}}))
+    with refused(HttpError, "'lamps'", "the error Invalid URL", "`dataset`"):
+        fetched(service, replace(LAMPS, dataset="Parks/FeatureServer/0"))
+    with refused(CatalogError, "'lamps'", "'Parks'", "FeatureServer/LAYER"):
+        fetched(service, replace(LAMPS, dataset="Parks"))

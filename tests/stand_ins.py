@@ -1,0 +1,191 @@
+"""Services that run on this machine: each answers as its protocol says, and errs where told to."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from servers import Answer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from servers import Seen, Server
+
+Row = dict[str, Any]
+FIELDS = ("OBJECTID", "KIND", "NOTE")
+# Five rows, of which three are lamps; nobody has ever written a note.
+ROWS: list[Row] = [
+    {"OBJECTID": number, "KIND": kind, "NOTE": None, "xy": xy}
+    for number, kind, xy in [
+        (11, "lamp", (2.35, 48.85)),
+        (12, "bench", (2.36, 48.86)),
+        (13, "lamp", (2.37, 48.87)),
+        (14, "bench", (2.38, 48.88)),
+        (15, "lamp", (2.39, 48.89)),
+    ]
+]
+PLACES = [row["xy"] for row in ROWS]
+
+
+def sent(content: object, **options: Any) -> Answer:  # noqa: ANN401
+    """Return an answer of JSON."""
+    return Answer(json.dumps(content).encode(), **options)
+
+
+def properties(row: Row, fields: Sequence[str] = FIELDS) -> Row:
+    """Return the fields of a row."""
+    return {name: row[name] for name in fields}
+
+
+def features(rows: Sequence[Row], fields: Sequence[str] = FIELDS) -> list[dict[str, Any]]:
+    """Return rows as GeoJSON."""
+    return [
+        {
+            "type": "Feature",
+            "id": row["OBJECTID"],
+            "geometry": {"type": "Point", "coordinates": list(row["xy"])},
+            "properties": properties(row, fields),
+        }
+        for row in rows
+    ]
+
+
+class StandIn:
+    """A service with one layer, whose pages have two rows.
+
+    It tells of `surplus` more rows than it has, sends its first page for ever where it `circles`,
+    `page` in the place of a page, if that is an answer, and fails after `whole` pages.
+    """
+
+    reader = ""
+    dataset = ""
+    wrong = ""
+    # What a wrong `dataset` is answered with.
+    others: tuple[str, ...] = ()
+    limit = 2
+
+    def __init__(self, server: Server) -> None:
+        self.server = server
+        self.surplus = 0
+        self.circles = False
+        self.page: Answer | None = None
+        self.whole: int | None = None
+        self.rows = ROWS
+        self.start()
+
+    @property
+    def endpoint(self) -> str:
+        return self.server.url
+
+    def start(self) -> None:
+        raise NotImplementedError
+
+    def failure(self) -> Answer | None:
+        """Return what is sent in the place of the page that is asked for, if anything."""
+        if self.whole is not None and len(self.pages_asked()) > self.whole:
+            return Answer(status=503)
+        return self.page
+
+    def part(self, rows: Sequence[Row], start: object, count: object) -> Sequence[Row]:
+        begin = 0 if self.circles else int(str(start))
+        return rows[begin : begin + min(int(str(count)), self.limit)]
+
+    def inside(self, west: float, south: float, east: float, north: float) -> list[Row]:
+        return [
+            row
+            for row in self.rows
+            if west <= row["xy"][0] <= east and south <= row["xy"][1] <= north
+        ]
+
+    def pages_asked(self) -> list[Seen]:
+        """Return the requests for pages, in order."""
+        return [seen for seen in self.server.seen if self.is_page(seen)]
+
+    def is_page(self, seen: Seen) -> bool:
+        raise NotImplementedError
+
+
+class ArcGIS(StandIn):
+    reader = "arcgis"
+    dataset = "Street/FeatureServer/Lamps"
+    wrong = "Street/FeatureServer/Lampposts"
+    others = ("0 (Lamps)", "3 (Kerbs)")
+    geojson = True
+    paging = True
+
+    def start(self) -> None:
+        path = "/arcgis/rest/services/Street/FeatureServer"
+        layers = [{"id": 0, "name": "Lamps"}, {"id": 3, "name": "Kerbs"}]
+        self.server.on(path, sent({"layers": layers, "tables": []}, type="text/plain"))
+        self.server.on(f"{path}/0", self.described)
+        self.server.on(f"{path}/0/query", self.query)
+
+    @property
+    def endpoint(self) -> str:
+        return f"{self.server.url}/arcgis/rest/services/"
+
+    def described(self, seen: Seen) -> Answer:
+        assert seen.query == {"f": "json"}
+        return sent(
+            {
+                "id": 0,
+                "name": "Lamps",
+                "type": "Feature Layer",
+                "geometryType": "esriGeometryPoint",
+                "copyrightText": "City of  Somewhere",
+                "maxRecordCount": self.limit,
+                "supportedQueryFormats": "JSON, geoJSON, PBF" if self.geojson else "JSON",
+                "advancedQueryCapabilities": {"supportsPagination": self.paging},
+                "objectIdField": "OBJECTID",
+                "fields": [{"name": name, "type": "esriFieldTypeString"} for name in FIELDS],
+            }
+        )
+
+    def is_page(self, seen: Seen) -> bool:
+        return seen.path.endswith("/query") and "returnCountOnly" not in seen.query
+
+    def query(self, seen: Seen) -> Answer:
+        asked = seen.query
+        assert asked["outSR"] == "4326"
+        rows: Sequence[Row] = self.rows
+        if "geometry" in asked:
+            assert asked["geometryType"] == "esriGeometryEnvelope"
+            assert (asked["inSR"], asked["spatialRel"]) == ("4326", "esriSpatialRelIntersects")
+            west, south, east, north = map(float, asked["geometry"].split(","))
+            rows = self.inside(west, south, east, north)
+        if asked["where"] == "KIND='lamp'":
+            rows = [row for row in rows if row["KIND"] == "lamp"]
+        elif asked["where"] != "1=1":
+            details = ["'where' clause is invalid"]
+            message = "Cannot perform query. Invalid query parameters."
+            return sent({"error": {"code": 400, "message": message, "details": details}})
+        if asked.get("returnCountOnly") == "true":
+            return sent({"count": len(rows) + self.surplus})
+        if (failure := self.failure()) is not None:
+            return failure
+        if self.paging:
+            assert asked["orderByFields"] == "OBJECTID"
+        start, count = asked.get("resultOffset", 0), asked.get("resultRecordCount", self.limit)
+        some = self.part(rows, start, count)
+        more = self.circles or int(start) + len(some) < len(rows)
+        names = FIELDS if asked["outFields"] == "*" else asked["outFields"].split(",")
+        if asked["f"] == "geojson":
+            beside = {"properties": {"exceededTransferLimit": True}} if more else {}
+            found = {"type": "FeatureCollection", "features": features(some, names), **beside}
+            return sent(found, type="application/geo+json")
+        found = {
+            "geometryType": "esriGeometryPoint",
+            "spatialReference": {"wkid": 4326, "latestWkid": 4326},
+            "features": [
+                {
+                    "attributes": properties(row, names),
+                    "geometry": dict(zip("xy", row["xy"], strict=True)),
+                }
+                for row in some
+            ],
+        }
+        return sent(found | ({"exceededTransferLimit": True} if more else {}))
+
+
+STAND_INS = (ArcGIS,)
