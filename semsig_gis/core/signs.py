@@ -186,11 +186,11 @@ CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#00441b", 0.9: "#41ab5d",
 
 VERDICTS: Mapping[str, str] = MappingProxyType(
     {
-        "matched": "#12b886",
-        "misnamed": "#e64980",
+        "matched": "#37de7f",
+        "misnamed": "#b15a9f",
         "missed": "#ffffff",
-        "false": "#ff5a1f",
-        "outside": "#bdbdbd",
+        "false": "#e66817",
+        "outside": "#bababa",
     }
 )
 """Colour of what became of an object."""
@@ -224,9 +224,9 @@ DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
 """Colour of a cell by what became of it."""
 
 OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
-    {"added": "#3d4a0c", "removed": "#6d1a47", "moved": "#c98a1b", "of another class": "#fdf6e3"}
+    {"added": "#3d4a0c", "removed": "#6d1a47", "moved": "#c98a1b", "of another class": "#1f6a9c"}
 )
-"""Colour of an object by what became of it: that of the cells, but darker."""
+"""Colour of an object by what became of it."""
 
 
 def mixed(values: NDArray[np.float64], ramp: Sequence[str]) -> list[str]:

@@ -11,6 +11,7 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import posterior_map
 from semsig_gis.maps.objects import objects_map
+from semsig_gis.maps.parts import cell_colours
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,7 +66,7 @@ def city_map(
     -------
     folium.Map
         The map. Its layers are in groups: the cells are coloured by one thing at a time, at first
-        by the last of those above, and a click tells of it.
+        by the first of those above, whose legend is open, and a click tells of it.
 
     Raises
     ------
@@ -103,6 +104,9 @@ def city_map(
         msg = "there is nothing to show of the city; give an evaluation, or ambiguity=True."
         raise InputError(msg)
     drawn = parts[0](tiles=tiles)
+    first = [colour for colour in cell_colours(drawn) if colour.show]
     for part in parts[1:]:
         part(map_=drawn)
+    for colour in cell_colours(drawn) if first else ():
+        colour.show = colour in first
     return drawn

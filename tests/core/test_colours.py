@@ -38,6 +38,7 @@ from semsig_gis.core.signs import (
 )
 from semsig_gis.exports.styles import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
 from semsig_gis.maps.parts import OUTLINES, mark_svg
+from semsig_gis.reports import axes, plots, scenes
 
 with warnings.catch_warnings(), np.printoptions():  # which it sets as they were long ago
     warnings.simplefilter("ignore")  # it tells what it lacks, and of its tritanopia
@@ -98,6 +99,7 @@ DARK = np.concatenate(
 )
 SAME, *CHANGES = DRIFT_COLOURS.values()
 FIELD = rgb([*FAILURES.values()])
+RAYS = ("matched", "misnamed", "false")  # the others are thin, grey and dashed on purpose
 # What can lie on what, and next to it.
 PAIRS = {
     "outcomes": (rgb(MARKS[:1]), rgb(MARKS[1:])),
@@ -129,6 +131,12 @@ PAIRS = {
     "answers, outcomes": (rgb(ANSWER_MARKS), rgb(MARKS)),
     "outcomes, cells that are the same": (rgb(MARKS), rgb([SAME])),
     "outcomes in the dark, cells that are the same": (rgb(MARKS), flipped([SAME])),
+    **{
+        f"{one}, {other}": (rgb([table[one]]), rgb([table[other]]))
+        for table in (VERDICTS, OBJECT_COLOURS)
+        for one, other in itertools.combinations(table, 2)
+    },
+    "rays to objects": (rgb([VERDICTS[one] for one in RAYS]), np.concatenate([LIGHT, DARK])),
     "changes": (rgb(CHANGES), rgb([SAME])),
     "changes in the dark": (lifted(CHANGES), flipped([SAME])),
 }
@@ -160,15 +168,43 @@ def test_signs_of_classes_are_told_by_outlines_too(sight: str) -> None:
                 assert distances(rgb([mark, edge]), fill, sight).max() >= APART
 
 
-def test_no_two_meanings_share_a_colour() -> None:
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_signs_of_objects_are_told_from_what_is_below_by_fill_or_edge(sight: str) -> None:
+    light, dark = rgb([SAME, *CHANGES]), np.concatenate([flipped([SAME]), lifted(CHANGES)])
+    for signs, edge, below in (
+        (VERDICTS, "#222222", LIGHT),
+        (VERDICTS, "#e9e9e6", DARK),
+        (OBJECT_COLOURS, "#222222", np.concatenate([LIGHT, light])),
+        (OBJECT_COLOURS, "#e9e9e6", np.concatenate([DARK, dark])),
+    ):
+        near = {
+            name: float(distances(rgb([fill, edge]), below, sight).max(axis=0).min())
+            for name, fill in signs.items()
+        }
+        assert {name: apart for name, apart in near.items() if apart < APART} == {}
+
+
+def meanings() -> list[str]:
+    """Return what the tables of signs draw anything with, but the classes."""
     tables = (
-        *([POINTED], COLOURS, MARKS, ANSWER_MARKS, FAILURES.values()),
+        *([POINTED], MARKS, ANSWER_MARKS, FAILURES.values()),
         *(RANK_RAMP, CANDIDATE_RAMP, FOUND_RAMP, SHADES.values(), CELL_CHANCES.values()),
         *(CHANCES.values(), VERDICTS.values(), GROUP_COLOURS.values(), DRIFT_COLOURS.values()),
         *(OBJECT_COLOURS.values(), [SAME_TYPES, SAME_LEVELS]),
     )
-    counts = Counter(itertools.chain(*tables))
+    return [*itertools.chain(*tables)]
+
+
+def test_no_two_meanings_share_a_colour() -> None:
+    counts = Counter([*meanings(), *COLOURS])
     assert [one for one, count in counts.items() if count > 1] == []
+
+
+def test_the_colours_of_reports_mean_nothing_else() -> None:
+    # Their curves and the classes, which no picture has together, are both many things of a kind.
+    inks = (plots.INK, plots.GROUND, plots.AXIS, plots.TICK, plots.GRID, plots.SOFT)
+    drawn = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.GROUND}
+    assert drawn & {*meanings()} == set()
 
 
 def test_web_and_qgis_draw_from_the_same_tables() -> None:

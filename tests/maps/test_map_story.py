@@ -8,6 +8,7 @@ from map_pages import IMAGES
 from small_city import chances_of, small_city, small_evaluation, small_location
 
 from semsig_gis.maps.cells import Cells, ambiguity_map, identifiability_map
+from semsig_gis.maps.city import city_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import location_map
@@ -70,6 +71,14 @@ def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
     assert checked(page) == ["Regions of 50, 90 and 99 %"]
     page.ask("shown((one) => one.getLayers?.().length === 2)[0].remove().addTo(map)")
     assert checked(page) == ["Regions of 50, 90 and 99 %"]
+
+
+def test_what_is_asked_for_first_is_seen_first(page: MapPage) -> None:
+    page.open(city_map(CITY, evaluation=EVALUATION, ambiguity=True, newer=CITY.select(slice(900))))
+    assert [one.text.splitlines()[0] for one in page.all(".semsig-legend[open]")] == [
+        "Localization errors"
+    ]
+    assert checked(page) == ["Share of queries that fail"]
 
 
 def test_a_click_tells_of_what_is_coloured(page: MapPage) -> None:

@@ -226,7 +226,8 @@ semsig.suggest = (session) => {
           semsig.rename(session, one.class);
           semsig.showScene(session);
         });
-        semsig.button(line, "No, or not in sight", () => ask(others));
+        if (others.length) semsig.button(line, "No, ask another", () => ask(others));
+        semsig.text(line, "small", "What could be seen and is not marked counts as not there.");
       };
       ask(offers);
     }, 400);
