@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from servers import Answer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from servers import Seen, Server
 
@@ -64,6 +65,8 @@ class StandIn:
     # What a wrong `dataset` is answered with.
     others: tuple[str, ...] = ()
     limit = 2
+    # The begin of a page.
+    half = b'{"features": [{"type"'
 
     def __init__(self, server: Server) -> None:
         self.server = server
@@ -188,4 +191,139 @@ class ArcGIS(StandIn):
         return sent(found | ({"exceededTransferLimit": True} if more else {}))
 
 
-STAND_INS = (ArcGIS,)
+WFS_NAMES = (
+    'xmlns:wfs="http://www.opengis.net/wfs/2.0" xmlns:gml="http://www.opengis.net/gml/3.2" '
+    'xmlns:ows="http://www.opengis.net/ows/1.1" xmlns:city="http://city.example"'
+)
+EXCEPTION = (
+    '<?xml version="1.0" encoding="UTF-8"?><ows:ExceptionReport version="2.0.0" '
+    'xmlns:ows="http://www.opengis.net/ows/1.1"><ows:Exception exceptionCode="{}">'
+    "<ows:ExceptionText>{}</ows:ExceptionText></ows:Exception></ows:ExceptionReport>"
+)
+
+
+class Wfs(StandIn):
+    """Its GeoJSON has x first; of what is named by a URN, latitude is first."""
+
+    reader = "wfs"
+    dataset = "lamps"
+    wrong = "city:lampposts"
+    others = ("city:lamps", "city:kerbs")
+    formats: tuple[str, ...] = ("text/xml; subtype=gml/3.2", "application/json")
+    constraints: tuple[tuple[str, str], ...] = (("CountDefault", "2"),)
+    turned = False
+
+    def start(self) -> None:
+        self.server.on("/wfs", self.answer)
+
+    @property
+    def endpoint(self) -> str:
+        return f"{self.server.url}/wfs"
+
+    def is_page(self, seen: Seen) -> bool:
+        query = seen.query
+        return query.get("request") == "GetFeature" and query.get("resultType") != "hits"
+
+    def answer(self, seen: Seen) -> Answer:
+        asked = seen.query
+        assert (asked["service"], asked["version"]) == ("WFS", "2.0.0")
+        if asked["request"] == "GetCapabilities":
+            return self.capabilities()
+        if asked["typeNames"] != "city:lamps":
+            return self.refusal("InvalidParameterValue", "Feature type unknown.")
+        if asked["request"] == "DescribeFeatureType":
+            return self.schema()
+        rows = self.found(asked)
+        return rows if isinstance(rows, Answer) else self.get_features(asked, rows)
+
+    def get_features(self, asked: Mapping[str, str], rows: Sequence[Row]) -> Answer:
+        told = str(len(rows) + self.surplus)
+        if asked.get("resultType") == "hits":
+            return self.collection((), told)
+        if (failure := self.failure()) is not None:
+            return failure
+        names = asked.get("propertyName", f"geom,{','.join(FIELDS)}").split(",")
+        assert "geom" in names
+        if self.constraints and "startIndex" in asked and asked.get("sortBy") != "OBJECTID":
+            return self.refusal("NoApplicableCode", "Cannot do natural order. Add a key.")
+        some = self.part(rows, asked.get("startIndex", 0), asked.get("count", len(rows)))
+        if asked.get("outputFormat") == "application/json":
+            assert asked["srsName"] == "EPSG:4326"
+            crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}
+            listed = features(some, [name for name in names if name != "geom"])
+            for item in listed if self.turned else ():
+                item["geometry"]["coordinates"].reverse()
+            return sent({"type": "FeatureCollection", "features": listed, "crs": crs})
+        return self.collection(some, told)
+
+    def found(self, asked: Mapping[str, str]) -> Sequence[Row] | Answer:
+        if "filter" in asked:
+            corners = re.findall(r"Corner>([^\s<]+) ([^\s<]+)</", asked["filter"])
+            (south, west), (north, east) = corners or [("-90", "-180"), ("90", "180")]
+            if "<fes:Literal>lamp</fes:Literal>" not in asked["filter"]:
+                return self.refusal("OperationParsingFailed", "No such property.")
+            rows = self.inside(*map(float, (west, south, east, north)))
+            return [row for row in rows if row["KIND"] == "lamp"]
+        if "bbox" not in asked:
+            return self.rows
+        south, west, north, east, crs = asked["bbox"].split(",")
+        assert crs == "urn:ogc:def:crs:EPSG::4326"
+        return self.inside(*map(float, (west, south, east, north)))
+
+    @staticmethod
+    def refusal(code: str, text: str) -> Answer:
+        return Answer(EXCEPTION.format(code, text).encode(), type="text/xml", status=400)
+
+    def capabilities(self) -> Answer:
+        values = "".join(f"<ows:Value>{text}</ows:Value>" for text in self.formats)
+        constraints = "".join(
+            f'<ows:Constraint name="{name}"><ows:NoValues/>'
+            f"<ows:DefaultValue>{value}</ows:DefaultValue></ows:Constraint>"
+            for name, value in self.constraints
+        )
+        text = f"""<?xml version="1.0" encoding="UTF-8"?>
+            <wfs:WFS_Capabilities version="2.0.0" {WFS_NAMES}>
+            <ows:ServiceIdentification><ows:Fees>none</ows:Fees>
+            <ows:AccessConstraints>CC BY 4.0</ows:AccessConstraints></ows:ServiceIdentification>
+            <ows:ServiceProvider><ows:ProviderName>City of Somewhere</ows:ProviderName>
+            </ows:ServiceProvider><ows:OperationsMetadata><ows:Operation name="GetFeature">
+            <ows:Parameter name="outputFormat"><ows:AllowedValues>{values}</ows:AllowedValues>
+            </ows:Parameter></ows:Operation>{constraints}</ows:OperationsMetadata>
+            <wfs:FeatureTypeList><wfs:FeatureType><wfs:Name>city:lamps</wfs:Name></wfs:FeatureType>
+            <wfs:FeatureType><wfs:Name>city:kerbs</wfs:Name></wfs:FeatureType>
+            </wfs:FeatureTypeList></wfs:WFS_Capabilities>"""
+        return Answer(text.encode(), type="application/xml")
+
+    @staticmethod
+    def schema() -> Answer:
+        names = "".join(f'<xsd:element name="{name}" type="xsd:string"/>' for name in FIELDS)
+        text = f"""<xsd:schema xmlns:xsd="http://www.w3.org/2001/XMLSchema">
+            <xsd:complexType name="lampsType"><xsd:complexContent><xsd:extension><xsd:sequence>
+            <xsd:element name="geom" type="gml:PointPropertyType"/>{names}
+            </xsd:sequence></xsd:extension></xsd:complexContent></xsd:complexType>
+            <xsd:element name="lamps" type="city:lampsType"/></xsd:schema>"""
+        return Answer(text.encode(), type="text/xml")
+
+    def collection(self, rows: Sequence[Row], told: str) -> Answer:
+        members = "".join(
+            f"""<wfs:member><city:lamps gml:id="lamps.{row["OBJECTID"]}">
+            <city:geom><gml:Point srsName="urn:ogc:def:crs:EPSG::4326">
+            <gml:pos>{row["xy"][1]} {row["xy"][0]}</gml:pos></gml:Point></city:geom>
+            <city:OBJECTID>{row["OBJECTID"]}</city:OBJECTID><city:KIND>{row["KIND"]}</city:KIND>
+            </city:lamps></wfs:member>"""
+            for row in rows
+        )
+        text = f"""<?xml version="1.0" encoding="UTF-8"?><wfs:FeatureCollection {WFS_NAMES}
+            numberMatched="{told}" numberReturned="{len(rows)}">{members}</wfs:FeatureCollection>"""
+        return Answer(text.encode(), type="application/gml+xml; version=3.2")
+
+
+class WfsOfGml(Wfs):
+    """It has no GeoJSON."""
+
+    half = b"<FeatureCollection><member>"
+
+    formats = ("application/gml+xml; version=3.2",)
+
+
+STAND_INS = (ArcGIS, Wfs, WfsOfGml)

@@ -29,6 +29,7 @@ READERS = {
     "overpass": "osm.overpass",
     "overture": "overture",
     "vector_file": "vector",
+    "wfs": "services.layers",
 }
 
 # Those of them that take several files at once, which are extracts of one map, and those that need
@@ -38,7 +39,7 @@ PRUNING = frozenset({"overture"})
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
-    {".bz2", ".csv", ".fgb", ".geojson", ".gpkg", ".gz", ".json",
+    {".bz2", ".csv", ".fgb", ".geojson", ".gml", ".gpkg", ".gz", ".json",
      ".osm", ".parquet", ".pbf", ".shp", ".zip"}
 )  # fmt: skip
 

@@ -10,7 +10,7 @@ import pytest
 import shapely
 from sentences import refused
 from servers import Answer
-from stand_ins import PLACES, STAND_INS, ArcGIS, sent
+from stand_ins import PLACES, STAND_INS, ArcGIS, Wfs, WfsOfGml, sent
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources.area import Area
@@ -102,7 +102,7 @@ def test_an_interrupted_run_goes_on_where_it_ended(service: StandIn, fetched: Fe
     [
         ({"circles": True}, ["sends the same page again after 2 rows"]),
         ({"surplus": 1}, ["sends 5 rows where it tells of 6"]),
-        ({"surplus": -1}, ["sends 5 rows where it tells of 4"]),
+        ({"surplus": -2}, ["sends 4 rows where it tells of 3"]),
     ],
 )
 def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(
@@ -121,7 +121,6 @@ def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(
     ("page", "error", "words"),
     [
         (Answer(b"<!DOCTYPE html><html></html>", type="text/html"), SourceError, ["address"]),
-        (Answer(b'{"features": [{"type"'), HttpError, ["layer 'lamps'", "not whole", "3 times"]),
         (Answer(b"{}"), SourceError, ["address"]),
         (Answer(b"[1]"), SourceError, ["address"]),
         (Answer(b'{"message": "Log in."}', status=403), HttpError, ["403", "(Log in)"]),
@@ -132,6 +131,12 @@ def test_what_is_no_page_is_told(
 ) -> None:
     service.page = page
     with refused(error, *words):
+        fetched(service)
+
+
+def test_half_a_page_is_asked_for_again(service: StandIn, fetched: Fetch) -> None:
+    service.page = Answer(service.half)
+    with refused(HttpError, "layer 'lamps'", "not whole", "3 times"):
         fetched(service)
 
 
@@ -214,3 +219,61 @@ def test_arcgis_errors_come_with_status_200(server: Server, fetched: Fetch) -> N
         fetched(service, replace(LAMPS, dataset="Parks/FeatureServer/0"))
     with refused(CatalogError, "'lamps'", "'Parks'", "FeatureServer/LAYER"):
         fetched(service, replace(LAMPS, dataset="Parks"))
+
+
+# --- WFS --------------------------------------------------------------------------------------
+
+LAMP = (
+    "<fes:PropertyIsEqualTo><fes:ValueReference>KIND</fes:ValueReference>"
+    "<fes:Literal>lamp</fes:Literal></fes:PropertyIsEqualTo>"
+)
+
+
+@pytest.mark.parametrize("kind", [Wfs, WfsOfGml])
+def test_a_wfs_takes_a_filter_beside_the_area(
+    server: Server, fetched: Fetch, kind: type[Wfs]
+) -> None:
+    service = kind(server)
+    lamps = replace(LAMPS, server_where=LAMP)
+    layer = fetched(service, lamps, area=NEAR).read()
+    assert (ids(layer), layer.counts.read) == (["13"], 1)
+    assert ids(fetched(service, lamps).read()) == ["11", "13", "15"]
+    assert layer.spec.terms == "City of Somewhere (CC BY 4.0)"
+    with refused(HttpError, "layer 'lamps'", "400", "(No such property)"):
+        fetched(service, replace(LAMPS, server_where=LAMP.replace("lamp<", "x<")))
+
+
+def test_a_wfs_without_order_is_told(server: Server, fetched: Fetch) -> None:
+    service = Wfs(server)
+    with refused(HttpError, "layer 'lamps'", "(Cannot do natural order, Add a key)"):
+        fetched(service, replace(LAMPS, id_field=None))
+    service.rows = service.rows[:2]  # which fit in one page
+    assert len(fetched(service, replace(LAMPS, id_field=None), area=NEAR).read().table) == 1
+
+
+def test_a_wfs_without_pages_sends_all_at_once(server: Server, fetched: Fetch) -> None:
+    service = WfsOfGml(server)
+    service.limit = 5
+    service.constraints = (("ImplementsResultPaging", "FALSE"), ("ImplementsSorting", "FALSE"))
+    layer = fetched(service, replace(LAMPS, id_field="gml_id")).read()
+    assert ids(layer) == [f"lamps.{number}" for number in range(11, 16)]
+
+
+def test_axes_that_a_wfs_exchanges_are_exchanged_back(server: Server, fetched: Fetch) -> None:
+    service = Wfs(server)
+    service.turned = True
+    layer = fetched(service, area=NEAR).read()
+    assert xy(layer) == PLACES[1:4]
+    assert layer.notes == ("the service sends latitude as x and longitude as y; exchanged here",)
+
+
+def test_what_is_no_wfs_is_told(server: Server, fetched: Fetch) -> None:
+    service = Wfs(server)
+    for answer, words in [
+        (Answer(b"<WMS_Capabilities/>"), ["no Web Feature Service", "WMS_Capabilities"]),
+        (Answer(b"<!DOCTYPE html><html></html>"), ["a web page", "XML"]),
+        (Answer(b"<r version='2'><ServiceException>No.</ServiceException></r>"), ["error No to"]),
+    ]:
+        server.on("/wfs", answer)
+        with refused(SourceError, "127.0.0.1", "/wfs", *words):
+            fetched(service)

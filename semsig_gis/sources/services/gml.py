@@ -77,13 +77,13 @@ def stated_crs(content: bytes) -> tuple[CRS | None, bool]:
 
 def read_feature(
     feature: ET.Element, *, swap: bool
-) -> tuple[dict[str, Any], shapely.Geometry | None]:
-    """Return the fields of a feature and its geometry; BadFeatureError if that is not valid."""
+) -> tuple[dict[str, Any], shapely.Geometry | BadFeatureError | None]:
+    """Return the fields of a feature, and its geometry or what is wrong with it."""
     values: dict[str, Any] = {}
     identifier = next((v for k, v in feature.attrib.items() if k.rpartition("}")[2] == "id"), None)
     if identifier is not None:
         values[GML_ID] = identifier
-    geometry = None
+    geometry: shapely.Geometry | BadFeatureError | None = None
     for item in feature:
         name = local_name(item)
         inner = next(iter(item), None)
@@ -97,13 +97,12 @@ def read_feature(
     return values, geometry
 
 
-def _shape(element: ET.Element, *, swap: bool) -> shapely.Geometry:
+def _shape(element: ET.Element, *, swap: bool) -> shapely.Geometry | BadFeatureError:
     try:
         with np.errstate(invalid="ignore"):
             return _geometry(element, swap=swap)
     except (IndexError, TypeError, ValueError, shapely.errors.ShapelyError) as error:
-        msg = f"its {local_name(element)} is not valid GML ({error})"
-        raise BadFeatureError(msg) from error
+        return BadFeatureError(f"its {local_name(element)} is not valid GML ({error})")
 
 
 def _geometry(element: ET.Element, *, swap: bool) -> shapely.Geometry:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
 import numpy as np
 import shapely
 import shapely.geometry
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.http.cache import Fetched
     from semsig_gis.sources.raw_layer import Position
@@ -110,6 +112,8 @@ class Positions:
     def of(self, record: Record) -> Position:
         """Return the position of a record, or None where it has none."""
         values = record.values
+        if isinstance(record.geometry, BadFeatureError):
+            raise record.geometry
         if self._shape is not None:
             shape = _shape(values.get(self._shape))
             if shape is not None:
@@ -226,12 +230,14 @@ VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
 class Download:
     """What a service sent of a layer: files that are read one after the other as one table.
 
-    `fields` are those that it names, for rows may lack what they have no value for.
+    `fields` are those that it names, for rows may lack what they have no value for; `area` is what
+    it was asked for.
     """
 
     spec: LayerSpec
     files: tuple[Fetched, ...]
     fields: tuple[str, ...] = ()
+    area: Area | None = None
 
     def read(self, *, filters: bool = True) -> RawLayer:
         """Return the layer; SourceError if it cannot be read."""
@@ -248,7 +254,22 @@ class Download:
         whole = dataclasses.replace(table, records=records, rest=0)
         if self.fields:
             whole = dataclasses.replace(whole, fields=self.fields, empty=False)
-        return _read_table(whole, [self.spec], first, filters=filters, crs=None)[0]
+        (layer,) = _read_table(whole, [self.spec], first, filters=filters, crs=None)
+        return layer if self.area is None else _righted(layer, self.area)
+
+
+def _righted(layer: RawLayer, area: Area) -> RawLayer:
+    """Exchange x and y where none of the rows touches the area that was asked for, but then do."""
+    shapes = layer.table.geometry.to_numpy()
+    box = shapely.box(*area.bounds)
+    if layer.table.crs != WGS84 or shapely.intersects(shapes, box).any():
+        return layer
+    turned = shapely.transform(shapes, lambda xy: xy[:, ::-1])
+    if not shapely.intersects(turned, box).any():
+        return layer
+    note = "the service sends latitude as x and longitude as y; exchanged here"
+    table = layer.table.set_geometry(gpd.GeoSeries(turned, layer.table.index, crs=WGS84))
+    return dataclasses.replace(layer, table=table, notes=(*layer.notes, note))
 
 
 def read_layers(

@@ -43,6 +43,7 @@ T = TypeVar("T")
 SERVICES = {
     "arcgis": "arcgis",
     "opendatasoft": "opendatasoft",
+    "wfs": "wfs",
 }
 NAMES_TOLD = 12
 NOT_FOUND = 404
@@ -330,7 +331,8 @@ def fetch_layers(
             continue
         client = Client(layer=layer, endpoints=endpoints, cache=cache, spec=spec, progress=progress)
         try:
-            downloads.append(adapter.fetch_layer(client, area))
+            download = adapter.fetch_layer(client, area)
+            downloads.append(dataclasses.replace(download, area=area))
         except PagingError:
             for file in client.asked:
                 cache.forget(file)

@@ -16,7 +16,7 @@ from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.http.errors import error_text
-from semsig_gis.sources.raw_layer import WGS84, BadFeatureError
+from semsig_gis.sources.raw_layer import WGS84
 from semsig_gis.sources.services.gml import (
     features,
     local_name,
@@ -29,7 +29,6 @@ from semsig_gis.storage.text import parse_json
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
-    from xml.etree import ElementTree as ET
 
     from semsig_gis.sources.csv_file import CsvFile
 
@@ -40,7 +39,7 @@ TOTALS = ("total_count", "nhits", "numberMatched", "totalFeatures", "total")
 
 
 class Record(NamedTuple):
-    """One row: its fields, and the geometry that stands beside them, if any."""
+    """One row: its fields, and the geometry that stands beside them, or what is wrong with it."""
 
     values: Mapping[str, Any]
     geometry: object = None
@@ -190,22 +189,14 @@ def _gml(path: Path) -> Table:
         msg = f"{path} {what}; give GML as a Web Feature Service sends it."
         raise SourceError(msg)
     crs, swap = stated_crs(content)
-    records = [_feature(item, swap=swap) for item in found]
-    good = (record for record in records if isinstance(record, Record))
+    records = [Record(*read_feature(item, swap=swap)) for item in found]
     return Table(
-        fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
+        fields=tuple(dict.fromkeys(name for record in records for name in record.values)),
         records=lambda _: iter(records),
         has_geometry=True,
         crs=None if crs is None else _usual(crs),
         empty=not records,
     )
-
-
-def _feature(item: ET.Element, *, swap: bool) -> Record | str:
-    try:
-        return Record(*read_feature(item, swap=swap))
-    except BadFeatureError as error:
-        return str(error)
 
 
 def _csv(path: Path) -> Table:

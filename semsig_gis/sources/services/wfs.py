@@ -1,0 +1,199 @@
+"""Layers of Web Feature Services (OGC WFS 2.0), as GeoJSON or, where there is none, as GML."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
+
+from semsig_gis.core.errors import SourceError
+from semsig_gis.sources.http.fetch import host_of
+from semsig_gis.sources.services.gml import GML_ID, features, local_name
+from semsig_gis.sources.services.layers import Download, find_field
+from semsig_gis.sources.services.pages import Page, Query, geojson_page, xml_root
+
+if TYPE_CHECKING:
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.http.cache import Fetched
+    from semsig_gis.sources.services.pages import Client
+
+VERSION = "2.0.0"
+PAGE_ROWS = 5_000
+# Of these, GML has latitude first, and GeoJSON as asked for by its short name has longitude first.
+URN, SHORT = "urn:ogc:def:crs:EPSG::4326", "EPSG:4326"
+JSON_FORMATS = ("application/geo+json", "application/json", "json", "geojson")
+FILTER = (
+    '<fes:Filter xmlns:fes="http://www.opengis.net/fes/2.0" '
+    'xmlns:gml="http://www.opengis.net/gml/3.2">{}</fes:Filter>'
+)
+BOX = (
+    '<fes:BBOX><gml:Envelope srsName="{}"><gml:lowerCorner>{}</gml:lowerCorner>'
+    "<gml:upperCorner>{}</gml:upperCorner></gml:Envelope></fes:BBOX>"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Capabilities:
+    """What a service says of itself: its types, formats and constraints, and its terms."""
+
+    types: tuple[str, ...]
+    formats: tuple[str, ...]
+    constraints: dict[str, str]
+    terms: str = ""
+    provider: str = ""
+
+    def denies(self, name: str) -> bool:
+        """Tell whether the service says that it lacks something."""
+        return self.constraints.get(name, "").upper() == "FALSE"
+
+
+def fetch_layer(client: Client, area: Area | None) -> Download:
+    """Fetch a feature type, named with or without its prefix, in WGS 84.
+
+    ``server_where`` is a condition in XML (OGC Filter Encoding 2.0). Rows are ordered by the
+    layer's `id_field` where the service can do that.
+    """
+    said = client.document(
+        _query(client, "GetCapabilities"), lambda content: _capabilities(content, client)
+    )
+    name = _type_name(client, said)
+    types = client.document(
+        _query(client, "DescribeFeatureType").also(typeNames=name),
+        lambda content: _field_types(xml_root(content, client.endpoint)),
+    )
+    fields = (*types, GML_ID) if types else ()
+    json_format = next((text for text in said.formats if text.lower() in JSON_FORMATS), None)
+    query = _query(client, "GetFeature").also(typeNames=name, srsName=SHORT if json_format else URN)
+    wanted = client.fields(fields)
+    if wanted:
+        places = (field for field, kind in types.items() if kind.startswith("gml:"))
+        listed = dict.fromkeys([*(field for field in wanted if field != GML_ID), *places])
+        query = query.also(propertyName=",".join(listed))
+    order: dict[str, str | float] = {"outputFormat": json_format} if json_format else {}
+    key = client.layer.id_field and find_field(client.layer.id_field, client.layer, fields)
+    if key and key != GML_ID and not said.denies("ImplementsSorting"):
+        order["sortBy"] = key
+    files: tuple[Fetched, ...] = ()
+    for box in area.boxes if area is not None else (None,):
+        files += _fetch_pages(client, query.also(**_condition(client, box)), said, order)
+    return Download(spec=client.licensed(said.terms, said.provider), files=files, fields=fields)
+
+
+def _query(client: Client, request: str) -> Query:
+    return Query(client.endpoint, {"service": "WFS", "version": VERSION, "request": request})
+
+
+def _capabilities(content: bytes, client: Client) -> _Capabilities:
+    root = xml_root(content, client.endpoint)
+    if local_name(root) != "WFS_Capabilities":
+        msg = (
+            f"{host_of(client.endpoint)} is no Web Feature Service of version 2.0 (it sent "
+            f"{local_name(root)}); check the address {client.endpoint}."
+        )
+        raise SourceError(msg)
+    formats = [
+        value
+        for operation in _named(root, "Operation", "GetFeature")
+        for parameter in _named(operation, "Parameter", "outputFormat")
+        for value in _texts(parameter, "Value")
+    ]
+    constraints = {
+        item.get("name", ""): next(iter(_texts(item, "DefaultValue")), "")
+        for item in root.iter()
+        if local_name(item) == "Constraint"
+    }
+    types = (item for item in root.iter() if local_name(item) == "FeatureType")
+    terms = [text for text in _texts(root, "AccessConstraints") if text.lower() != "none"]
+    return _Capabilities(
+        types=tuple(name for item in types for name in _texts(item, "Name")[:1]),
+        formats=tuple(formats),
+        constraints=constraints,
+        terms=" ".join(terms),
+        provider=" ".join(_texts(root, "ProviderName")),
+    )
+
+
+def _named(element: ET.Element, kind: str, name: str) -> list[ET.Element]:
+    return [
+        item for item in element.iter() if local_name(item) == kind and item.get("name") == name
+    ]
+
+
+def _texts(element: ET.Element, name: str) -> list[str]:
+    texts = ((item.text or "").strip() for item in element.iter() if local_name(item) == name)
+    return [text for text in texts if text]
+
+
+def _type_name(client: Client, said: _Capabilities) -> str:
+    wanted = client.dataset
+    names = [name for name in said.types if wanted in {name, name.rpartition(":")[2]}]
+    if wanted in names:
+        return wanted
+    if len(names) != 1:
+        raise client.unknown(said.types, what="feature type")
+    return names[0]
+
+
+def _field_types(schema: ET.Element) -> dict[str, str]:
+    """Return the properties that a schema describes, and their types."""
+    whole = set(schema)
+    elements = (item for item in schema.iter() if local_name(item) == "element")
+    return {
+        item.get("name", ""): item.get("type", "")
+        for item in elements
+        if item not in whole and "name" in item.attrib
+    }
+
+
+def _condition(
+    client: Client, box: tuple[float, float, float, float] | None
+) -> dict[str, str | float]:
+    """Return the parameters for an area and the layer's filter, of which KVP takes only one."""
+    where = client.layer.server_where
+    if box is None and not where:
+        return {}
+    if box is None:
+        return {"filter": FILTER.format(where)}
+    west, south, east, north = (f"{number:.7f}" for number in box)
+    if not where:
+        return {"bbox": f"{south},{west},{north},{east},{URN}"}
+    inside = BOX.format(URN, f"{south} {west}", f"{north} {east}")
+    return {"filter": FILTER.format(f"<fes:And>{inside}{where}</fes:And>")}
+
+
+def _fetch_pages(
+    client: Client, query: Query, said: _Capabilities, order: dict[str, str | float]
+) -> tuple[Fetched, ...]:
+    """Fetch all rows of a query, as many as the service says that there are."""
+    told = client.document(
+        query.also(resultType="hits"), lambda content: _gml_page(content, client).told
+    )
+    as_json = "outputFormat" in order
+    read = functools.partial(geojson_page if as_json else _gml_page, client=client)
+    suffix = ".json" if as_json else ".gml"
+    query = query.also(**order)
+    if said.denies("ImplementsResultPaging"):
+        return client.pages(query, read, lambda *_: None, told=told, suffix=suffix)
+    most = said.constraints.get("CountDefault", "")
+    count = min(PAGE_ROWS, int(most) if most.isdecimal() and int(most) else PAGE_ROWS)
+
+    def then(page: Page, rows: int) -> Query | None:
+        rest = told is None or rows < told
+        return query.also(count=count, startIndex=rows) if page.rows and rest else None
+
+    # Services that cannot order rows by nature refuse any startIndex.
+    return client.pages(query.also(count=count), read, then, told=told, suffix=suffix)
+
+
+def _gml_page(content: bytes, client: Client) -> Page:
+    root = xml_root(content, client.endpoint)
+    if local_name(root) != "FeatureCollection":
+        msg = (
+            f"{host_of(client.endpoint)} sent {local_name(root)} where features were expected; "
+            f"check the address {client.endpoint}."
+        )
+        raise SourceError(msg)
+    matched = root.get("numberMatched", "")
+    rows = [ET.tostring(item, encoding="unicode") for item in features(root)]
+    return Page(rows, told=int(matched) if matched.isdecimal() else None)

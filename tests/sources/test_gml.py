@@ -1,0 +1,114 @@
+"""Geometries in GML of every version, and the order of their axes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+import shapely
+from sentences import refused
+
+from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.sources.catalog import LayerSpec
+from semsig_gis.sources.services.layers import read_layers
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.sources import RawLayer
+
+GML = """<FeatureCollection xmlns:gml="http://www.opengis.net/gml"><gml:featureMembers><a>
+<gml:boundedBy><gml:Envelope srsName="{0}"><gml:lowerCorner>0 0</gml:lowerCorner></gml:Envelope>
+</gml:boundedBy><n>7</n><empty/><many><one>a</one> <one>b</one></many><shape>{1}</shape></a>
+</gml:featureMembers></FeatureCollection>"""
+POINT = '<gml:Point srsName="{0}"><gml:pos srsDimension="3">2 48 30</gml:pos></gml:Point>'
+RING = "<gml:LinearRing><gml:posList>0 0 0 4 4 4 0 0</gml:posList></gml:LinearRing>"
+HOLE = "<gml:LinearRing><gml:coordinates>1,2 1,3 2,3 1,2</gml:coordinates></gml:LinearRing>"
+PATCH = f"<gml:exterior>{RING}</gml:exterior><gml:interior>{HOLE}</gml:interior>"
+SEGMENT = (
+    '<gml:LineStringSegment><gml:posList srsDimension="3">0 1 9 2 3 9</gml:posList>'
+    "</gml:LineStringSegment>"
+)
+AREA = "POLYGON ((0 0, 0 4, 4 4, 0 0), (1 2, 1 3, 2 3, 1 2))"
+
+
+SURFACE = (
+    f"<gml:Surface><gml:patches><gml:PolygonPatch>{PATCH}</gml:PolygonPatch></gml:patches>"
+    "</gml:Surface>"
+)
+TWO = "".join(f"<gml:Point><gml:pos>{xy}</gml:pos></gml:Point>" for xy in ("1 2", "3 4"))
+REPORT = "<e:ExceptionReport xmlns:e='e'><e:ExceptionText>No.</e:ExceptionText></e:ExceptionReport>"
+SPEC = LayerSpec(name="a", class_name="bench", id_field="n", where=(("many", ("a b",)),))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "a.gml"
+
+
+def read(path: Path, text: str) -> RawLayer:
+    path.write_text(text)
+    (layer,) = read_layers(path, [SPEC])
+    return layer
+
+
+@pytest.mark.parametrize(
+    ("shape", "text"),
+    [
+        (f"<gml:Polygon>{PATCH}</gml:Polygon>", AREA),
+        (
+            f"<gml:MultiSurface><gml:surfaceMember>{SURFACE}</gml:surfaceMember></gml:MultiSurface>",
+            AREA,
+        ),
+        (f"<gml:Curve><gml:segments>{SEGMENT}</gml:segments></gml:Curve>", "LINESTRING (0 1, 2 3)"),
+        (
+            f"<gml:MultiPoint><gml:pointMembers>{TWO}</gml:pointMembers></gml:MultiPoint>",
+            "MULTIPOINT (1 2, 3 4)",
+        ),
+        ("<gml:Polygon><gml:exterior/></gml:Polygon>", None),
+        ("<gml:Point><gml:pos>here</gml:pos></gml:Point>", None),
+        ("<gml:Curve><gml:segments><gml:Arc/></gml:segments></gml:Curve>", None),
+    ],
+)
+def test_geometries(path: Path, shape: str, text: str | None) -> None:
+    layer = read(path, GML.format("EPSG:4326", shape))
+    assert layer.counts.unreadable == (text is None)
+    if text is None:
+        assert "is not valid GML" in layer.errors[0]
+    else:
+        assert layer.table.geometry.tolist() == [shapely.from_wkt(text)]
+        assert layer.table["source_id"].tolist() == ["7"]
+
+
+@pytest.mark.parametrize(
+    ("name", "crs", "turned"),
+    [
+        ("EPSG:4326", "EPSG:4326", False),
+        ("urn:ogc:def:crs:EPSG::4326", "EPSG:4326", True),
+        ("urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4326", False),
+        ("http://www.opengis.net/def/crs/EPSG/0/3879", "EPSG:3879", True),
+        ("http://www.opengis.net/gml/srs/epsg.xml#3879", "EPSG:3879", False),
+        ("urn:ogc:def:crs:EPSG::25833", "EPSG:25833", False),
+    ],
+)
+def test_the_name_of_a_crs_says_which_axis_is_first(
+    path: Path, name: str, crs: str, *, turned: bool
+) -> None:
+    layer = read(path, GML.format(name, POINT.format(name)))
+    assert layer.table.crs == crs
+    assert layer.table.geometry.tolist() == [shapely.Point((48, 2) if turned else (2, 48))]
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        (GML.format("EPSG:99999", POINT), CrsError, ["'EPSG:99999'", "unknown"]),
+        (GML[:90], SourceError, ["a.gml", "not whole GML"]),
+        ("<!DOCTYPE html><html/>", SourceError, ["a.gml", "document type"]),
+        ("<kml/>", SourceError, ["a.gml", "has no features"]),
+        (REPORT, SourceError, ["a.gml", "the error No"]),
+    ],
+)
+def test_what_is_no_gml(path: Path, text: str, error: type[Exception], words: list[str]) -> None:
+    with refused(error, *words):
+        read(path, text)
