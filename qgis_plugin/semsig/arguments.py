@@ -20,7 +20,7 @@ __all__ = [
     "require_likelihood",
 ]
 
-CATALOGS = ("montpellier", "opendata_paris", "openstreetmap", "overture")
+CATALOGS = ("mapillary", "montpellier", "opendata_paris", "openstreetmap", "overture")
 LIKELIHOOD = "likelihood"
 METHODS = (
     LIKELIHOOD,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.sources import overture
+from semsig_gis.sources import mapillary, overture
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
+from semsig_gis.sources.http.secret import Secret
 from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.osm.overpass import find_place
 from semsig_gis.sources.services import pages
@@ -25,7 +27,11 @@ if TYPE_CHECKING:
     from semsig_gis.sources.catalog import Catalog, LayerSpec
 
 # Readers whose service sends an area in parts, each a file.
-TILED: Mapping[str, ModuleType] = {"osm_file": overpass, "overture": overture}
+TILED: Mapping[str, ModuleType] = {
+    "mapillary": mapillary,
+    "osm_file": overpass,
+    "overture": overture,
+}
 
 
 def fetch_layers(
@@ -57,15 +63,16 @@ def fetch_layers(
         Whether the filters of the layers apply.
     progress : callable, optional
         Takes how much has arrived and how much there is, 0 where nobody knows: bytes of a portal's
-        file, rows of a service that sends pages, tiles of OpenStreetMap.
+        file, rows of a service that sends pages, parts of an area.
     tell : callable, optional
         Takes a line about each layer that has arrived: rows, size and date.
 
     Returns
     -------
     tuple of RawLayer
-        The layers, cut to the area. InputError if the catalogue has no service to fetch from,
-        SourceError if a service refuses, fails, or sends something else.
+        The layers, cut to the area. InputError if the catalogue has no service to fetch from, or
+        the access token that it wants is not in the environment, SourceError if a service refuses,
+        fails, or sends something else.
 
     Examples
     --------
@@ -85,6 +92,8 @@ def fetch_layers(
         )
         raise InputError(msg)
     layers: list[RawLayer] = []
+    if catalog.token is not None and not http.offline:
+        http = replace(http, secret=Secret.of_environment(catalog.token))
     service = TILED.get(catalog.reader)
     if service is not None:
         tiles = service.fetch_layers(

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # The module of this package that reads what a catalogue's `reader` names.
 READERS = {
     "arcgis": "services.layers",
+    "mapillary": "mapillary",
     "opendatasoft": "services.layers",
     "osm_file": "osm.file",
     "overpass": "osm.overpass",
@@ -34,7 +35,7 @@ READERS = {
 
 # Those of them that take several files at once, which are extracts of one map, and those that need
 # not read what is outside an `area`.
-MERGING = frozenset({"osm_file", "overture"})
+MERGING = frozenset({"mapillary", "osm_file", "overture"})
 PRUNING = frozenset({"overture"})
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.

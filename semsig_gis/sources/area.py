@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -31,6 +32,7 @@ T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
 # How a user asks for the box that a file says it covers.
 BOX = "box"
 METRES_A_DEGREE = 111_195.0  # of latitude
+MOST_TILES = 10_000
 POLYGONAL = {"Polygon", "MultiPolygon"}
 
 
@@ -57,6 +59,51 @@ class Area:
             return (self.bounds,)
         sides = (shapely.total_bounds(parts[side]).tolist() for side in (eastern, ~eastern))
         return tuple((west, south, east, north) for west, south, east, north in sides)
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A box of an area that is asked for in parts, and how often it was split."""
+
+    bounds: tuple[float, float, float, float]
+    splits: int = 0
+
+    def parts(self, columns: int, rows: int, *, splits: int) -> Iterator[Tile]:
+        """Yield a grid of tiles over this one, from the south-west."""
+        west, south, east, north = self.bounds
+        xs = [west + (east - west) * i / columns for i in range(columns + 1)]
+        ys = [south + (north - south) * i / rows for i in range(rows + 1)]
+        for bottom, top in itertools.pairwise(ys):
+            for left, right in itertools.pairwise(xs):
+                yield Tile((left, bottom, right, top), splits)
+
+    def quarters(self, area: Area) -> list[Tile]:
+        """Return those of its four parts that touch an area."""
+        return _touching(area, self.parts(2, 2, splits=self.splits + 1))
+
+
+def tiles_of(area: Area, tile_deg: float, *, remedy: str) -> list[Tile]:
+    """Return tiles of at most so many degrees that touch an area; InputError for too many."""
+    if not tile_deg > 0:
+        msg = f"tile_deg is {tile_deg}; give degrees above 0."
+        raise InputError(msg)
+    shapely.prepare(area.polygon)
+    tiles: list[Tile] = []
+    for west, south, east, north in area.boxes:
+        columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
+        if columns * rows > MOST_TILES:
+            msg = (
+                f"the area takes {columns * rows:,} requests, and at most {MOST_TILES:,} are sent; "
+                f"{remedy}."
+            )
+            raise InputError(msg)
+        grid = Tile((west, south, east, north)).parts(max(1, columns), max(1, rows), splits=0)
+        tiles.extend(_touching(area, grid))
+    return tiles
+
+
+def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:
+    return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
 
 
 def parse_area(text: str) -> Area:

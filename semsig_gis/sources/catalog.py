@@ -396,6 +396,7 @@ CATALOG_KEYS = {
     "metric_crs": str,
     "reader": str,
     "endpoints": list,
+    "token": str,
     "geocoder": str,
     "files": list,
     "not": dict,
@@ -430,6 +431,8 @@ class Catalog(Displayed):
         Reader of `sources` for its files.
     endpoints : tuple of str
         Base addresses of the services that send the data, best first.
+    token : str, optional
+        Environment variable with the access token that they want.
     geocoder : str, optional
         Base address of the Nominatim service that knows places by name.
     conflate : tuple of (str, float)
@@ -454,6 +457,7 @@ class Catalog(Displayed):
     url: str = ""
     reader: str = "vector_file"
     endpoints: tuple[str, ...] = ()
+    token: str | None = None
     geocoder: str | None = None
     conflate: tuple[tuple[str, float], ...] = ()
     license: str = "unknown"

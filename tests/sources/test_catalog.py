@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     Town = Callable[..., Path]
     Snapshot = Callable[[str, str], None]
 
-NAMES = ("montpellier", "opendata_paris", "openstreetmap", "overture")
+NAMES = ("mapillary", "montpellier", "opendata_paris", "openstreetmap", "overture")
 DATA = Path(__file__).with_name("data")
 TOWN = (DATA / "town.toml").read_text(encoding="utf-8")
 

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.sources.http.cache import Cache, Entry
+    from semsig_gis.sources.http.secret import Secret
 
 USER_AGENT = f"semsig_gis/{__version__} (reads open data once, into a cache)"
 MOST_REDIRECTS = 5
@@ -60,6 +61,7 @@ class HttpSpec:
     failure, `backoff_s`, doubles each time; a server that asks for more than `longest_wait_s` is
     not waited for. `max_bytes` holds as sent and as unpacked. `fresh_s` is how long a copy is used
     that the server cannot confirm. `tell` takes a line about what is waited for.
+    `secret` authorizes every request; it is not told, and not in the cache.
     """
 
     deadline_s: float = 600.0
@@ -74,6 +76,7 @@ class HttpSpec:
     offline: bool = False
     sleep: Callable[[float], None] = time.sleep
     tell: Callable[[str], None] = lambda _: None
+    secret: Secret | None = None
 
     def __post_init__(self) -> None:
         """Refuse numbers of attempts below 1, and a deadline that is now."""
@@ -337,6 +340,10 @@ def fetch(
         job = _Job(request, entry, held, spec, accept, suffix, check, progress)
         try:
             return _persist(job, before)
+        except HttpError as error:
+            if spec.secret is None:
+                raise
+            raise HttpError(spec.secret.hide(str(error)), error.status) from None
         except TooLargeError:
             entry.drop_part()
             raise
@@ -435,6 +442,8 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
     headers = job.held.condition if job.held and request.method == "GET" else {}
     if job.accept:
         headers |= {"Accept": ", ".join((*job.accept, ANYTHING))}
+    if spec.secret is not None:
+        have, headers = 0, headers | spec.secret.headers
     if have:
         headers |= {"Range": f"bytes={have}-", "If-Range": begun.if_range}
     with answer_to(session, request, headers, spec) as response:
@@ -457,8 +466,11 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
             raise SourceError(msg)
         if not have:
             entry.start_part(edition)
+        if spec.secret is not None and edition.encoding:
+            msg = f"{host_of(request.url)} sent a packed answer where none was asked for."
+            raise HttpError(msg)
         _receive(response, job, have)
-        url = response.url
+        url = response.url if spec.secret is None else spec.secret.hide(response.url)
     body = entry.scratch(job.suffix)
     try:
         sha256, size = _unpack(entry.part, body, edition.encoding, job)
@@ -494,7 +506,8 @@ def _receive(response: requests.Response, job: _Job, have: int) -> None:
     total = have + int(length) if length.isdecimal() else 0
     _require_room(total, job)
     with job.entry.part.open("ab") as stream:
-        for block in blocks_of(response):
+        blocks = blocks_of(response)
+        for block in blocks if job.spec.secret is None else job.spec.secret.strained(blocks):
             have += len(block)
             _require_room(have, job)
             stream.write(block)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-import itertools
 import json
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +14,7 @@ import numpy as np
 import shapely
 
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.area import Area, join_areas
+from semsig_gis.sources.area import Area, join_areas, tiles_of
 from semsig_gis.sources.conditions import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
@@ -52,7 +50,6 @@ JSON = ("application/json",)
 QUERY_S = 90  # a server gives up a query after so many seconds
 ANSWER_S = 30.0  # for what comes before and after it
 STATUS_S = 10.0
-MOST_TILES = 10_000
 TILE_BYTES = 2**28  # a tile is parsed in memory
 MOST_SPLITS = 4
 TOO_SLOW = 504
@@ -309,21 +306,6 @@ def _quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
-@dataclass(frozen=True, slots=True)
-class _Tile:
-    bounds: tuple[float, float, float, float]
-    splits: int = 0
-
-    def parts(self, columns: int, rows: int, *, splits: int) -> Iterator[_Tile]:
-        """Yield a grid of tiles over this one, from the south-west."""
-        west, south, east, north = self.bounds
-        xs = [west + (east - west) * i / columns for i in range(columns + 1)]
-        ys = [south + (north - south) * i / rows for i in range(rows + 1)]
-        for bottom, top in itertools.pairwise(ys):
-            for left, right in itertools.pairwise(xs):
-                yield _Tile((left, bottom, right, top), splits)
-
-
 def fetch_layers(
     specs: Sequence[LayerSpec],
     *,
@@ -345,41 +327,23 @@ def fetch_layers(
     if not endpoints:
         msg = "there is no Overpass server to ask; name one in endpoints."
         raise InputError(msg)
-    if not tile_deg > 0:
-        msg = f"tile_deg is {tile_deg}; give degrees above 0."
-        raise InputError(msg)
     if not specs:
         return []
     addresses = [address.rstrip("/").removesuffix("/interpreter") for address in endpoints]
     servers = _Servers(addresses, cache, spec)
-    shapely.prepare(area.polygon)
-    waiting: collections.deque[_Tile] = collections.deque()
-    for west, south, east, north in area.boxes:
-        columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
-        if columns * rows > MOST_TILES:
-            msg = (
-                f"the area takes {columns * rows:,} requests, and at most {MOST_TILES:,} are sent; "
-                "give a smaller one, or load an extract of OpenStreetMap."
-            )
-            raise InputError(msg)
-        grid = _Tile((west, south, east, north)).parts(max(1, columns), max(1, rows), splits=0)
-        waiting.extend(_touching(area, grid))
+    remedy = "give a smaller one, or load an extract of OpenStreetMap"
+    waiting = collections.deque(tiles_of(area, tile_deg, remedy=remedy))
     paths: list[Path] = []
     while waiting:
         tile = waiting.popleft()
         path = servers.answer(overpass_query(specs, tile.bounds), last=tile.splits == MOST_SPLITS)
         if path is None:
-            parts = tile.parts(2, 2, splits=tile.splits + 1)
-            waiting.extendleft(reversed(_touching(area, parts)))
+            waiting.extendleft(reversed(tile.quarters(area)))
             continue
         paths.append(path)
         if progress is not None:
             progress(len(paths), len(paths) + len(waiting))
     return paths
-
-
-def _touching(area: Area, tiles: Iterator[_Tile]) -> list[_Tile]:
-    return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
 
 
 class _Servers:

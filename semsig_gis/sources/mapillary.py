@@ -1,0 +1,153 @@
+"""Mapillary: what its cameras saw along the streets, from files or by its Graph API (version 4)."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.errors import SourceError
+from semsig_gis.sources.area import tiles_of
+from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
+from semsig_gis.sources.raw_layer import WGS84, RowRules, Rows, raw_layer, settle_crs
+from semsig_gis.storage.text import parse_json
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from semsig_gis.sources import RawLayer
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources.http.fetch import HttpSpec
+    from semsig_gis.sources.raw_layer import Position
+
+FIELDS = ("id", "object_value", "object_type", "geometry", "first_seen_at", "last_seen_at")
+MOST_FEATURES = 2000  # in an answer, which says nothing of the others
+TILE_DEG = 0.02  # boxes may have 0.01 square degrees, but in a city that is too much
+MOST_SPLITS = 6
+TOO_MUCH = 500  # what the service says of a box that it cannot do in time
+UNAUTHORIZED = frozenset({400, 401, 403})
+
+
+def read_layers(
+    path: str | Path | Sequence[Path],
+    specs: Sequence[LayerSpec],
+    *,
+    filters: bool = True,
+    crs: str | None = None,
+) -> tuple[RawLayer, ...]:
+    """Read layers of JSON files of map features, one for each of `specs`.
+
+    The files are answers of the Graph API, or GeoJSON with the same properties. Features of values
+    that a layer does not want are filtered; those of an id that came before count once. SourceError
+    if a file is neither.
+    """
+    paths = [Path(path)] if isinstance(path, str | Path) else list(path)
+    where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
+    features: dict[str, dict[str, Any]] = {}
+    for file in paths:
+        features.update((str(item.get("id", "")), item) for item in load_features(file))
+    return tuple(_layer(spec, features, where, filters=filters, crs=crs) for spec in specs)
+
+
+def _layer(
+    spec: LayerSpec,
+    features: dict[str, dict[str, Any]],
+    where: str,
+    *,
+    filters: bool,
+    crs: str | None,
+) -> RawLayer:
+    where = f"layer {spec.name!r} ({where})"
+    rules = RowRules(spec, FIELDS, filters=filters, where=where)
+    rows = Rows()
+    for name, feature in features.items():
+        rows.read += 1
+        rows.add([feature.get(field) for field in rules.fields], name, _position(feature))
+    system, notes = settle_crs(WGS84, implicit=False, expected=spec.crs, given=crs, where=where)
+    return raw_layer(rows, rules, system, by_file=True, notes=notes)
+
+
+def _position(feature: dict[str, Any]) -> Position | str:
+    """Return the place of a feature, or what is wrong with it."""
+    try:
+        longitude, latitude = feature["geometry"]["coordinates"][:2]
+        return float(longitude), float(latitude)
+    except (KeyError, TypeError, ValueError):
+        return f"map feature {feature.get('id')} has no position"
+
+
+def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:
+    """Read map features, as an answer has them; SourceError if the file holds none."""
+    try:
+        content = parse_json(path.read_bytes())
+        if "data" in content:
+            features = list(content["data"])
+        else:
+            features = [
+                {**item["properties"], "geometry": item["geometry"]} for item in content["features"]
+            ]
+        if all("object_value" in item for item in features):
+            return features
+    except (AttributeError, KeyError, OSError, TypeError, ValueError):
+        pass
+    msg = f"{where or path} is not what Mapillary sends of map features; get it again."
+    raise SourceError(msg)
+
+
+def fetch_layers(
+    specs: Sequence[LayerSpec],
+    *,
+    endpoints: Sequence[str],
+    area: Area,
+    cache: Cache,
+    spec: HttpSpec = DEFAULT_HTTP,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Fetch the map features of layers in an area, and a little more, as files for `read_layers`.
+
+    Values are asked for as layers say in ``server_where``, such as ``"regulatory--*"``. There are
+    no pages: a full answer, or a box that is too much, is asked for again in quarters. What
+    has come is in the cache, so that a run that was interrupted goes on there. SourceError if the
+    service refuses the token or fails.
+    """
+    host, url = host_of(endpoints[0]), f"{endpoints[0].rstrip('/')}/map_features"
+    values = sorted({v for layer in specs for v in (layer.server_where or "").split(",") if v})
+    common: dict[str, str | float] = {"fields": ",".join(FIELDS), "limit": MOST_FEATURES}
+    if values:
+        common["object_values"] = ",".join(values)
+    few = dataclasses.replace(spec, attempts=min(spec.attempts, 2))
+    waiting = collections.deque(tiles_of(area, TILE_DEG, remedy="give a smaller one"))
+    paths: list[Path] = []
+    while waiting:
+        tile = waiting.popleft()
+        last = tile.splits == MOST_SPLITS
+        try:
+            path = fetch(
+                url,
+                params={**common, "bbox": ",".join(f"{side:.7f}" for side in tile.bounds)},
+                cache=cache,
+                spec=spec if last else few,
+                accept=("application/json", "text/javascript"),
+                check=lambda file: load_features(file, where=f"the answer of {host}"),
+            ).path
+            full = len(load_features(path)) >= MOST_FEATURES
+        except HttpError as error:
+            if error.status in UNAUTHORIZED:
+                msg = f"{error}".rstrip(".") + "; look whether the access token still holds."
+                raise HttpError(msg, error.status) from error
+            if error.status != TOO_MUCH or last:
+                raise
+            full = True
+        if full and last:
+            msg = f"{host} sends no more than {MOST_FEATURES:,} features of even the smallest box."
+            raise SourceError(msg)
+        if full:
+            waiting.extendleft(reversed(tile.quarters(area)))
+            continue
+        paths.append(path)
+        if progress is not None:
+            progress(len(paths), len(paths) + len(waiting))
+    return paths

@@ -1,0 +1,180 @@
+"""Mapillary's map features: files, and a service on this machine that keeps the rules."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from sentences import refused
+from servers import Answer
+
+from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.sources.area import parse_area
+from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.http.fetch import HttpError, HttpSpec
+from semsig_gis.sources.http.secret import Secret
+from semsig_gis.sources.mapillary import MOST_FEATURES, fetch_layers, read_layers
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from servers import Seen, Server
+
+    from semsig_gis.sources.http.cache import Cache
+
+CATALOG = load_catalog("mapillary")
+AREA = parse_area("2.30,48.85,2.31,48.86")
+TOKEN = "MLY|4711|0123456789abcdef"  # noqa: S105 - of nobody
+
+
+def feature(number: int, value: str, x: float = 2.305, y: float = 48.855) -> dict[str, Any]:
+    return {
+        "id": str(number),
+        "object_value": value,
+        "object_type": "point",
+        "geometry": {"type": "Point", "coordinates": [x, y]},
+        "first_seen_at": "2019-05-01T10:00:00+0000",
+        "last_seen_at": "2024-05-01T10:00:00+0000",
+    }
+
+
+VALUES = {
+    "object--street-light": "street_lights",
+    "object--traffic-light--general-upright": "traffic_lights",
+    "regulatory--stop--g1": "signs",
+    "complementary--both-directions--g1": "signs",
+    "object--bench": "benches",
+    "object--fire-hydrant": "fire_hydrants",
+    "object--support--pole": "",
+}
+
+
+@pytest.mark.parametrize("form", ["answer", "geojson"])
+def test_a_value_belongs_to_its_layer(tmp_path: Path, form: str) -> None:
+    features = [feature(number, value) for number, value in enumerate(VALUES)]
+    content: dict[str, Any] = {"data": features}
+    if form == "geojson":
+        parts = [{"geometry": item.pop("geometry"), "properties": item} for item in features]
+        content = {"type": "FeatureCollection", "features": parts}
+    path = tmp_path / "map_features.json"
+    path.write_text(json.dumps(content), "utf-8")
+    layers = read_layers([path, path], CATALOG.layers)  # an id counts once
+    found = {item.spec.name: len(item.table) for item in layers if len(item.table)}
+    names = [name for name in VALUES.values() if name]
+    assert found == {name: names.count(name) for name in names}
+    assert {layer.counts.read for layer in layers} == {len(VALUES)}
+
+
+class Service:
+    """Answers as the Graph API does: by box, at most so many features, a full box is cut off."""
+
+    def __init__(self, features: Sequence[dict[str, Any]]) -> None:
+        self.features = features
+
+    def __call__(self, seen: Seen) -> Answer:
+        if seen.headers.get("authorization") != f"OAuth {TOKEN}":
+            told = {"error": {"message": f"Invalid token {seen.headers.get('authorization')}"}}
+            return Answer(json.dumps(told).encode(), status=401)
+        west, south, east, north = map(float, seen.query["bbox"].split(","))
+        if (east - west) * (north - south) > 0.01:
+            return Answer(b'{"error": {"message": "bbox too large"}}', status=500)
+        inside = [
+            item
+            for item in self.features
+            for x, y in [item["geometry"]["coordinates"]]
+            if west <= x <= east and south <= y <= north
+        ][: int(seen.query["limit"])]
+        # A service that gives the token away all the same, spelt in every way.
+        link = f"https://graph.example/?access_token={TOKEN.replace('|', '%7C')}"
+        body = json.dumps({"data": inside, "paging": {"next": link, "own": TOKEN}})
+        return Answer(body.replace("|0", "\\u007c0").encode())
+
+
+@pytest.fixture
+def crowd() -> list[dict[str, Any]]:
+    """Return more benches than an answer has, half of them in one corner."""
+    corner = [feature(n, "object--bench", 2.3001 + n * 1e-8, 48.8501) for n in range(1500)]
+    return [*corner, *(feature(2000 + n, "object--bench", 2.3099) for n in range(1500))]
+
+
+def texts(folder: Path) -> Iterator[str]:
+    """Yield the names and contents of all files."""
+    for path in folder.rglob("*"):
+        yield str(path)
+        if path.is_file():
+            yield path.read_bytes().decode("latin-1")
+
+
+def test_a_full_box_is_asked_for_in_quarters(
+    server: Server, cache: Cache, crowd: list[dict[str, Any]], slept: list[float]
+) -> None:
+    server.on("/map_features", Service(crowd))
+    told: list[str] = []
+    spec = HttpSpec(timeout=(2, 2), sleep=slept.append, tell=told.append, secret=Secret(TOKEN))
+    benches = [CATALOG.layer("benches"), CATALOG.layer("signs")]
+    options: Any = {"endpoints": [server.url], "area": AREA, "cache": cache}
+    steps: list[tuple[int, int]] = []
+    files = fetch_layers(benches, spec=spec, progress=lambda *s: steps.append(s), **options)
+    assert len(read_layers(files, benches)[0].table) == len(crowd) > MOST_FEATURES
+    assert len(server.seen) == 1 + 4
+    assert steps[-1] == (4, 4)
+    asked = server.seen[0].query
+    assert asked["object_values"].split(",")[:2] == ["complementary--*", "information--*"]
+    assert "access_token" not in asked
+    # Again: all is there, and offline without a token.
+    server.seen.clear()
+    assert fetch_layers(benches, spec=spec, **options) == files
+    assert not server.seen
+    assert fetch_layers(benches, spec=HttpSpec(offline=True), **options) == files
+    # Not in names, files, addresses or lines, however it is spelt.
+    everything = "\n".join([*texts(cache.folder), *told, repr(spec)])
+    assert "paging" in everything
+    assert not any(part in everything for part in TOKEN.split("|")[1:])
+
+
+def test_a_refused_token_is_not_told(server: Server, cache: Cache) -> None:
+    server.on("/map_features", Service([]))
+    spec = HttpSpec(timeout=(2, 2), attempts=1, secret=Secret("MLY|1|other"))
+    words = ("401", "Invalid token OAuth (token)", "access token still holds")
+    with refused(HttpError, *words):
+        fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
+    assert not any("other" in text for text in texts(cache.folder))
+
+
+def test_a_connection_that_is_cut_leaves_no_token(server: Server, cache: Cache) -> None:
+    body = json.dumps({"data": [], "next": TOKEN}).encode()
+    server.on("/map_features", Answer(body, headers={"ETag": '"1"'}, cut=len(body) - 8),
+              Answer(body))  # fmt: skip
+    spec = HttpSpec(timeout=(2, 2), sleep=lambda _: None, secret=Secret(TOKEN))
+    fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
+    assert "range" not in server.seen[1].headers
+    assert not any("0123456789" in text for text in texts(cache.folder))
+
+
+def test_a_token_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MAPILLARY_ACCESS_TOKEN", raising=False)
+    with refused(InputError, "MAPILLARY_ACCESS_TOKEN", "is not set"):
+        Secret.of_environment("MAPILLARY_ACCESS_TOKEN")
+    monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", " MLY|1\n2 ")
+    with pytest.raises(InputError, match=r"^[^|]*MAPILLARY_ACCESS_TOKEN holds blanks[^|]*$"):
+        Secret.of_environment("MAPILLARY_ACCESS_TOKEN")
+    monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", f"{TOKEN}\n")
+    assert Secret.of_environment("MAPILLARY_ACCESS_TOKEN") == Secret(TOKEN)
+
+
+@pytest.mark.parametrize("size", [1, 3, 7, 1000])
+def test_a_token_is_strained_out_of_blocks(size: int) -> None:
+    spelt = ["a/b", r"a\/b", "a%2fb", r"a\u002Fb"]
+    body = "".join(f"<{text}>" for text in spelt).encode()
+    blocks = [body[start : start + size] for start in range(0, len(body), size)]
+    assert b"".join(Secret("a/b").strained(blocks)) == b"<(token)>" * 4
+
+
+def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    for content in ('{"data": [{"id": 1}]}', "[]", '{"features": [1]}', "x"):
+        path.write_text(content, "utf-8")
+        with refused(SourceError, str(path), "not what Mapillary sends"):
+            read_layers(path, CATALOG.layers)
