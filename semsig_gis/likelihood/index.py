@@ -283,11 +283,17 @@ def own_sigma(photo: View, north_sigma: float) -> float:
 
 
 def _turns(north_sigma: float) -> tuple[int, NDArray[np.float64]]:
-    """Return the first turn of a photo, in steps, and the chances of that and the next ones."""
+    """Return the first turn of a photo, in steps, and the chances of that and the next ones.
+
+    Those that fill up the last block of `kernels.scan_turned` have no chance.
+    """
+    from semsig_gis.likelihood.kernels import TURNED_LANES  # noqa: PLC0415 - numba loads slowly
+
     turns = np.arange(-TURNS // 2, TURNS // 2)
     chances = np.exp(-0.5 * (turns * (FULL_TURN / TURNS) / north_sigma) ** 2)
     likely = np.flatnonzero(chances > LEAST_PRIOR)
-    return int(turns[likely[0]]), chances[likely] / chances[likely].sum()
+    chances = chances[likely] / chances[likely].sum()
+    return int(turns[likely[0]]), np.pad(chances, (0, -len(chances) % TURNED_LANES))
 
 
 def _turned(rows: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -18,13 +18,14 @@ _REACH = 6.0  # deviations beyond which a detection is not taken for an object
 _LEAST = 1e-6  # weight of a pair against a miss and a false detection, from which it counts
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200
-_MISSES = 32  # chances of a miss that are multiplied before the product is brought back to one
 # How often messages are sent, and the relative change at which they are taken for settled.
 _ROUNDS, _SETTLED = 30, 1e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
 
 LANES = 8
 """Detections that are added up together."""
+TURNED_LANES = 16
+"""Turns that are added up together."""
 _BINS = 1024  # scores are counted in so many bins to find the best of them
 _BINS_A_NAT = np.float32(16.0)
 
@@ -453,31 +454,37 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
 ) -> None:
     """Fill `scores` as `scan`, summed over turns of the photo, and `best` with the likeliest turn.
 
-    Turns are steps from `first` on, with their chances in `priors`. `rows`, shape (n, groups,
-    levels, bins // turns, 2 * turns), and `masses` are those of `turned_rows`; `named` has shape
-    (longest + 1, k, n).
+    Turns are steps from `first` on, with their chances in `priors`, whole blocks of them. `rows`,
+    shape (n, groups, levels, bins // turns, 2 * turns), and `masses` are those of `turned_rows`;
+    `named` has shape (longest + 1, k, n).
     """
     size, groups, levels, inside = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
-    twice = rows.shape[4]
-    turns, ways = twice // 2, len(priors)
+    twice, ways = rows.shape[4], len(priors)
+    turns, bins = twice // 2, inside * twice // 2
     longest, classes = len(chances) - 1, chances.shape[1]
     flat_rows, flat_named, flat_masses = rows.ravel(), named.ravel(), masses.ravel()
     partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
-    one_size = groups * levels * inside * twice
-    sums = np.empty((size, ways), np.float32)
-    odds = np.empty(ways, np.float32)
+    most = 0
+    for cell in range(part[0], part[1]):
+        most = max(most, offsets[cell + 1] - offsets[cell])
+    starts = np.empty(most, np.uint64)
+    odds = np.empty(most * ways, np.float32)
+    missed = np.empty(ways, np.float32)
+    sums = np.empty(ways, np.float32)
     product = np.empty(ways)
     floors = np.empty(size, np.float32)
     left = np.zeros(classes, np.float32)
     one_f = np.float32(1.0)
-    bins = inside * turns
+    # As in `scan`: unsigned numbers, and sums side by side that stay where they are added up.
+    all_ways, block = np.uint64(ways), np.uint64(TURNED_LANES)
+    one_size = np.uint64(groups * levels * inside * twice)
     for cell in range(part[0], part[1]):
-        low, high = offsets[cell], offsets[cell + 1]
-        length = min(high - low, longest)
+        low, count = offsets[cell], offsets[cell + 1] - offsets[cell]
+        length = min(count, longest)
         gone = np.float32(0.0)
         floors[:] = one_f
         if moving:
-            for one in range(low, high):
+            for one in range(low, low + count):
                 left[kinds[one]] += leaving[length, kinds[one], places[one] // bins]
             for row in range(classes):
                 if left[row] > 0.0:
@@ -485,43 +492,78 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
                     for two in range(size):
                         floors[two] += left[row] * named[length, row, two] * disc[two]
                     left[row] = 0.0
-        for two in range(size):
-            for way in range(ways):
-                sums[two, way] = floors[two]
         for way in range(ways):
             product[way] = priors[way]
+        missed[:] = one_f
         total = base - gone * width
-        for one in range(low, high):
-            kind, place = kinds[one], places[one]
+        for one in range(count):
+            kind, place = kinds[low + one], places[low + one]
             level, place = place // bins, place % bins
             chance = chances[length, kind, level]
             start = (first - place // inside) % turns
             start += ((group_of[kind] * levels + level) * inside + place % inside) * twice
+            starts[one] = start
+            own = odds[one * ways : (one + 1) * ways]
             if partial:
+                mass = flat_masses[start : start + ways]
                 for way in range(ways):
-                    missed = one_f - chance * flat_masses[start + way]
-                    odds[way] = chance / missed
-                    product[way] *= missed
+                    none = one_f - chance * mass[way]
+                    own[way] = chance / none
+                    missed[way] *= none
             else:
-                missed = one_f - chance
-                for way in range(ways):
-                    odds[way] = chance / missed
-                    product[way] *= missed
-            name = (length * classes + kind) * size
-            for two in range(size):
-                factor = flat_named[name + two]
-                if factor > 0.0:
-                    at = two * one_size + start
-                    for way in range(ways):
-                        sums[two, way] += odds[way] * factor * flat_rows[at + way]
-            if (one - low) % _MISSES == _MISSES - 1:
-                peak = product.max()
+                own[:] = chance / (one_f - chance)
+                missed[0] *= one_f - chance
+            if one % LANES == LANES - 1 or one == count - 1:
+                if not partial:
+                    missed[:] = missed[0]
+                peak = missed.max()
                 total += math.log(peak)
                 for way in range(ways):
-                    product[way] /= peak
+                    product[way] *= missed[way] / peak
+                missed[:] = one_f
         for two in range(size):
+            above = np.uint64(two) * one_size
+            for way in range(np.uint64(0), all_ways, block):
+                a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = floors[two]
+                b0 = b1 = b2 = b3 = b4 = b5 = b6 = b7 = floors[two]
+                for one in range(np.uint64(count)):
+                    kind = kinds[np.uint64(low) + one]
+                    factor = flat_named[np.uint64((length * classes + kind) * size + two)]
+                    at, of = above + starts[one] + way, one * all_ways + way
+                    a0 += factor * odds[of] * flat_rows[at]
+                    a1 += factor * odds[of + np.uint64(1)] * flat_rows[at + np.uint64(1)]
+                    a2 += factor * odds[of + np.uint64(2)] * flat_rows[at + np.uint64(2)]
+                    a3 += factor * odds[of + np.uint64(3)] * flat_rows[at + np.uint64(3)]
+                    a4 += factor * odds[of + np.uint64(4)] * flat_rows[at + np.uint64(4)]
+                    a5 += factor * odds[of + np.uint64(5)] * flat_rows[at + np.uint64(5)]
+                    a6 += factor * odds[of + np.uint64(6)] * flat_rows[at + np.uint64(6)]
+                    a7 += factor * odds[of + np.uint64(7)] * flat_rows[at + np.uint64(7)]
+                    b0 += factor * odds[of + np.uint64(8)] * flat_rows[at + np.uint64(8)]
+                    b1 += factor * odds[of + np.uint64(9)] * flat_rows[at + np.uint64(9)]
+                    b2 += factor * odds[of + np.uint64(10)] * flat_rows[at + np.uint64(10)]
+                    b3 += factor * odds[of + np.uint64(11)] * flat_rows[at + np.uint64(11)]
+                    b4 += factor * odds[of + np.uint64(12)] * flat_rows[at + np.uint64(12)]
+                    b5 += factor * odds[of + np.uint64(13)] * flat_rows[at + np.uint64(13)]
+                    b6 += factor * odds[of + np.uint64(14)] * flat_rows[at + np.uint64(14)]
+                    b7 += factor * odds[of + np.uint64(15)] * flat_rows[at + np.uint64(15)]
+                sums[way] = a0
+                sums[way + np.uint64(1)] = a1
+                sums[way + np.uint64(2)] = a2
+                sums[way + np.uint64(3)] = a3
+                sums[way + np.uint64(4)] = a4
+                sums[way + np.uint64(5)] = a5
+                sums[way + np.uint64(6)] = a6
+                sums[way + np.uint64(7)] = a7
+                sums[way + np.uint64(8)] = b0
+                sums[way + np.uint64(9)] = b1
+                sums[way + np.uint64(10)] = b2
+                sums[way + np.uint64(11)] = b3
+                sums[way + np.uint64(12)] = b4
+                sums[way + np.uint64(13)] = b5
+                sums[way + np.uint64(14)] = b6
+                sums[way + np.uint64(15)] = b7
             for way in range(ways):
-                product[way] *= sums[two, way]
+                product[way] *= sums[way]
             if two % LANES == LANES - 1:
                 peak = product.max()
                 total += math.log(peak)
