@@ -39,7 +39,7 @@ METHOD_HELP = (
     "occurs, whatever the order. jaccard+jaccard: by which types and which angles occur at all. "
     "types:edit and angles:edit: as edit+edit, by the types or the angles alone."
 )
-NOISES = ("generic", "light", "medium", "strong")
+NOISES = ("generic", "light", "medium", "strong", "by-hand")
 DISTORTIONS = ("none", "light", "medium", "strong")
 
 Value = Union[str, float, bool, None, "list[str]"]

@@ -87,7 +87,7 @@ map page for the eye.
                 "Detector",
                 NOISES,
                 "With likelihood, how much of what is seen may be wrong: light, medium, strong, or "
-                "generic where that is not known.",
+                "generic where that is not known, by-hand for what a person noted down.",
             ),
             whole_number(
                 "TOP",

@@ -48,7 +48,7 @@ A large city takes minutes. What is known already is not computed again.
                 "Detector",
                 NOISES,
                 "How much of what is seen will be wrong: light, medium, strong, or generic where "
-                "that is not known.",
+                "that is not known, by-hand for what a person notes down.",
             ),
             number(
                 "RADIUS",

@@ -101,7 +101,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 "Detector",
                 NOISES,
                 "With likelihood, how much of what is seen may be wrong: light, medium, strong, or "
-                "generic where that is not known.",
+                "generic where that is not known, by-hand for what a person noted down.",
             ),
             choice("HEADING", "North", HEADINGS, "With likelihood, whether the north is known."),
             number(

@@ -32,8 +32,8 @@ NoiseName = Annotated[
     str,
     typer.Option(
         "--noise",
-        help="How the detector fails: light, medium, strong, generic (any of them), or a file "
-        "written by `semsig learn`.",
+        help="How the detector fails: light, medium, strong, generic (any of them), by-hand (a "
+        "person, who leaves some out), or a file written by `semsig learn`.",
     ),
 ]
 MapAge = Annotated[

@@ -25,7 +25,7 @@ def serve(
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the address, but open no browser.")
     ] = False,
-    noise: NoiseName = "generic",
+    noise: NoiseName = "by-hand",
     objects: Objects = None,
 ) -> None:
     """Open a page in the browser to ask with photos, on this machine alone.

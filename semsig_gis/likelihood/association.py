@@ -326,7 +326,7 @@ HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from whi
 NEGLIGIBLE = 30.0  # nats below the best, at which cells hold nothing together
 POOL, WINDOWS = 16, 8  # times a sample, that it is taken from; parts of it, by likelihood
 # Turns around the likeliest one of the scan, which knows it to less than six degrees.
-TURNS = np.arange(-7.5, 7.6, 1.5)
+TURNS = np.arange(-7.5, 7.6, 3.0)
 
 
 def align_cells(

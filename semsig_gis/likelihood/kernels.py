@@ -516,10 +516,10 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
             if one % LANES == LANES - 1 or one == count - 1:
                 if not partial:
                     missed[:] = missed[0]
-                peak = missed.max()
-                total += math.log(peak)
+                unit = missed.max()
+                total += math.log(unit)
                 for way in range(ways):
-                    product[way] *= missed[way] / peak
+                    product[way] *= missed[way] / unit
                 missed[:] = one_f
         for two in range(size):
             above = np.uint64(two) * one_size

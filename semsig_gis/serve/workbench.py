@@ -59,12 +59,13 @@ if TYPE_CHECKING:
 
 MOST_UPLOAD = 25 * 2**20
 """Bytes of a picture, or of a question."""
+USUAL, PLAIN = "by-hand", "generic"
+"""The noise models of the page and of `semsig localize` where none is chosen."""
 FORMATS = {
     "gpkg": "application/geopackage+sqlite3",
     "geojson": "application/geo+json",
     "kml": "application/vnd.google-earth.kml+xml",
 }
-USUAL = "generic"
 MARKS_TO_PREPARE = 5
 PANORAMA = 2  # times as wide as high
 
@@ -79,7 +80,7 @@ class Workbench:
         The city.
     store : ObjectStore or None
         Its street objects, if they are at hand.
-    noises : mapping of str to Noise, default those that have a name
+    noises : mapping of str to Noise, default those that have a name, that of marks by hand first
         What the page may choose from, as ``--noise`` of `semsig localize` takes it; the first is
         taken where it chooses none.
     options : sequence of str, default the file of the city
@@ -273,7 +274,7 @@ class Workbench:
         )
         noise = self._noise(question)
         options = [*(self.options or [str(self.city.path)])]
-        options += [] if noise == USUAL else ["--noise", noise]
+        options += [] if noise == PLAIN else ["--noise", noise]
         return drawing | {
             "command": question.command(self.taxonomy, options=options),
             "views": question.rows(self.taxonomy),

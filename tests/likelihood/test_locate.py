@@ -49,6 +49,22 @@ def seen_from(xy: np.ndarray, *, objects: StreetObjects = STORE.objects) -> Sign
     return Signature(view.codes, view.bearings)
 
 
+def test_what_a_person_leaves_out_hardly_speaks_against_a_place() -> None:
+    marked = CELLS.taxonomy.encode("DBH"), np.array([20.0, 140.0, 260.0])
+    street = (
+        "DDDDBDDDDHDD",
+        [20.0, 40.0, 60.0, 80.0, 140.0, 160.0, *range(180, 241, 20), 260.0, 280.0],
+    )
+    crossing = "DBH", [33.0, 127.0, 273.0]
+    database = database_of([(street[0], sorted(street[1])[:12]), crossing])
+    chances = {
+        name: locate(build_index(database, named_noise(name)), Signature(*marked)).chances[0]
+        for name in ("by-hand", "generic", "medium")
+    }
+    assert chances["by-hand"] > 0.9
+    assert max(chances["generic"], chances["medium"]) < 0.5
+
+
 def test_what_a_long_signature_was_seen_from_is_found() -> None:
     right = 0
     for cell in LONG:

@@ -77,8 +77,8 @@ def photo(bench: Workbench, cell: int, middle: float, **known: Any) -> dict[str,
 def test_the_page_is_told_of_the_city(page: Page) -> None:
     city, database = page.ask("/api/city"), page.bench.database
     assert (city["name"], city["cells"], city["radius"]) == ("town", len(database), 30.0)
-    assert city["noise"][0] == "generic"
-    assert set(city["noise"]) == {"generic", "light", "medium", "strong"}
+    assert city["noise"][0] == "by-hand"
+    assert set(city["noise"]) == {"by-hand", "generic", "light", "medium", "strong"}
     assert any(line.startswith("Town") for line in city["licences"])
     assert city["image"]["url"].startswith("data:image/png;base64,")
     codes = [item["code"] for item in city["classes"]]

@@ -311,8 +311,10 @@ def named_noise(name: str) -> Noise:
 
     Parameters
     ----------
-    name : {"light", "medium", "strong", "generic"}
-        A level of the source's distortion, or ``"generic"`` where the level is not known.
+    name : {"light", "medium", "strong", "generic", "by-hand"}
+        A level of the source's distortion, ``"generic"`` where the level is not known, or
+        ``"by-hand"`` for a person, who marks or names some of the objects in sight: nine, six or
+        three in ten.
 
     Returns
     -------
@@ -429,11 +431,24 @@ def _level(name: str, occurrences: int) -> NoiseSpec:
     return replace(sure, clutter=each, missed_each=each, misnamed_each=each)
 
 
+def _alike(name: str, specs: tuple[NoiseSpec, ...]) -> NoiseMixture:
+    """Return a mixture of models that are equally likely."""
+    return NoiseMixture(specs=specs, weights=(1 / len(specs),) * len(specs), name=name)
+
+
 _LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
+# A person leaves out much or little, hardly errs about the rest, and makes nothing up.
+_MARKED = tuple(
+    NoiseSpec(
+        detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:.0%} marked"
+    )
+    for share in (0.9, 0.6, 0.3)
+)
 NOISES: Mapping[str, Noise] = MappingProxyType(
     {
         **{spec.name: spec for spec in _LEVELS},
-        "generic": NoiseMixture(specs=_LEVELS, weights=(1 / 3, 1 / 3, 1 / 3), name="generic"),
+        "generic": _alike("generic", _LEVELS),
+        "by-hand": _alike("by-hand", _MARKED),
     }
 )
 """The noise models that have a name."""

@@ -115,6 +115,8 @@ semsig.readBoxes = async (session, files) => {
     }
     semsig.notice(read.notes.join(" "));
   }
+  const noise = semsig.element("noise");
+  if (noise.value === "by-hand") session.noise = noise.value = "generic";
   session.show(session.scene);
   session.changed();
 };
@@ -377,7 +379,9 @@ semsig.start = semsig.trying(async () => {
   semsig.element("about").textContent = city.licences.join(" · ");
   semsig.palette(session);
   const noise = semsig.element("noise");
-  noise.append(...city.noise.map((name) => new Option(name, name)));
+  const noticed = {"by-hand": "a person, who leaves some out", generic: "any detector"};
+  noise.append(...city.noise.map(
+    (name) => new Option(noticed[name] ?? `a detector with ${name} noise`, name)));
   session.noise = noise.value;
   noise.addEventListener("change", () => {
     session.noise = noise.value;
