@@ -505,9 +505,9 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
             starts[one] = start
             own = odds[one * ways : (one + 1) * ways]
             if partial:
-                mass = flat_masses[start : start + ways]
+                held = flat_masses[start : start + ways]
                 for way in range(ways):
-                    none = one_f - chance * mass[way]
+                    none = one_f - chance * held[way]
                     own[way] = chance / none
                     missed[way] *= none
             else:
