@@ -438,14 +438,7 @@ def _overdue(url: str, spec: HttpSpec, entry: Entry | None = None) -> HttpError:
 
 def _attempt(session: requests.Session, job: _Job) -> Fetched:
     request, entry, spec = job.request, job.entry, job.spec
-    have, begun = entry.resumable() if request.method == "GET" else (0, Edition())
-    headers = job.held.condition if job.held and request.method == "GET" else {}
-    if job.accept:
-        headers |= {"Accept": ", ".join((*job.accept, ANYTHING))}
-    if spec.secret is not None:
-        have, headers = 0, headers | spec.secret.headers
-    if have:
-        headers |= {"Range": f"bytes={have}-", "If-Range": begun.if_range}
+    have, begun, headers = _conditions(job)
     with answer_to(session, request, headers, spec) as response:
         if response.status_code == NOT_MODIFIED and job.held is not None:
             entry.drop_part()
@@ -466,9 +459,6 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
             raise SourceError(msg)
         if not have:
             entry.start_part(edition)
-        if spec.secret is not None and edition.encoding:
-            msg = f"{host_of(request.url)} sent a packed answer where none was asked for."
-            raise HttpError(msg)
         _receive(response, job, have)
         url = response.url if spec.secret is None else spec.secret.hide(response.url)
     body = entry.scratch(job.suffix)
@@ -493,6 +483,21 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
         entry.drop_part()  # it was whole: what is wrong with it now stays wrong
 
 
+def _conditions(job: _Job) -> tuple[int, Edition, dict[str, str]]:
+    """Return how many bytes are there already, of which edition, and the headers to send."""
+    secret = job.spec.secret
+    may_go_on = job.request.method == "GET" and secret is None  # what has a secret in it is changed
+    have, begun = job.entry.resumable() if may_go_on else (0, Edition())
+    headers = job.held.condition if job.held and job.request.method == "GET" else {}
+    if job.accept:
+        headers |= {"Accept": ", ".join((*job.accept, ANYTHING))}
+    if secret is not None:
+        headers |= secret.headers
+    if have:
+        headers |= {"Range": f"bytes={have}-", "If-Range": begun.if_range}
+    return have, begun, headers
+
+
 def _continues(response: requests.Response, have: int, begun: Edition) -> bool:
     """Tell whether a response goes on where the part ends, in the same edition."""
     starts = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
@@ -505,9 +510,14 @@ def _receive(response: requests.Response, job: _Job, have: int) -> None:
     length = response.headers.get("Content-Length", "")
     total = have + int(length) if length.isdecimal() else 0
     _require_room(total, job)
+    blocks = blocks_of(response)
+    if job.spec.secret is not None:
+        if Edition.of(response.headers).encoding:
+            msg = f"{host_of(job.request.url)} sent a packed answer where none was asked for."
+            raise HttpError(msg)
+        blocks = job.spec.secret.strained(blocks)
     with job.entry.part.open("ab") as stream:
-        blocks = blocks_of(response)
-        for block in blocks if job.spec.secret is None else job.spec.secret.strained(blocks):
+        for block in blocks:
             have += len(block)
             _require_room(have, job)
             stream.write(block)
