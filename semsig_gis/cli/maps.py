@@ -137,6 +137,7 @@ def map_(
     from semsig_gis.database.database import require_same_place
     from semsig_gis.evaluation.file import open_evaluation
     from semsig_gis.likelihood.posterior import open_posterior
+    from semsig_gis.maps.answer import RASTERS
     from semsig_gis.maps.city import city_map
     from semsig_gis.maps.page import save_map
     from semsig_gis.objects.table import open_objects
@@ -146,12 +147,6 @@ def map_(
     _require_content(evaluation, smooth, other=cells or others != (None, None, None))
     keep_inputs(out, read=(database, drift, location, objects, buildings, streets))
     require_suffix(".html", out)
-    if location is not None and location.suffix.lower() not in {".tif", ".tiff"}:
-        msg = (
-            f"{location} does not hold the chance of every cell; give the .tif file that semsig "
-            "localize --out wrote."
-        )
-        raise InputError(msg)
     results = None if evaluation is None else open_evaluation(evaluation)
     city = open_city(database)
     opened = city.database
@@ -162,7 +157,10 @@ def map_(
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_city(drift)
     dates = {} if newer is None else _dates(city, newer)
-    chances = None if location is None else open_posterior(location, opened)
+    answer: dict[str, Any] = {}
+    if location is not None:
+        raster = location.suffix.lower() in RASTERS
+        answer = {"posterior": open_posterior(location, opened)} if raster else {"answer": location}
     if seen is not None:
         places = shapely.get_coordinates(seen.table.geometry.to_crs(opened.crs).array)
         require_same_place(opened, places, "street objects")
@@ -173,9 +171,9 @@ def map_(
             smooth=smooth,
             ambiguity=ambiguity,
             identifiability=known,
-            posterior=chances,
             objects=seen,
             tiles=tiles,
+            **answer,
             **dates,
         )
         draw_ground(drawn, city, buildings=buildings, streets=streets)

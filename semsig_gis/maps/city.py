@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.maps.answer import answer_map
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
@@ -14,7 +15,8 @@ from semsig_gis.maps.objects import objects_map
 from semsig_gis.maps.parts import cell_colours
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     import folium
 
@@ -36,6 +38,7 @@ def city_map(
     objects_before: StreetObjects | None = None,
     objects_after: StreetObjects | None = None,
     posterior: Posterior | None = None,
+    answer: str | Path | None = None,
     objects: StreetObjects | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
@@ -57,6 +60,9 @@ def city_map(
         The database at a later date, and the street objects of both, as `drift_map` shows them.
     posterior : Posterior, optional
         The chances of an answer, as `posterior_map` shows them.
+    answer : str or Path, optional
+        File of an answer that has no chances of cells: regions to search and, in most formats,
+        candidates (see `export_answer`).
     objects : StreetObjects, optional
         The street objects, as `objects_map` shows them.
     tiles : str, optional
@@ -97,6 +103,8 @@ def city_map(
         parts.append(partial(dates, database, newer))
     if posterior is not None:
         parts.append(partial(posterior_map, posterior))
+    if answer is not None:
+        parts.append(partial(answer_map, answer, database))
     if objects is not None:
         cells = None if parts else database
         parts.append(partial(objects_map, objects, database=cells))
@@ -104,9 +112,14 @@ def city_map(
         msg = "there is nothing to show of the city; give an evaluation, or ambiguity=True."
         raise InputError(msg)
     drawn = parts[0](tiles=tiles)
+    _keep_colour(drawn, parts[1:])
+    return drawn
+
+
+def _keep_colour(drawn: folium.Map, parts: Sequence[Callable[..., folium.Map]]) -> None:
+    """Draw more on a map, whose cells keep the colours that they have, if any."""
     first = [colour for colour in cell_colours(drawn) if colour.show]
-    for part in parts[1:]:
+    for part in parts:
         part(map_=drawn)
     for colour in cell_colours(drawn) if first else ():
         colour.show = colour in first
-    return drawn

@@ -105,6 +105,26 @@ def test_a_raster_of_something_else_is_no_answer(done: Done, run: Run) -> None:
     sentence(outcome, "cells.tif does not hold the chances of the cells", "give a .tif file")
 
 
+@pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml", "parquet", "csv", "fgb"])
+def test_answers_of_all_formats_are_drawn(done: Done, suffix: str) -> None:
+    done(f"localize city.parquet --types DD --method likelihood --out answer.{suffix}")
+    page = drawn(done, f"--location answer.{suffix}")
+    assert '"Regions to search (' in page
+    assert '"Region 1"' in page
+    assert ('"Candidates (10)"' in page) == (suffix in {"gpkg", "geojson", "kml"})
+    assert ('"Candidate 10"' in page) == (suffix in {"gpkg", "geojson", "kml"})
+
+
+@pytest.mark.parametrize("name", ["objects.parquet", "words.geojson", "cells.gpkg"])
+def test_what_is_no_answer_is_not_drawn(done: Done, run: Run, name: str) -> None:
+    Path("words.geojson").write_text("words", encoding="utf-8")
+    if name == "cells.gpkg":
+        done("export city.parquet --out cells.gpkg")
+    outcome = run(f"map city.parquet --location {name} --out map.html")
+    sentence(outcome, name, "give a file that semsig localize --out wrote")
+    assert not Path("map.html").exists()
+
+
 def test_a_map_of_what_has_changed(run: Run) -> None:
     save_with_store(build_database(FEWER), ObjectStore.of(FEWER), "new.parquet")
     line = "map city.parquet --drift new.parquet --out drift.html"
