@@ -31,6 +31,7 @@ from .objects.fetch import (
     find_area as find_area,
     open_cache as open_cache,
 )
+from .objects.frame import objects_from_frame as objects_from_frame
 from .objects.load import (
     Loaded as Loaded,
     assemble as assemble,

@@ -45,3 +45,42 @@ def _tags(tags: Mapping[str, str] | None) -> str:
     return "".join(
         f"<tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in (tags or {}).items()
     )
+
+
+def street_town() -> list[str]:
+    """Return a street with what stands along it, as points, lines, areas and with a hole."""
+    lon, lat = 2.35, 48.85
+    things: list[Mapping[str, str]] = [
+        {"natural": "tree", "leaf_type": "broadleaved"},
+        {"natural": "tree"},
+        {"amenity": "bench", "backrest": "yes", "note": 'a "quoted" => text'},
+        {"amenity": "bench", "layer": "-1"},
+        {"highway": "street_lamp"},
+        {"highway": "bus_stop"},
+        {"amenity": "waste_basket"},
+        {"highway": "crossing", "crossing": "zebra"},
+        {"amenity": "vending_machine", "vending": "parking_tickets"},
+        {"traffic_sign": "FR:B1"},
+    ]
+    parts = [node(n, lon + n * 1e-4, lat + n % 3 * 1e-5, tags) for n, tags in enumerate(things, 1)]
+    corners = [(0, 0), (3, 0), (3, 1), (0, 1), (1, 0.2), (2, 0.2), (2, 0.8), (1, 0.8)]
+    for number, (east, north) in enumerate([*corners, *corners], 101):
+        aside = 4e-4 if number > 100 + len(corners) else 0.0
+        parts.append(node(number, lon + east * 1e-4 + aside, lat + 3e-4 + north * 1e-4))
+    outer, inner = [101, 102, 103, 104, 101], [105, 106, 107, 108, 105]
+    parts += [
+        way(201, outer),
+        way(202, inner),
+        way(203, [109, 110, 111, 112, 109], {"amenity": "toilets", "building": "yes"}),
+        way(204, [113, 114], {"amenity": "bench"}),
+        way(205, [1, 3, 5, 7, 9], {"highway": "residential", "name": "Rue"}),
+        way(206, [113, 114, 115, 116, 113], {"highway": "pedestrian", "area": "yes"}),
+    ]
+    return [
+        *parts,
+        relation(
+            301,
+            {201: "outer", 202: "inner"},
+            {"type": "multipolygon", "amenity": "fountain", "building": "yes"},
+        ),
+    ]

@@ -75,11 +75,13 @@ def load(
     files: Annotated[list[Path], typer.Argument(help="Files, or a folder of files.")],
     *,
     names: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
-            "--catalog", help="Catalogue, by name or .toml file; repeat to merge, best first."
+            "--catalog",
+            help="Catalogue, by name or .toml file, where the files do not tell it (those of "
+            "OpenStreetMap and Overture do); repeat to merge, best first.",
         ),
-    ],
+    ] = None,
     out: Objects,
     layer: Layers = None,
     all_layers: AllLayers = False,
@@ -105,12 +107,18 @@ def load(
 ) -> None:
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
+    from semsig_gis.objects.told import told_catalogs
     from semsig_gis.objects.unread import passed_by, read_small
     from semsig_gis.sources.area import BOX, clip_layers, parse_area
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
 
-    keep_inputs(out, buildings, streets, read=[*files, *names, clip])
+    keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
+    if not names:
+        told, lines = told_catalogs(files)
+        names = list(told)
+        for line in lines:
+            remark(line)
     catalog = combine_catalogs([load_catalog(name) for name in names])
     specs = choose_layers(
         catalog,

@@ -17,7 +17,7 @@ from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.viewpoints import choose_viewpoints
 from semsig_gis.database.views import ViewpointSpec, clockwise_order, sightings
-from semsig_gis.objects.table import licenses_of
+from semsig_gis.objects.table import StreetObjects, licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.database.views import Sightings
-    from semsig_gis.objects.table import StreetObjects
 
 # So many that the arrays of a block stay in the cache of a processor.
 CELLS_A_BLOCK = 1 << 14
@@ -43,7 +42,7 @@ ROUNDING_CELLS = 1e-3
 
 
 def build_database(
-    objects: StreetObjects,
+    objects: StreetObjects | gpd.GeoDataFrame,
     *,
     grid: GridSpec | None = None,
     spec: SignatureSpec | None = None,
@@ -56,8 +55,9 @@ def build_database(
 
     Parameters
     ----------
-    objects : StreetObjects
-        The objects of a city.
+    objects : StreetObjects or GeoDataFrame
+        The objects of a city, or a table of OpenStreetMap's elements with their tags, such as of
+        osmnx (see `objects_from_frame`, which takes other tables too).
     grid : GridSpec, optional
         The cells; 10 m by default.
     spec : SignatureSpec, optional
@@ -97,6 +97,10 @@ def build_database(
     >>> build_database(demo_objects, spec=SignatureSpec(radius=20.0)).lengths.min() >= 1
     np.True_
     """
+    if not isinstance(objects, StreetObjects):
+        from semsig_gis.objects.frame import objects_from_frame  # noqa: PLC0415 - it loads slowly
+
+        objects = objects_from_frame(objects)
     grid, spec = grid or GridSpec(), spec or SignatureSpec()
     reach = float(objects.taxonomy.ranges(spec.radius).max())
     database = build_cells(

@@ -27,7 +27,14 @@ from semsig_gis.objects.conflate import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
-from semsig_gis.sources import MERGING, PRUNING, find_files, reader
+from semsig_gis.sources import (
+    MERGING,
+    PRUNING,
+    TAGS_READER,
+    file_reader,
+    find_files,
+    reader,
+)
 from semsig_gis.sources.area import note_outside
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -153,7 +160,8 @@ def build_objects(
     everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
     # By number, because two layers may bear one name.
     owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
-    unique = np.array([layer.spec.unique_id for layer in layers])[owner]
+    # An element of the map is the same in files of all kinds.
+    unique = np.array([layer.spec.unique_id or bool(layer.spec.tags) for layer in layers])[owner]
     has_id = (everything[SOURCE_ID] != "") & unique
     # Of the id of an earlier row of the layer, as in a second file of it.
     again = (has_id & everything.duplicated([SOURCE, SOURCE_ID])).to_numpy(bool)
@@ -430,14 +438,19 @@ def read_files(
     nowhere does not exist; give a file or a folder of files.
     """
     pairs, absent = find_files(specs, paths)
+    told = {
+        path: file_reader(path) or TAGS_READER
+        for path in {path for spec, path in pairs if spec.reader == TAGS_READER}
+    }
     by_files: dict[tuple[str, tuple[Path, ...]], list[LayerSpec]] = {}
     for spec, found in itertools.groupby(pairs, key=lambda pair: pair[0]):
-        paths_of_spec = tuple(path for _, path in found)
-        together = (
-            [paths_of_spec] if spec.reader in MERGING else [(path,) for path in paths_of_spec]
-        )
-        for some in together:
-            by_files.setdefault((spec.reader, some), []).append(spec)
+        by_reader: dict[str, list[Path]] = {}
+        for _, path in found:
+            name = told[path] if spec.reader == TAGS_READER else spec.reader
+            by_reader.setdefault(name, []).append(path)
+        for name, some in by_reader.items():
+            for together in [tuple(some)] if name in MERGING else [(path,) for path in some]:
+                by_files.setdefault((name, together), []).append(spec)
     layers: list[RawLayer] = []
     for done, ((name, (first, *more)), layers_of_files) in enumerate(by_files.items(), start=1):
         path = (first, *more) if more else first

@@ -15,14 +15,12 @@ from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
 from semsig_gis.sources.catalog import LayerSpec, load_catalog
 from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.raw_layer import WGS84
 from semsig_gis.storage.geoparquet import (
     CHECKED_PAGES,
-    CHECKING_PAGES,
     GROUP_ROWS,
-    UNREADABLE,
     hilbert_order,
-    require_intact,
     seal,
 )
 from semsig_gis.storage.whole import whole_file
@@ -151,7 +149,7 @@ def _read(
     kind = KIND_OF[role]
     notes: tuple[str, ...] = ()
     if path.suffix.lower() == ".parquet":
-        table = _read_parquet(path, kind, box)
+        table = read_parquet(path, kind=f"{kind}s", box=box)
     elif path.name.lower().endswith(tuple(osm_file.FORMATS)) and role != "area":
         spec = load_catalog("openstreetmap").layer(role)
         (layer,) = osm_file.read_layers(path, [spec])
@@ -182,19 +180,3 @@ def _read(
         msg = f"{path} {content}; give a file of {kind}s."
         raise InputError(msg)
     return table.to_crs(crs)
-
-
-def _read_parquet(path: Path, kind: GeometryKind, box: Sequence[float] | None) -> gpd.GeoDataFrame:
-    if not path.is_file():
-        msg = f"{path} does not exist; give a file of {kind}s."
-        raise SourceError(msg)
-    try:
-        require_intact(path)
-        return gpd.read_parquet(path, bbox=None if box is None else tuple(box), **CHECKING_PAGES)
-    except shapely.errors.ShapelyError as error:
-        cause = str(error).partition(": ")[2] or str(error)
-        msg = f"{path} has shapes that cannot be read ({cause.rstrip('.')}); correct the file."
-        raise SourceError(msg) from error
-    except UNREADABLE as error:
-        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}s."
-        raise SourceError(msg) from error

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import itertools
 from dataclasses import astuple, dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NoReturn, Protocol
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
@@ -26,6 +27,7 @@ READERS = {
     "arcgis": "services.layers",
     "mapillary": "mapillary",
     "opendatasoft": "services.layers",
+    "osm_features": "osm.features",
     "osm_file": "osm.file",
     "overpass": "osm.overpass",
     "overture": "overture",
@@ -35,8 +37,13 @@ READERS = {
 
 # Those of them that take several files at once, which are extracts of one map, and those that need
 # not read what is outside an `area`.
-MERGING = frozenset({"mapillary", "osm_file", "overture"})
+MERGING = frozenset({"mapillary", "osm_features", "osm_file", "overpass", "overture"})
 PRUNING = frozenset({"overture"})
+
+# The reader whose layers are told by their tags, whatever kind of file has them.
+TAGS_READER = "osm_file"
+# Layers of the same files that a message names.
+NAMES_TOLD = 4
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
@@ -165,6 +172,19 @@ def require_file(path: Path, kind: str) -> None:
         raise SourceError(msg)
 
 
+def file_reader(path: Path, *, sure: bool = False) -> str | None:
+    """Return the reader of a file of OpenStreetMap by its name, or by what is in it.
+
+    None if it is none; if `sure`, it has to say which elements of the map it holds, beside tags.
+    """
+    from semsig_gis.sources.osm import features  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources.osm.file import FORMATS  # noqa: PLC0415 - it loads slowly
+
+    if path.name.lower().endswith(tuple(FORMATS)):
+        return "osm_file"
+    return features.file_reader(path, sure=sure)
+
+
 def find_files(
     specs: Iterable[LayerSpec], paths: Iterable[str | Path]
 ) -> tuple[tuple[tuple[LayerSpec, Path], ...], tuple[LayerSpec, ...]]:
@@ -178,7 +198,8 @@ def find_files(
         Files, and folders to look in, not in the folders below them but for partitions such as
         ``theme=base``. A file given by itself goes before one found in a folder. Of a folder's
         files, a layer takes those that match the first of its patterns that any matches; of
-        extracts of a map, all that match.
+        extracts of a map, all that match, and of OpenStreetMap vector files with columns of tags,
+        too, in a folder if it holds no file of any pattern.
 
     Returns
     -------
@@ -198,17 +219,26 @@ def find_files(
     specs = tuple(specs)
     files: list[Path] = []
     in_folders: list[Path] = []
+    tagged: list[Path] = []
     for path in dict.fromkeys(Path(item) for item in paths):
         if path.is_dir():
-            inside = [p for p in _files_in(path) if p.suffix.lower() in FILE_SUFFIXES]
-            _require_match(path, inside, specs)
-            in_folders.extend(inside)
-        elif path.is_file():
-            _require_match(path, [path], specs)
-            files.append(path)
-        else:
+            inside = files_in(path)
+            if any(_named(file, specs) for file in inside):
+                in_folders.extend(inside)
+                continue
+            with_tags = [file for file in inside if _has_tags(file, specs, forgiving=True)]
+            if not with_tags:
+                _refuse(path, specs)
+            tagged.extend(with_tags)
+        elif not path.is_file():
             msg = f"{path} does not exist; give a file or a folder of files."
             raise SourceError(msg)
+        elif _named(path, specs):
+            files.append(path)
+        elif _has_tags(path, specs):
+            tagged.append(path)
+        else:
+            _refuse(path, specs)
     pairs: list[tuple[LayerSpec, Path]] = []
     missing = []
     for spec in specs:
@@ -217,6 +247,8 @@ def find_files(
         patterns = (spec.files,) if merging else tuple((pattern,) for pattern in spec.files)
         in_folder = ([path for path in in_folders if _matches(path, any_)] for any_ in patterns)
         candidates = by_hand or next(filter(None, in_folder), [])
+        if spec.reader == TAGS_READER:
+            candidates = [*candidates, *tagged]
         if len(candidates) > 1 and not (spec.unique_id or merging):
             names = " and ".join(str(path) for path in candidates)
             msg = f"layer {spec.name!r} is matched by {names}; give one of them."
@@ -227,10 +259,14 @@ def find_files(
     return tuple(pairs), tuple(missing)
 
 
-def _files_in(folder: Path) -> list[Path]:
-    """Return what is in a folder, and in the partitions of a dataset that it is, sorted."""
-    parts = (_files_in(p) if "=" in p.name and p.is_dir() else [p] for p in folder.iterdir())
-    return sorted(itertools.chain.from_iterable(parts))
+def files_in(folder: Path) -> list[Path]:
+    """Return the data in a folder, and in the partitions of a dataset that it is, sorted."""
+    parts = (
+        files_in(path) if "=" in path.name and path.is_dir() else [path]
+        for path in folder.iterdir()
+    )
+    files = itertools.chain.from_iterable(parts)
+    return sorted(path for path in files if path.suffix.lower() in FILE_SUFFIXES)
 
 
 def _matches(path: Path, patterns: Iterable[str]) -> bool:
@@ -238,9 +274,30 @@ def _matches(path: Path, patterns: Iterable[str]) -> bool:
     return any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
 
 
-def _require_match(path: Path, files: Iterable[Path], specs: Iterable[LayerSpec]) -> None:
-    if not any(_matches(file, spec.files) for file in files for spec in specs):
-        known = ", ".join(f"{spec.name} ({', '.join(spec.files)})" for spec in specs)
-        verb = "holds no file of" if path.is_dir() else "is not the file of"
-        msg = f"{path} {verb} any layer; the layers and their files are {known}."
-        raise SourceError(msg)
+def _named(path: Path, specs: Iterable[LayerSpec]) -> bool:
+    return any(_matches(path, spec.files) for spec in specs)
+
+
+def _has_tags(path: Path, specs: Iterable[LayerSpec], *, forgiving: bool = False) -> bool:
+    """Tell whether a file of no layer's name has tags, where some layer is told by them."""
+    if all(spec.reader != TAGS_READER for spec in specs):
+        return False
+    with contextlib.suppress(*([SourceError] if forgiving else [])):
+        return file_reader(path) is not None
+    return False
+
+
+def _refuse(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
+    patterns: dict[tuple[str, ...], list[str]] = {}
+    for spec in specs:
+        patterns.setdefault(spec.files, []).append(spec.name)
+    known = ", ".join(
+        f"{', '.join(names if len(names) <= NAMES_TOLD else (*names[:NAMES_TOLD], '...'))} "
+        f"({', '.join(files)})"
+        for files, names in patterns.items()
+    )
+    verb = "holds no file of" if path.is_dir() else "is not the file of"
+    tags = any(spec.reader == TAGS_READER for spec in specs)
+    more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
+    msg = f"{path} {verb} any layer; the layers and their files are {known}{more}."
+    raise SourceError(msg)

@@ -384,8 +384,8 @@ def _rows(item: list[Any], where: str) -> tuple[int, int]:
     raise CatalogError(msg)
 
 
-# Shipped beside the catalogues: the paper's classes, and words by which drafts are made.
-NO_CATALOGS = frozenset({"drift", "keywords", "taxonomy"})
+# Shipped beside the catalogues: the paper's classes, words by which drafts are made, and more.
+NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "taxonomy"})
 # What a catalogue may say, and of which type; every other key is a mistake that gets named.
 CATALOG_KEYS = {
     "name": str,

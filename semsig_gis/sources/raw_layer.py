@@ -181,7 +181,7 @@ def raw_layer(
     broken = table[GEOMETRY][[isinstance(position, str) for position in table[GEOMETRY]]]
     errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
     table = table.drop(index=broken.index)
-    table[GEOMETRY] = pd.Series(_geometries(table[GEOMETRY]), table.index, dtype=object)
+    table[GEOMETRY] = pd.Series(built_geometries(table[GEOMETRY]), table.index, dtype=object)
     off_globe = functools.partial(_off_globe, crs=crs, by_file=by_file, file=rules.file)
     for check in (_not_finite, off_globe):
         bad = check(table)
@@ -216,7 +216,8 @@ def raw_layer(
     )
 
 
-def _geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
+def built_geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
+    """Return the geometries of positions, all points built at once."""
     positions = list(positions)
     geometry = np.empty(len(positions), dtype=object)
     geometry[:] = [None if isinstance(position, tuple) else position for position in positions]

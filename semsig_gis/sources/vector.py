@@ -40,7 +40,7 @@ from semsig_gis.sources.raw_layer import (
 from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
     from pyproj import CRS
 
@@ -270,18 +270,74 @@ def read_layer(
         if (table := _csv(member, spec, where=where)) is not None:
             return read_csv_layer(table, spec, filters=filters, crs=crs, where=where)
         rules = RowRules(spec, _fields(member, where=where), filters=filters, where=where)
-        with _opened(member, fields=rules.fields) as source:
-            own, implicit = _own_crs(source)
-            system, notes = settle_crs(
-                own, implicit=implicit, expected=spec.crs, given=crs, where=where
-            )
-            rows = _read_rows(source, rules, heard)
-        if member.driver == "GeoJSON":
-            _refuse_broken(rows, member)
-        if any(record.getMessage().startswith("Failed to decode") for record in heard):
-            notes += ("some text is not UTF-8 and was read as missing",)
-    by_file = own is not None and not implicit
-    return raw_layer(rows, rules, system, by_file=by_file, notes=notes)
+        found = _read_rows(member, rules.fields, heard, expected=spec.crs, given=crs, where=where)
+    return raw_layer(found.rows, rules, found.crs, by_file=found.by_file, notes=found.notes)
+
+
+@dataclass(frozen=True, slots=True)
+class TableRows:
+    """The rows of a layer of a file, with the values of some `fields`, in the CRS that holds."""
+
+    fields: tuple[str, ...]
+    rows: Rows
+    crs: CRS
+    by_file: bool
+    notes: tuple[str, ...]
+
+
+def layer_fields(path: Path) -> list[list[str]]:
+    """Return the fields of every layer of a vector file that has a geometry and is no CSV file."""
+    with listening():
+        return [list(fields) for _, fields in _with_geometry(path)]
+
+
+def read_tables(
+    path: Path, choose: Callable[[Sequence[str]], Collection[str]], *, crs: str | None = None
+) -> Iterator[TableRows]:
+    """Yield the rows of the layers of a vector file of which fields are chosen, and these."""
+    with listening():
+        layers = list(_with_geometry(path))
+    for member, fields in layers:
+        chosen = choose(fields)
+        if chosen:
+            wanted = tuple(field for field in fields if field in chosen)
+            with listening() as heard:
+                found = _read_rows(
+                    member, wanted, heard, expected=None, given=crs, where=str(member)
+                )
+            yield found
+
+
+def _with_geometry(path: Path) -> Iterator[tuple[Member, Sequence[str]]]:
+    for member in _layers(path):
+        if member.driver != CSV:
+            with _opened(member) as source:
+                kind, fields = source.schema["geometry"], list(source.schema["properties"])
+            if kind != NO_GEOMETRY:
+                yield member, fields
+
+
+def _read_rows(
+    member: Member,
+    fields: tuple[str, ...],
+    heard: list[logging.LogRecord],
+    *,
+    expected: str | None,
+    given: str | None,
+    where: str,
+) -> TableRows:
+    """Read a layer of a file whose CRS is its own, or `given` by the user, or `expected`."""
+    with _opened(member, fields=fields) as source:
+        own, implicit = _own_crs(source)
+        system, notes = settle_crs(
+            own, implicit=implicit, expected=expected, given=given, where=where
+        )
+        rows = _stream(source, fields, heard)
+    if member.driver == "GeoJSON":
+        _refuse_broken(rows, member)
+    if any(record.getMessage().startswith("Failed to decode") for record in heard):
+        notes += ("some text is not UTF-8 and was read as missing",)
+    return TableRows(fields, rows, system, own is not None and not implicit, notes)
 
 
 def read_layers(
@@ -476,10 +532,8 @@ def _sound_json(what: object) -> Iterator[None]:
         raise unreadable(what, error) from error
 
 
-def _read_rows(
-    source: fiona.Collection,
-    rules: RowRules,
-    heard: list[logging.LogRecord],
+def _stream(
+    source: fiona.Collection, fields: Sequence[str], heard: list[logging.LogRecord]
 ) -> Rows:
     rows = Rows()
     expected = _count(source) or 0
@@ -512,7 +566,7 @@ def _read_rows(
             place: Position | str = (damage or None) if position is None else position
         except BadFeatureError as error:
             place = str(error)
-        rows.add([properties[field] for field in rules.fields], feature.id, place)
+        rows.add([properties[field] for field in fields], feature.id, place)
     if rows.read < expected and (damage or failures):
         rest = range(rows.read + 1, expected + 1)
         rows.errors.update(dict.fromkeys(rest, damage or "out of reach behind unreadable rows"))

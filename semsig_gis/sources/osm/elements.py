@@ -66,6 +66,22 @@ def relation_shape(
     return _require_area(_areas(area))
 
 
+def feature_shape(geometry: BaseGeometry, role: Role) -> BaseGeometry:
+    """Return what a way or multipolygon stands for of which a program has made a shape already.
+
+    It is as of `way_shape` if it has one outline, whether drawn as a line or an area.
+    """
+    parts = shapely.get_parts(geometry)
+    if len(parts) == 1 and shapely.get_num_interior_rings(parts[0]) == 0:
+        kind = shapely.get_type_id(parts[0])
+        outline = parts[0].exterior if kind == shapely.GeometryType.POLYGON else parts[0]
+        if kind != shapely.GeometryType.POINT:
+            return way_shape(shapely.get_coordinates(outline), role)
+    elif shapely.get_dimensions(geometry) == 2:  # noqa: PLR2004
+        return _require_area(_areas(geometry))
+    return geometry
+
+
 def _is_ring(xy: NDArray[np.float64]) -> bool:
     return len(xy) >= RING_NODES and bool((xy[0] == xy[-1]).all())
 
@@ -171,14 +187,13 @@ class ElementLayer:
         self._rules = RowRules(spec, fields, filters=filters, where=where)
 
     def add(
-        self, kind: ElementKind, number: int, tags: Mapping[str, str], position: Position | str
+        self, kind: ElementKind, name: str, tags: Mapping[str, str], position: Position | str
     ) -> bool:
         """Add an element, with what is wrong with it in the place of its position, if it counts."""
         self.rows.read += 1
         if not has_shape(kind, tags, self.spec):
             self.rows.filtered += 1
             return False
-        name = f"{kind}/{number}"
         text = f"{name} {position}" if isinstance(position, str) else position
         self.rows.add([tags.get(field) for field in self._rules.fields], name, text)
         return True

@@ -148,13 +148,14 @@ def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex)
             continue
         tags = {tag.k: tag.v for tag in element.tags}
         kind = KINDS[element.type_str()]
+        name = f"{kind}/{element.id}"
         for layer in (layers[number] for number in index.layers(tags)):
             if isinstance(element, Node):
                 valid = element.location.valid()
                 place = _lonlat(element.location) if valid else "has no valid position"
-                layer.add(kind, element.id, tags, place)
-            elif layer.add(kind, element.id, tags, None):
-                row, name = len(layer.rows.positions) - 1, layer.rows.names[-1]
+                layer.add(kind, name, tags, place)
+            elif layer.add(kind, name, tags, None):
+                row = len(layer.rows.positions) - 1
                 outlines.append(_Outline(layer, row, name, *_ways(element)))
     return outlines
 

@@ -139,7 +139,8 @@ def read_layers(
                 seen.add(name)
                 tags = element["tags"]
                 for layer in (layers[place] for place in index.layers(tags)):
-                    added = layer.add(kind, number, tags, places.position(element, layer.spec))
+                    place = places.position(element, layer.spec)
+                    added = layer.add(kind, f"{kind}/{number}", tags, place)
                     boxed[layer.spec.name] += added and _has_only_centre(element)
     raw = (layer.raw(crs) for layer in layers)
     return tuple(_with_note(layer, boxed[layer.spec.name]) for layer in raw)

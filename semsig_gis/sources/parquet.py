@@ -1,0 +1,59 @@
+"""Tables of features from GeoParquet files, whoever wrote them."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+import pyarrow.parquet as pq
+import shapely
+
+from semsig_gis.core.errors import SourceError
+from semsig_gis.sources import require_file
+from semsig_gis.storage.geoparquet import CHECKING_PAGES, UNREADABLE, require_intact
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+    from pathlib import Path
+
+
+def column_names(path: Path) -> list[str]:
+    """Return the names of the columns of a Parquet file; SourceError if it is none."""
+    try:
+        names: list[str] = pq.read_schema(path).names
+    except UNREADABLE as error:
+        msg = f"{path} is damaged or is no Parquet file; get it again."
+        raise SourceError(msg) from error
+    return names
+
+
+def read_parquet(
+    path: Path,
+    *,
+    kind: str,
+    columns: Collection[str] | None = None,
+    box: Sequence[float] | None = None,
+) -> gpd.GeoDataFrame:
+    """Read the features of a GeoParquet file, of which it is said what `kind` is needed.
+
+    Of `columns`, those that are there are read, and the geometry. SourceError if it cannot be read.
+    """
+    require_file(path, f"a file of {kind}")
+    try:
+        require_intact(path)
+        names = None
+        if columns is not None:
+            schema = pq.read_schema(path)
+            geometry = json.loads(schema.metadata[b"geo"])["primary_column"]
+            names = [name for name in schema.names if name in columns or name == geometry]
+        return gpd.read_parquet(
+            path, columns=names, bbox=None if box is None else tuple(box), **CHECKING_PAGES
+        )
+    except shapely.errors.ShapelyError as error:
+        cause = str(error).partition(": ")[2] or str(error)
+        msg = f"{path} has shapes that cannot be read ({cause.rstrip('.')}); correct the file."
+        raise SourceError(msg) from error
+    except UNREADABLE as error:
+        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}."
+        raise SourceError(msg) from error
