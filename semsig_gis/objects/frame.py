@@ -170,8 +170,9 @@ def _by_column(
     unknown = next((str(v) for v in frame[column].dropna().unique() if v not in names), None)
     if unknown is not None:
         msg = (
-            f"column {column!r} holds {unknown!r}, which is no class{nearest_name(unknown, names)}; "
-            f"the classes are {', '.join(names)}, and rows without one are left out."
+            f"column {column!r} holds {unknown!r}, which is no class"
+            f"{nearest_name(unknown, names)}; the classes are "
+            f"{', '.join(names)}, and rows without one are left out."
         )
         raise InputError(msg)
     layer = replace(layer, notes=())  # that rows have no class is meant

@@ -27,14 +27,7 @@ from semsig_gis.objects.conflate import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
-from semsig_gis.sources import (
-    MERGING,
-    PRUNING,
-    TAGS_READER,
-    file_reader,
-    find_files,
-    reader,
-)
+from semsig_gis.sources import MERGING, PRUNING, TAGS_READER, file_reader, find_files, reader
 from semsig_gis.sources.area import note_outside
 from semsig_gis.sources.catalog import paper_taxonomy
 
@@ -449,13 +442,13 @@ def read_files(
             name = told[path] if spec.reader == TAGS_READER else spec.reader
             by_reader.setdefault(name, []).append(path)
         for name, some in by_reader.items():
-            for together in [tuple(some)] if name in MERGING else [(path,) for path in some]:
-                by_files.setdefault((name, together), []).append(spec)
+            for together in [some] if name in MERGING else ([path] for path in some):
+                by_files.setdefault((name, tuple(together)), []).append(spec)
     layers: list[RawLayer] = []
     for done, ((name, (first, *more)), layers_of_files) in enumerate(by_files.items(), start=1):
-        path = (first, *more) if more else first
+        files = (first, *more) if more else first
         within = {"area": area} if name in PRUNING else {}
-        layers.extend(reader(name)(path, layers_of_files, filters=filters, crs=crs, **within))
+        layers.extend(reader(name)(files, layers_of_files, filters=filters, crs=crs, **within))
         if progress is not None:
             progress(done, len(by_files))
     order = {spec.name: number for number, spec in enumerate(specs)}

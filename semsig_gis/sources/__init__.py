@@ -217,28 +217,7 @@ def find_files(
     'trees'
     """
     specs = tuple(specs)
-    files: list[Path] = []
-    in_folders: list[Path] = []
-    tagged: list[Path] = []
-    for path in dict.fromkeys(Path(item) for item in paths):
-        if path.is_dir():
-            inside = files_in(path)
-            if any(_named(file, specs) for file in inside):
-                in_folders.extend(inside)
-                continue
-            with_tags = [file for file in inside if _has_tags(file, specs, forgiving=True)]
-            if not with_tags:
-                _refuse(path, specs)
-            tagged.extend(with_tags)
-        elif not path.is_file():
-            msg = f"{path} does not exist; give a file or a folder of files."
-            raise SourceError(msg)
-        elif _named(path, specs):
-            files.append(path)
-        elif _has_tags(path, specs):
-            tagged.append(path)
-        else:
-            _refuse(path, specs)
+    files, in_folders, tagged = _sorted_out(specs, paths)
     pairs: list[tuple[LayerSpec, Path]] = []
     missing = []
     for spec in specs:
@@ -259,6 +238,28 @@ def find_files(
     return tuple(pairs), tuple(missing)
 
 
+def _sorted_out(
+    specs: Sequence[LayerSpec], paths: Iterable[str | Path]
+) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return files that are given and of a layer's name, those in folders, and those with tags."""
+    files: list[Path] = []
+    in_folders: list[Path] = []
+    tagged: list[Path] = []
+    for path in dict.fromkeys(Path(item) for item in paths):
+        if not path.exists():
+            msg = f"{path} does not exist; give a file or a folder of files."
+            raise SourceError(msg)
+        inside = files_in(path) if path.is_dir() else [path]
+        if any(_matches(file, spec.files) for file in inside for spec in specs):
+            (in_folders if path.is_dir() else files).extend(inside)
+            continue
+        with_tags = [file for file in inside if _has_tags(file, specs, forgiving=path.is_dir())]
+        if not with_tags:
+            _refuse(path, specs)
+        tagged.extend(with_tags)
+    return files, in_folders, tagged
+
+
 def files_in(folder: Path) -> list[Path]:
     """Return the data in a folder, and in the partitions of a dataset that it is, sorted."""
     parts = (
@@ -274,11 +275,7 @@ def _matches(path: Path, patterns: Iterable[str]) -> bool:
     return any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
 
 
-def _named(path: Path, specs: Iterable[LayerSpec]) -> bool:
-    return any(_matches(path, spec.files) for spec in specs)
-
-
-def _has_tags(path: Path, specs: Iterable[LayerSpec], *, forgiving: bool = False) -> bool:
+def _has_tags(path: Path, specs: Iterable[LayerSpec], *, forgiving: bool) -> bool:
     """Tell whether a file of no layer's name has tags, where some layer is told by them."""
     if all(spec.reader != TAGS_READER for spec in specs):
         return False

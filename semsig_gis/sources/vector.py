@@ -270,7 +270,7 @@ def read_layer(
         if (table := _csv(member, spec, where=where)) is not None:
             return read_csv_layer(table, spec, filters=filters, crs=crs, where=where)
         rules = RowRules(spec, _fields(member, where=where), filters=filters, where=where)
-        found = _read_rows(member, rules.fields, heard, expected=spec.crs, given=crs, where=where)
+        found = _read_member(member, rules.fields, heard, expected=spec.crs, given=crs, where=where)
     return raw_layer(found.rows, rules, found.crs, by_file=found.by_file, notes=found.notes)
 
 
@@ -302,7 +302,7 @@ def read_tables(
         if chosen:
             wanted = tuple(field for field in fields if field in chosen)
             with listening() as heard:
-                found = _read_rows(
+                found = _read_member(
                     member, wanted, heard, expected=None, given=crs, where=str(member)
                 )
             yield found
@@ -317,7 +317,7 @@ def _with_geometry(path: Path) -> Iterator[tuple[Member, Sequence[str]]]:
                 yield member, fields
 
 
-def _read_rows(
+def _read_member(
     member: Member,
     fields: tuple[str, ...],
     heard: list[logging.LogRecord],
@@ -332,7 +332,7 @@ def _read_rows(
         system, notes = settle_crs(
             own, implicit=implicit, expected=expected, given=given, where=where
         )
-        rows = _stream(source, fields, heard)
+        rows = _read_rows(source, fields, heard)
     if member.driver == "GeoJSON":
         _refuse_broken(rows, member)
     if any(record.getMessage().startswith("Failed to decode") for record in heard):
@@ -532,7 +532,7 @@ def _sound_json(what: object) -> Iterator[None]:
         raise unreadable(what, error) from error
 
 
-def _stream(
+def _read_rows(
     source: fiona.Collection, fields: Sequence[str], heard: list[logging.LogRecord]
 ) -> Rows:
     rows = Rows()

@@ -46,9 +46,9 @@ def expected(extract: Path) -> StreetObjects:
 @pytest.fixture(scope="module")
 def frame(extract: Path) -> gpd.GeoDataFrame:
     """Return what osmnx makes of the town."""
-    import osmnx  # noqa: PLC0415 - it loads slowly
+    import osmnx
 
-    return osmnx.features_from_xml(extract, tags=dict.fromkeys(KEYS, True))  # noqa: FBT003
+    return osmnx.features_from_xml(extract, tags=dict.fromkeys(KEYS, True))
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +61,8 @@ def quack(extract: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     extension = next(Path(package.origin).parent.rglob("spatial.duckdb_extension"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HOME", str(folder))  # where DuckDB keeps the extensions it has
-        import duckdb  # noqa: PLC0415 - it loads slowly
-        import quackosm  # noqa: PLC0415 - it loads slowly
+        import duckdb
+        import quackosm
 
         with duckdb.connect() as connection:
             connection.execute(f"INSTALL '{extension}'")
@@ -177,7 +177,7 @@ def test_tables_that_do_not_tell_what_they_hold_are_refused() -> None:
     with refused(InputError, "kind", "class_column"):
         build_database(points(kind=["bench"]))
     with refused(InputError, "GeoDataFrame"):
-        build_database("city.parquet")  # type: ignore[arg-type]
+        build_database("city.parquet")
     with refused(InputError, "one"):
         objects_from_frame(tagged, tags=True, class_column="amenity")
     with refused(InputError, "no geometry", "set_geometry"):

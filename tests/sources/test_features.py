@@ -16,6 +16,7 @@ from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.osm.features import frame_layers, read_layers, tells_elements
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from semsig_gis.sources import RawLayer
@@ -27,7 +28,7 @@ IDS = ["node/1", "node/2"]
 SQUARE = shapely.box(2, 48, 2.001, 48.001)
 
 
-def frame(shapes: list[object] | None = None, **columns: list[Any]) -> gpd.GeoDataFrame:
+def frame(shapes: Sequence[object] | None = None, **columns: list[Any]) -> gpd.GeoDataFrame:
     size = len(next(iter(columns.values())))
     geometry = shapes or [shapely.Point(2 + number, 48) for number in range(size)]
     names = {name.replace("at_", "@"): values for name, values in columns.items()}

@@ -26,7 +26,6 @@ from sentences import refused
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.catalog import ClassBy, LayerSpec
-from semsig_gis.sources.raw_layer import RowRules
 from semsig_gis.sources.vector import DRIVERS, list_layers, read_layer
 
 if TYPE_CHECKING:
@@ -355,7 +354,6 @@ class Source:
         return feature
 
 
-RULES = RowRules(spec_of(), [], filters=True, where="here")
 GEOMETRY = fiona.Geometry(coordinates=(1.0, 0.0), type="Point")
 GOOD = fiona.Feature(geometry=GEOMETRY, id="1", properties=fiona.Properties())
 
@@ -363,7 +361,7 @@ GOOD = fiona.Feature(geometry=GEOMETRY, id="1", properties=fiona.Properties())
 def test_features_that_raise_do_not_stop_the_rest() -> None:
     bad = ValueError("unlucky")
     source = Source(9, [bad, *[GOOD] * 3, bad, *[GOOD] * 3, bad])
-    rows = vector_file._read_rows(source, RULES, [])
+    rows = vector_file._read_rows(source, [], [])
     assert (rows.read, rows.numbers) == (9, [2, 3, 4, 6, 7, 8])
     assert rows.errors == dict.fromkeys((1, 5, 9), "cannot be read (unlucky)")
 
@@ -371,7 +369,7 @@ def test_features_that_raise_do_not_stop_the_rest() -> None:
 @pytest.mark.parametrize("size", [5, 5000])
 def test_reader_that_is_stuck_comes_to_an_end(size: int) -> None:
     features = itertools.chain([GOOD] * 3, itertools.repeat(OSError(5, "no more")))
-    rows = vector_file._read_rows(Source(size, features), RULES, [])
+    rows = vector_file._read_rows(Source(size, features), [], [])
     assert rows.numbers == [1, 2, 3]
     assert rows.read == len(rows.numbers) + len(rows.errors) == max(size, 1003)
 

@@ -66,7 +66,7 @@ def relation_shape(
     return _require_area(_areas(area))
 
 
-def feature_shape(geometry: BaseGeometry, role: Role) -> BaseGeometry:
+def feature_shape(geometry: shapely.Geometry, role: Role) -> shapely.Geometry:
     """Return what a way or multipolygon stands for of which a program has made a shape already.
 
     It is as of `way_shape` if it has one outline, whether drawn as a line or an area.
@@ -100,7 +100,7 @@ def _rings(ways: Iterable[NDArray[np.float64]]) -> list[BaseGeometry]:
     return [_areas(ring) for ring in (*closed, *filled)]
 
 
-def _areas(geometry: BaseGeometry) -> BaseGeometry:
+def _areas(geometry: shapely.Geometry) -> BaseGeometry:
     """Return the areas in a geometry, in valid form."""
     parts = shapely.get_parts(shapely.make_valid(geometry))
     return shapely.union_all(parts[shapely.get_dimensions(parts) == 2])  # noqa: PLR2004

@@ -7,6 +7,7 @@ own, in one column of all of them, or as a class of Geofabrik.
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 import re
 from dataclasses import dataclass, replace
@@ -121,13 +122,13 @@ def table_layers(
             kind, number = names[row]
             kind = kind or _kind(position)
             name = f"{kind}/{number}" if number else ""
-            found = _completed(found, kind, position, all_tags=all_tags)
+            full = _completed(found, kind, position, all_tags=all_tags)
             for layer in wanted:
                 if name and (layer, name) in seen:
                     continue
                 seen.add((layer, name))
                 place = _place(position, layers[layer].spec)
-                layers[layer].add(kind, name or f"row {row + 1}", found, place)
+                layers[layer].add(kind, name or f"row {row + 1}", full, place)
     raw = [layer.raw(None) for layer in layers]
     # A table seldom holds elements of all layers, and what cannot be read is of none of them.
     raw = [layer if layer.counts.read else replace(layer, notes=()) for layer in raw]
@@ -205,7 +206,7 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
             frame = frame.set_crs(crs)
         yield frame_table(frame)
         return
-    for table in read_tables(path, lambda fields: holds_tags(fields) and wanted, crs=crs):
+    for table in read_tables(path, lambda fields: wanted if holds_tags(fields) else (), crs=crs):
         rows = table.rows
         values = zip(*rows.values, strict=True) if rows.values else [()] * len(table.fields)
         columns = {
@@ -319,26 +320,42 @@ def _says_kinds(values: pd.Series[Any]) -> bool:
 def _names(columns: Mapping[str, pd.Series[Any]], size: int) -> list[Name]:
     """Return kind and number of the element of every row, as far as it is told."""
     names: list[Name] = [(None, "")] * size
+    told = (_numbered(columns), _of_pairs(columns), _of_texts(columns))
+    for row, name in itertools.chain.from_iterable(told):
+        names[row] = name
+    return names
+
+
+def _numbered(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, Name]]:
+    """Yield what GDAL, Geofabrik and osm2pgsql say, of whose columns one has the number alone."""
+    among_areas = WAY_NUMBER in columns
     for row, value in _known(columns.get(NUMBER)):
         number = as_text(value)
         if number.lstrip("-").isdigit():  # osm2pgsql has relations below zero
-            kind = "relation" if number.startswith("-") or WAY_NUMBER in columns else None
-            names[row] = (kind, number.lstrip("-"))  # type: ignore[assignment]
+            relation = among_areas or number.startswith("-")
+            yield row, ("relation" if relation else None, number.lstrip("-"))
     for row, value in _known(columns.get(WAY_NUMBER)):
         if as_text(value).isdigit():
-            names[row] = ("way", as_text(value))
+            yield row, ("way", as_text(value))
+
+
+def _of_pairs(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, Name]]:
+    """Yield what two columns say, one of the kind and one of the number."""
     for kinds, numbers in KINDS_AND_NUMBERS:
         if kinds in columns and numbers in columns and _says_kinds(columns[kinds]):
             told = dict(_known(columns[kinds]))
             for row, value in _known(columns[numbers]):
                 if row in told and as_text(value).isdigit():
-                    names[row] = (KINDS[str(told[row])[0].lower()], as_text(value))
+                    yield row, (KINDS[str(told[row])[0].lower()], as_text(value))
+
+
+def _of_texts(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, Name]]:
+    """Yield what a column of both says."""
     for column in NAMES:
         for row, value in _known(columns.get(column)):
             match = NAME.fullmatch(value) if isinstance(value, str) else None
             if match:
-                names[row] = (KINDS[match[1][0]], match[2])
-    return names
+                yield row, (KINDS[match[1][0]], match[2])
 
 
 def _kind(position: Position | str) -> ElementKind:
