@@ -22,6 +22,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 __all__ = ["AssetsBuildHook", "AssetsError", "bring_assets"]
 
 ASSETS = Path("semsig_gis", "assets")
+TEST_ASSETS = Path("tests", "assets")
 NPM_SECONDS = 120
 
 
@@ -38,7 +39,8 @@ class AssetsBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its para
         Parameters
         ----------
         version : str
-            ``"standard"`` or ``"editable"``; both need the files.
+            ``"standard"`` or ``"editable"``; both need the files, and who works on the package
+            those of the tests, too.
         build_data : dict
             What other hooks may change; unused.
         """
@@ -46,6 +48,12 @@ class AssetsBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its para
             bring_assets(Path(self.root, ASSETS))
         except AssetsError as error:
             self.app.display_warning(f"Maps will link Leaflet instead of containing it: {error}")
+        if version != "editable" or not Path(self.root, TEST_ASSETS).is_dir():
+            return
+        try:
+            bring_assets(Path(self.root, TEST_ASSETS))
+        except AssetsError as error:
+            self.app.display_warning(f"Some tests in a browser will be skipped: {error}")
 
 
 def bring_assets(folder: Path) -> tuple[str, ...]:

@@ -174,6 +174,7 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     options.binary_location = chromium
     switches = (
         "--headless=new --no-sandbox --disable-dev-shm-usage --disable-gpu --disable-quic "
+        "--enable-unsafe-swiftshader "  # WebGL, drawn by the processor
         "--disable-component-update --window-size=1200,900"
     )
     for argument in (

@@ -96,11 +96,12 @@ def published(
         cut = left.pop(0) if left else None
         if not part or condition not in {None, etag, modified}:
             return Answer(body, headers=headers, cut=cut)
-        start = int(part.removeprefix("bytes=").partition("-")[0])
+        first, _, last = part.removeprefix("bytes=").partition("-")
+        start, end = int(first), min(int(last or len(body)), len(body) - 1)
         if start >= len(body):
             return Answer(status=416, headers={"Content-Range": f"bytes */{len(body)}"})
-        headers["Content-Range"] = f"bytes {start}-{len(body) - 1}/{len(body)}"
-        return Answer(body[start:], status=206, headers=headers, cut=cut)
+        headers["Content-Range"] = f"bytes {start}-{end}/{len(body)}"
+        return Answer(body[start : end + 1], status=206, headers=headers, cut=cut)
 
     return answer
 

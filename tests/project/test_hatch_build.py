@@ -69,12 +69,12 @@ def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "calls"
 
 
-def run_hook(hook: SimpleNamespace, project: Path) -> list[str]:
+def run_hook(hook: SimpleNamespace, project: Path, version: str = "standard") -> list[str]:
     """Run the hook as hatchling does and return the warnings it shows."""
     warnings: list[str] = []
     app = SimpleNamespace(display_warning=warnings.append)
     arguments: list[Any] = [str(project), {}, None, None, "", "wheel", app]
-    hook.AssetsBuildHook(*arguments).initialize("standard", {})
+    hook.AssetsBuildHook(*arguments).initialize(version, {})
     return warnings
 
 
@@ -121,6 +121,19 @@ def test_what_cannot_be_brought_is_one_line_and_nothing_is_written(
     assert re.search(reason, warning)
     assert "\n" not in warning
     assert contents(folder) == {}
+
+
+@pytest.mark.usefixtures("npm")
+@pytest.mark.parametrize(("version", "brought"), [("standard", {}), ("editable", FILES)])
+def test_files_of_tests_are_for_who_works_on_it(
+    hook: SimpleNamespace, folder: Path, version: str, brought: dict[str, bytes]
+) -> None:
+    project = folder.parents[1]
+    of_tests = project / "tests" / "assets"
+    of_tests.mkdir(parents=True)
+    (of_tests / "manifest.toml").write_bytes((folder / "manifest.toml").read_bytes())
+    assert run_hook(hook, project, version) == []
+    assert (contents(folder), contents(of_tests)) == (FILES, brought)
 
 
 def test_without_npm(
