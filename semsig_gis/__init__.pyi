@@ -149,7 +149,11 @@ from .maps.location import localization_map as localization_map
 from .maps.location import location_map as location_map, posterior_map as posterior_map
 from .maps.objects import ground_map as ground_map, objects_map as objects_map
 from .maps.page import save_map as save_map, show_map as show_map
-from .exports import export_answer as export_answer, export_database as export_database
+from .exports import (
+    export_answer as export_answer,
+    export_database as export_database,
+    export_item as export_item,
+)
 from .exports.geopackage import (
     GeopackageContents as GeopackageContents,
     read_geopackage as read_geopackage,

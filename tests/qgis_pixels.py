@@ -1,7 +1,7 @@
-"""The colours in which QGIS draws a raster when it is opened; run by QGIS's own Python.
+"""The colours in which QGIS draws rasters when they are opened; run by QGIS's own Python.
 
-Usage: ``python3 qgis_pixels.py RASTER``. Prints JSON: the labels of its legend, their colours, and
-the colour of each pixel, from the north-west, null where it is clear.
+Usage: ``python3 qgis_pixels.py RASTER...``. Prints a JSON list: of each the labels of its legend,
+their colours, and the colour of each pixel, from the north-west, null where it is clear.
 """
 
 # ruff: noqa: T201 - a program, which imports what only QGIS has
@@ -10,12 +10,10 @@ import os
 import sys
 
 
-def main(path: str) -> None:
-    from qgis.core import QgsApplication, QgsRasterLayer
+def drawn(path: str) -> dict[str, object]:
+    from qgis.core import QgsRasterLayer
     from qgis.PyQt.QtGui import QColor
 
-    application = QgsApplication([], False)  # noqa: FBT003
-    application.initQgis()
     layer = QgsRasterLayer(path)
     renderer, source = layer.renderer(), layer.dataProvider()
     items = renderer.shader().rasterShaderFunction().colorRampItemList()
@@ -24,9 +22,19 @@ def main(path: str) -> None:
         [QColor.fromRgba(block.color(row, column)) for column in range(block.width())]
         for row in range(block.height())
     ]
-    shown = [[one.name() if one.alpha() else None for one in line] for line in pixels]
-    facts = {"labels": [item.label for item in items], "pixels": shown}
-    print(json.dumps({**facts, "colours": [item.color.name() for item in items]}))
+    return {
+        "labels": [item.label for item in items],
+        "colours": [item.color.name() for item in items],
+        "pixels": [[one.name() if one.alpha() else None for one in line] for line in pixels],
+    }
+
+
+def main(*paths: str) -> None:
+    from qgis.core import QgsApplication
+
+    application = QgsApplication([], False)  # noqa: FBT003
+    application.initQgis()
+    print(json.dumps([drawn(path) for path in paths]))
     # QGIS and Python do not agree on who takes the layers down.
     sys.stdout.flush()
     os._exit(0)

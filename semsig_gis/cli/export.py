@@ -31,7 +31,7 @@ def export(
             help="File to write: a GeoPackage of all layers, for QGIS (.gpkg), one layer as "
             "GeoParquet (.parquet), FlatGeobuf (.fgb), GeoJSON (.geojson) or CSV (.csv), the cells "
             "by zoom for maps of the web (.pmtiles), or numbers of places as a Cloud-Optimised "
-            "GeoTIFF (.tif)."
+            "GeoTIFF (.tif); or what the database is as an item of STAC (.json)."
         ),
     ],
     objects: Annotated[Path | None, typer.Option(help="Street objects to add as a layer.")] = None,
@@ -69,10 +69,17 @@ def export(
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
     from semsig_gis.database.city import open_city
-    from semsig_gis.exports import export_database
+    from semsig_gis.exports import ITEM, export_database, export_item
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(database, objects))
+    if out.suffix.lower() == ITEM:
+        if any(option is not None for option in (evaluation, layer, smooth, h3, geometry)):
+            msg = f"{out} tells of the files of a database; give no option but --objects with it."
+            raise InputError(msg)
+        export_item(database, out, objects=objects)
+        say(f"exported: {out}")
+        return
     city = open_city(database)
     queries = None
     if evaluation is not None:

@@ -3,7 +3,8 @@
 ``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``, ``.fgb``,
 ``.geojson`` and ``.csv`` (`exports.files`) hold one; ``.pmtiles`` (`exports.tiles`) holds the cells
 by zoom, and ``.tif`` (`exports.rasters`) one number a cell. An answer goes into the same files, and
-whole into ``.geojson`` and ``.kml`` (`exports.answers`).
+whole into ``.geojson`` and ``.kml`` (`exports.answers`). ``.json`` (`exports.stac`) tells of the
+files of a database.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
 from semsig_gis.database.answer import REGION_SHARE
+from semsig_gis.database.city import open_city
 from semsig_gis.database.database import require_same_place
 from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import geopackage
@@ -44,6 +46,9 @@ LAYERS = ("cells", "objects", "evaluation", "evaluation_lines", "hexagons")
 
 RASTERS = ("ambiguity", "identifiability", "error", "field")
 """What may be written of a database as a raster."""
+
+ITEM = ".json"
+"""Suffix of an item of STAC, which tells of the files of a database."""
 
 _MANY_LAYERS = {".gpkg": geopackage.write_layers}
 _ONE_LAYER: Mapping[str, Callable[..., None]] = {
@@ -298,6 +303,61 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     return content
 
 
+def export_item(
+    database: str | Path, path: str | Path, *, objects: str | Path | None = None
+) -> None:
+    """Write what a database is as an item of a SpatioTemporal Asset Catalog (STAC 1.1).
+
+    Parameters
+    ----------
+    database : str or Path
+        File of the database, or folder of its parts.
+    path : str or Path
+        File to write, ``.json``; it appears whole, by rename. It names the files of the database
+        by where they are from there.
+    objects : str or Path, optional
+        File of the objects that the cells see.
+
+    Raises
+    ------
+    DatabaseError
+        If the database is missing, damaged, or holds something else.
+    InputError
+        If the suffix is another, pystac is not installed, or the file cannot be written.
+
+    Notes
+    -----
+    The item has the extent, the CRS and the grid (extension ``projection``), the licences, and the
+    files as assets, with their sizes and checksums (extension ``file``). Its date is when the
+    database was written. The names of the specs begin with ``semsig:``.
+
+    Examples
+    --------
+    >>> import json
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from semsig_gis import save_database
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     export_item(f"{folder}/city.parquet", f"{folder}/city.json")
+    ...     item = json.loads(Path(folder, "city.json").read_text())
+    >>> item["assets"]["database"]["href"], item["properties"]["proj:code"]
+    ('city.parquet', 'EPSG:32631')
+    """
+    _suffix(path, {ITEM})
+    try:
+        from semsig_gis.exports.stac import write_item  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError as error:
+        if str(error.name).partition(".")[0] != "pystac":
+            raise
+        msg = (
+            "a STAC item needs pystac, which is not installed; install it with pip install "
+            "'semsig_gis[stac]'."
+        )
+        raise InputError(msg) from error
+    write_item(open_city(database), path, objects=objects)
+
+
 def export_answer(
     answer: Answer,
     database: SignatureDatabase,
@@ -368,10 +428,8 @@ def _suffix(path: str | Path, accepted: Collection[str]) -> str:
     suffix = Path(path).suffix.lower()
     if suffix not in accepted:
         # One of each format.
-        names = [name for name in accepted if name != ".tiff"]
-        msg = (
-            f"{path} does not end in {', '.join(names[:-1])} or {names[-1]}; give a name that says "
-            "the format."
-        )
+        *names, last = [name for name in accepted if name != ".tiff"]
+        listed = f"{', '.join(names)} or {last}" if names else last
+        msg = f"{path} does not end in {listed}; give a name that says the format."
         raise InputError(msg)
     return suffix

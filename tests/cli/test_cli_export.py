@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pyogrio
 import pytest
 import rasterio
+from sentences import sentence
 from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
@@ -112,3 +113,17 @@ def test_the_number_of_cells_that_tie_is_printed(
     query = {"types": "D", "bearings": None, "length": 1}
     print_answer({**found, "query": query, "notes": [], "north": {"name": "grid"}})
     assert f"\n{words}" in capsys.readouterr().out
+
+
+def test_formats_for_other_programs(run: Run, done: Done) -> None:
+    hexagons = "--objects objects.parquet --evaluation evaluation --h3 10"
+    done(f"export city.parquet {hexagons} --out hexagons.geojson")
+    table = gpd.read_file("hexagons.geojson")
+    assert table["cells"].sum() == len(small_city()[0])
+    assert {"chance_found", "objects", "queries", "found"} <= set(table.columns)
+    done("export city.parquet --out cells.pmtiles")
+    assert Path("cells.pmtiles").read_bytes()[:8] == b"PMTiles\x03"
+    done("export city.parquet --objects objects.parquet --out city.json")
+    assert set(json.loads(Path("city.json").read_text())["assets"]) == {"database", "objects"}
+    sentence(run("export city.parquet --h3 9 --out city.json"), "city.json", "--objects")
+    sentence(run("export city.parquet --h3 16 --out a.fgb"), "--h3", "16")

@@ -17,10 +17,18 @@ from small_city import chances_of, small_city, small_evaluation, small_location
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signs import FAILURES
+from semsig_gis.core.signs import ERROR_BREAKS, FAILURES
 from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.rasters import cell_errors, export_geotiff
+from semsig_gis.exports.rasters import (
+    CLEAR,
+    ERRORS,
+    STYLES,
+    by_pixel,
+    cell_errors,
+    export_geotiff,
+)
+from semsig_gis.exports.styles import AMBIGUITY
 from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
@@ -94,26 +102,46 @@ def test_the_field_of_a_map(radius: float | None, tmp_path: Path) -> None:
     assert np.isfinite(whole).sum() == np.isfinite(field.failed).sum()
 
 
-def test_qgis_draws_the_field_as_the_map_does(
+def test_qgis_draws_rasters_as_the_maps_do(
     qgis_python: str, qgis_environment: dict[str, str], tmp_path: Path
 ) -> None:
-    database, evaluation, file = small_city()[0], small_evaluation("medium"), tmp_path / "field.tif"
-    export_database(database, file, layers="field", evaluation=evaluation, smooth=60.0)
+    database, evaluation = small_city()[0], small_evaluation("medium")
+    export_database(database, tmp_path / "ambiguity.tif")
+    file = tmp_path / "identifiability.tif"
+    export_database(database, file, layers="identifiability", identifiability=chances_of(database))
+    export_database(database, tmp_path / "error.tif", layers="error", evaluation=evaluation)
+    field = tmp_path / "field.tif"
+    export_database(database, field, layers="field", evaluation=evaluation, smooth=60.0)
+    export_answer(small_location(), database, tmp_path / "posterior.tif")
     program = Path(__file__).parents[1] / "qgis_pixels.py"
     said = subprocess.run(
-        [qgis_python, program, file],
+        [qgis_python, program, *(tmp_path / f"{name}.tif" for name in STYLES)],
         check=True, capture_output=True, timeout=120, env=qgis_environment,
     )  # fmt: skip
-    told = json.loads(said.stdout)
-    assert told["labels"][:2] == ["failed: 0% to 10%", "failed: 10% to 25%"]
-    assert told["colours"] == list(FAILURES.values())
-    with rasterio.open(file) as read:
-        failed = read.read(1)
-    levels = np.digitize(failed, list(FAILURES)) - 1
-    sure = np.isfinite(failed) & ~np.isin(failed, list(FAILURES))  # a border is of either class
-    drawn = np.array(told["pixels"])
-    assert (drawn[sure] == np.array(told["colours"])[levels[sure]]).all()
-    assert (drawn[np.isnan(failed)] == None).all()  # noqa: E711 - element by element
+    for (name, classes), told in zip(STYLES.items(), json.loads(said.stdout), strict=True):
+        assert told["labels"] == [label for label, _ in classes.values()]
+        with rasterio.open(tmp_path / f"{name}.tif") as read:
+            values = read.read(1).astype(np.float64)
+        colours = [None if colour == CLEAR else colour for _, colour in classes.values()]
+        lows = np.array([low for low, _ in classes])
+        levels = np.searchsorted(lows, values, side="right") - 1
+        sure = np.isfinite(values) & ~np.isin(values, lows[1:].astype(np.float32))
+        sure |= np.isfinite(values) & (name == "ambiguity")  # whose classes have no common border
+        drawn = np.array(told["pixels"])
+        assert (drawn[sure] == np.array(colours, dtype=object)[levels[sure]]).all()
+        assert (drawn[np.isnan(values)] == None).all()  # noqa: E711 - element by element
+        assert len({*levels[sure].tolist()}) > 2
+
+
+def test_the_style_is_that_of_the_numbers_beside_it(tmp_path: Path) -> None:
+    database, file = small_city()[0], tmp_path / "a.tif"
+    export_database(database, file, layers="field", evaluation=small_evaluation())
+    failed = file.with_suffix(".qml").read_text()
+    export_database(database, file)
+    assert file.with_suffix(".qml").read_text() == by_pixel(AMBIGUITY) != failed
+    # What is told of errors is told in the colours of what failed, the worse the darker.
+    assert [colour for _, colour in ERRORS.values()] == [*FAILURES.values()]
+    assert [high for _, high in ERRORS] == [*ERROR_BREAKS, np.inf]
 
 
 def test_what_is_not_of_the_field_is_refused(tmp_path: Path) -> None:

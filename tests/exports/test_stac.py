@@ -1,0 +1,133 @@
+"""STAC items: pystac finds nothing wrong with them, and they say where, whose and which file."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import sys
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pystac
+import pytest
+from pystac.extensions.file import FileExtension
+from pystac.extensions.projection import ProjectionExtension
+from pystac.validation import RegisteredValidator
+from pystac.validation.stac_validator import JsonSchemaSTACValidator
+from sentences import refused
+from small_city import small_city
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.file import save_database
+from semsig_gis.exports import export_item
+from semsig_gis.objects.table import save_objects
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+CITY, OBJECTS = small_city()
+NUMBERS = {"type": "array", "items": {"type": "number"}}
+# What the two extensions ask of their fields, since their own schemas are on a server.
+FIELDS: dict[str, dict[str, Any]] = {
+    "projection/v2.0.0": {
+        "proj:code": {"type": ["string", "null"], "pattern": "^[A-Z]+:[0-9]+$"},
+        "proj:projjson": {"type": ["object", "null"], "required": ["type", "name"]},
+        "proj:bbox": {**NUMBERS, "minItems": 4, "maxItems": 4},
+        "proj:shape": {"type": "array", "items": {"type": "integer"}, "minItems": 2, "maxItems": 2},
+        "proj:transform": {**NUMBERS, "minItems": 6, "maxItems": 9},
+    },
+    "file/v2.1.0": {
+        "file:size": {"type": "integer", "minimum": 0},
+        "file:checksum": {"type": "string", "pattern": "^[a-f0-9]+$"},
+    },
+}
+
+
+@pytest.fixture(autouse=True)
+def _schemas() -> Iterator[None]:
+    """Have pystac validate without a network."""
+    validator = JsonSchemaSTACValidator()
+    for name, fields in FIELDS.items():
+        prefix = next(iter(fields)).partition(":")[0]
+        strict = {
+            "properties": fields,
+            "patternProperties": {f"^(?!{prefix}:)": {}},
+            "additionalProperties": False,
+        }
+        address = f"https://stac-extensions.github.io/{name}/schema.json"
+        validator.schema_cache[address] = {
+            "$schema": "http://json-schema.org/draft-07/schema#",
+            "$id": address,
+            "properties": {"properties": strict, "assets": {"additionalProperties": strict}},
+        }
+    before = RegisteredValidator.get_validator()
+    RegisteredValidator.set_validator(validator)
+    yield
+    RegisteredValidator.set_validator(before)
+
+
+def test_an_item_is_valid_and_says_what_the_database_is(tmp_path: Path) -> None:
+    save_database(CITY, tmp_path / "data" / "city.parquet")
+    save_objects(OBJECTS, tmp_path / "objects.parquet")
+    file = tmp_path / "items" / "city.json"
+    city, objects = tmp_path / "data" / "city.parquet", tmp_path / "objects.parquet"
+    export_item(city, file, objects=objects)
+    item = pystac.Item.from_file(str(file))
+    assert len(item.validate()) == 3
+    projected = ProjectionExtension.ext(item)
+    assert projected.code == "EPSG:32631"
+    assert projected.bbox is not None
+    west, south, east, north = projected.bbox
+    assert (CITY.xy.min(axis=0) - 5).tolist() == [west, south]
+    assert (CITY.xy.max(axis=0) + 5).tolist() == [east, north]
+    assert (projected.shape, projected.transform) == (
+        [(north - south) / 10, (east - west) / 10],
+        [10.0, 0.0, west, 0.0, -10.0, north],
+    )
+    lon, lat = np.array(item.bbox).reshape(2, 2).mean(axis=0)
+    assert (round(lon, 1), 48 < lat < 49) == (3.0, True)
+    assert item.datetime == datetime.fromtimestamp(int(city.stat().st_mtime), tz=UTC)
+    assert item.properties["license"] == "CC0"
+    assert item.properties["providers"][0]["name"] == "Town"
+    assert item.properties["semsig:licenses"] == list(CITY.licenses)
+    assert item.properties["semsig:taxonomy"] == CITY.taxonomy.to_list()
+    hrefs = {"database": "../data/city.parquet", "objects": "../objects.parquet"}
+    assert {name: asset.href for name, asset in item.assets.items()} == hrefs
+    for name, path in {"database": city, "objects": objects}.items():
+        told = FileExtension.ext(item.assets[name])
+        assert item.assets[name].media_type == pystac.MediaType.VND_APACHE_PARQUET
+        assert told.size == path.stat().st_size
+        assert told.checksum == "1220" + hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("licenses", "licence"),
+    [
+        ((), "other"),
+        (("OpenStreetMap contributors (ODbL-1.0): trees",), "ODbL-1.0"),
+        (("A (ODbL-1.0): trees", "B (CC0-1.0): lamps"), "other"),
+        (("A (Licence Ouverte 2.0)",), "other"),
+        (("no brackets",), "other"),
+    ],
+)
+def test_the_licence_of_all(licenses: tuple[str, ...], licence: str, tmp_path: Path) -> None:
+    save_database(dataclasses.replace(CITY, licenses=licenses), tmp_path / "a.parquet")
+    export_item(tmp_path / "a.parquet", tmp_path / "a.json")
+    item = pystac.Item.from_dict(json.loads((tmp_path / "a.json").read_text()))
+    item.validate()
+    assert item.properties["license"] == licence
+    assert len(item.properties["providers"]) == len(licenses)
+
+
+def test_what_cannot_be_an_item_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_database(CITY, tmp_path / "a.parquet")
+    with refused(InputError, "a.yaml does not end in .json"):
+        export_item(tmp_path / "a.parquet", tmp_path / "a.yaml")
+    monkeypatch.delitem(sys.modules, "semsig_gis.exports.stac", raising=False)
+    monkeypatch.setitem(sys.modules, "pystac", None)
+    with refused(InputError, "pystac", "semsig_gis[stac]"):
+        export_item(tmp_path / "a.parquet", tmp_path / "a.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
