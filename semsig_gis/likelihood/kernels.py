@@ -18,6 +18,7 @@ _REACH = 6.0  # deviations beyond which a detection is not taken for an object
 _LEAST = 1e-6  # weight of a pair against a miss and a false detection, from which it counts
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200
+_SURE = 6.0  # from which on the error function is one
 # How often messages are sent, and the relative change at which they are taken for settled.
 _ROUNDS, _SETTLED = 30, 1e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
@@ -39,7 +40,9 @@ def _mass(start: float, width: float, spread: float) -> float:
     total = 0.0
     for lap in range(-laps - 1, laps + 1):
         low = (start + _TURN * lap) * scale
-        total += math.erf(low + width * scale) - math.erf(low)
+        high = low + width * scale
+        if low < _SURE and high > -_SURE:
+            total += math.erf(high) - math.erf(low)
     return 0.5 * total
 
 
@@ -128,7 +131,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 start += math.log(floor[two])
             for way in range(turns.shape[1]):
                 turn = turns[place, way]
-                total = start
+                total, unseen = start, 1.0
                 edges = 0
                 for one in range(count):
                     ends[one] = edges
@@ -148,7 +151,10 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                                 spread,
                             )
                     missed = 1.0 - chance * inside
-                    total += math.log(missed)
+                    unseen *= missed
+                    if unseen < 1.0 / _LARGE:
+                        total += math.log(unseen)
+                        unseen = 1.0
                     if chance == 0.0:
                         continue
                     factor = chance / (missed * spread * _ROOT)
@@ -193,7 +199,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                         back[edge] = new
                     if settled:
                         break
-                product = 1.0
+                product = unseen
                 for one in range(count):
                     here = 1.0
                     for edge in range(ends[one], ends[one + 1]):

@@ -269,7 +269,7 @@ KEPT = (1000, 400, 200, 100)
 """How many parts are divided, level by level: cells, their quarters, and so on."""
 LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
 TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
-TURNS_A_SIDE = 3
+TURNS_A_SIDE = 2
 NEAR = 25.0  # metres from the best place that are averaged over
 BEST = 300  # likeliest parts among which the best place is looked for
 CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
