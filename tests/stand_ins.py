@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlencode
 
 from servers import Answer
 
@@ -65,6 +66,8 @@ class StandIn:
     # What a wrong `dataset` is answered with.
     others: tuple[str, ...] = ()
     limit = 2
+    # Whether it can cut out an area.
+    cuts = True
     # The begin of a page.
     half = b'{"features": [{"type"'
 
@@ -326,4 +329,203 @@ class WfsOfGml(Wfs):
     formats = ("application/gml+xml; version=3.2",)
 
 
-STAND_INS = (ArcGIS, Wfs, WfsOfGml)
+class OgcFeatures(StandIn):
+    """Its pages have links to the next ones, on the same address or another; it omits nulls."""
+
+    reader = "ogc_features"
+    dataset = "lamps"
+    wrong = "lampposts"
+    others = ("lamps", "kerbs")
+    conforms: tuple[str, ...] = ("core", "geojson")
+    filters = "http://www.opengis.net/spec/ogcapi-features-3/1.0/conf/features-filter"
+    next_host = ""
+
+    def start(self) -> None:
+        on, path = self.server.on, "/ogc/collections"
+        on("/ogc/conformance", self.conformance)
+        links = [
+            {"rel": "items", "type": "text/html", "href": f"{path}/lamps/items?f=html"},
+            {"rel": "items", "type": "application/geo+json", "href": f"{path}/lamps/items?f=x"},
+            {"rel": "license", "href": "https://licence.example/by"},
+            {
+                "rel": "http://www.opengis.net/def/rel/ogc/1.0/queryables",
+                "href": f"{self.server.url}{path}/lamps/queryables",
+            },
+        ]
+        on(path, sent({"collections": [{"id": "lamps"}, {"id": "kerbs"}]}))
+        on(f"{path}/lamps", sent({"id": "lamps", "links": links}))
+        schema = {"type": "object", "properties": {name: {} for name in FIELDS}}
+        on(f"{path}/lamps/queryables", sent(schema, type="application/schema+json"))
+        on(f"{path}/lamps/items", self.items)
+
+    @property
+    def endpoint(self) -> str:
+        return f"{self.server.url}/ogc"
+
+    def is_page(self, seen: Seen) -> bool:
+        return seen.path.endswith("/items")
+
+    def conformance(self, _: Seen) -> Answer:
+        base = "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf"
+        return sent({"conformsTo": [*(f"{base}/{name}" for name in self.conforms), self.filters]})
+
+    def items(self, seen: Seen) -> Answer:
+        asked = seen.query
+        assert seen.headers["accept"].startswith("application/geo+json, ")
+        rows: Sequence[Row] = self.rows
+        if "bbox" in asked:
+            rows = self.inside(*map(float, asked["bbox"].split(",")))
+        if "filter" in asked:
+            assert (asked["filter"], asked["filter-lang"]) == ("KIND = 'lamp'", "cql2-text")
+            rows = [row for row in rows if row["KIND"] == "lamp"]
+        if (failure := self.failure()) is not None:
+            return failure
+        start = int(asked.get("offset", 0))
+        some = self.part(rows, start, asked["limit"])
+        listed = features(some)
+        for item in listed:
+            item["properties"] = {k: v for k, v in item["properties"].items() if v is not None}
+        links = [{"rel": "self", "href": seen.path}]
+        if self.circles or start + len(some) < len(rows):
+            query = urlencode({**asked, "offset": start + len(some)})
+            links.append({"rel": "next", "href": f"{self.next_host}?{query}"})
+        content = {
+            "type": "FeatureCollection",
+            "features": listed,
+            "links": links,
+            "timeStamp": f"2024-01-01T00:00:{len(self.server.seen):02}Z",
+            "numberMatched": len(rows) + self.surplus,
+            "numberReturned": len(some),
+        }
+        return sent(content, type="application/geo+json")
+
+
+class Ckan(StandIn):
+    """Its datastore has coordinates in two fields; it cannot cut out an area."""
+
+    reader = "ckan"
+    dataset = "lamps"
+    wrong = "lampposts"
+    others = ("the nearest is 'lamps'", "kerbs")
+    cuts = False
+    half = b'{"success": true, "result": {"records": ['
+
+    def start(self) -> None:
+        on = self.server.on
+        self.resources: list[dict[str, Any]] = [
+            {"id": "r-1", "name": "Map", "format": "PDF", "url": "/files/map.pdf"},
+            {"id": "r-2", "name": "Table", "format": "XLSX", "datastore_active": True},
+        ]
+        on("/api/3/action/package_show", self.package_show)
+        on("/api/3/action/package_list", sent({"success": True, "result": ["kerbs", "lamps"]}))
+        on("/api/3/action/datastore_search", self.datastore_search)
+
+    def is_page(self, seen: Seen) -> bool:
+        return seen.path.endswith("/datastore_search") and seen.query["limit"] != "0"
+
+    def package_show(self, seen: Seen) -> Answer:
+        if seen.query["id"] != "lamps":
+            error = {"__type": "Not Found Error", "message": "Not found"}
+            return sent({"success": False, "error": error}, status=404)
+        result = {
+            "name": "lamps",
+            "license_title": "CC0",
+            "organization": {"title": "City of Somewhere"},
+            "resources": self.resources,
+        }
+        return sent({"success": True, "result": result})
+
+    def datastore_search(self, seen: Seen) -> Answer:
+        asked = seen.query
+        assert asked["resource_id"] == "r-2"
+        if asked["limit"] == "0":
+            return self.found((), len(self.rows))
+        if (failure := self.failure()) is not None:
+            return failure
+        assert asked["sort"] == "_id"
+        wanted = json.loads(asked.get("filters", "{}")).items()
+        rows = [row for row in self.rows if all(row[name] == value for name, value in wanted)]
+        names = asked.get("fields", f"{','.join(FIELDS)},Longitude,Latitude").split(",")
+        records = [
+            {k: v for k, v in self.record(row).items() if k in names}
+            for row in self.part(rows, asked["offset"], asked["limit"])
+        ]
+        return self.found(records, len(rows) + self.surplus)
+
+    @staticmethod
+    def record(row: Row) -> Row:
+        x, y = map(str, row["xy"])
+        return properties(row) | {"Longitude": x, "Latitude": y}
+
+    @staticmethod
+    def found(records: Sequence[Row], total: int) -> Answer:
+        fields = [{"id": name} for name in (*FIELDS, "Longitude", "Latitude")]
+        result = {"fields": fields, "records": records, "total": total}
+        return sent({"success": True, "result": result})
+
+
+class Socrata(StandIn):
+    """Its rows are GeoJSON, or plain where the place is a `location` or two columns."""
+
+    reader = "socrata"
+    dataset = "abcd-1234"
+    wrong = "abcd-9999"
+    others = ("/browse",)
+    place = "point"
+
+    def start(self) -> None:
+        self.server.on("/api/views/abcd-1234.json", self.views)
+        for kind in ("json", "geojson"):
+            self.server.on(f"/resource/abcd-1234.{kind}", self.resource)
+
+    def is_page(self, seen: Seen) -> bool:
+        return seen.path.startswith("/resource/") and seen.query.get("$select") != "count(*)"
+
+    def views(self, _: Seen) -> Answer:
+        kinds = dict.fromkeys(FIELDS, "text") | {":@computed_region_x": "number"}
+        kinds |= {"the_place": self.place} if self.place else {"lon": "text", "lat": "text"}
+        columns = [{"fieldName": name, "dataTypeName": kind} for name, kind in kinds.items()]
+        terms = {"license": {"name": "PDDL"}, "attribution": "City of Somewhere"}
+        return sent({"id": "abcd-1234", "columns": columns, **terms})
+
+    def resource(self, seen: Seen) -> Answer:
+        asked = seen.query
+        rows: Sequence[Row] = self.rows
+        for condition in re.findall(r"\((.+?\)?)\)(?: AND |$)", asked.get("$where", "")):
+            rows = [row for row in rows if self.holds(condition, row)]
+        if asked.get("$select") == "count(*)":
+            return sent([{"count": str(len(rows) + self.surplus)}])
+        if (failure := self.failure()) is not None:
+            return failure
+        assert asked["$order"] == ":id"
+        names = asked.get("$select", ",".join(FIELDS)).split(",")
+        names = [name for name in names if name in FIELDS]
+        some = self.part(rows, asked["$offset"], asked["$limit"])
+        if seen.path.endswith(".geojson"):
+            assert self.place not in {"", "location"}
+            content = {"type": "FeatureCollection", "features": features(some, names)}
+            return sent(content, type="application/vnd.geo+json")
+        return sent([self.plain(row, names) for row in some])
+
+    def plain(self, row: Row, names: Sequence[str]) -> Row:
+        x, y = map(str, row["xy"])
+        where = {"latitude": y, "longitude": x, "human_address": "{}"}
+        values = {k: v for k, v in properties(row, names).items() if v is not None}
+        return values | ({"the_place": where} if self.place else {"lon": x, "lat": y})
+
+    def holds(self, condition: str, row: Row) -> bool:
+        if condition == "KIND = 'lamp'":
+            return bool(row["KIND"] == "lamp")
+        numbers = [float(text) for text in re.findall(r"-?\d+\.\d+", condition)]
+        x, y = map(float, row["xy"])
+        if condition.startswith("within_box(the_place, "):
+            north, west, south, east = numbers
+            return west <= x <= east and south <= y <= north
+        if condition.startswith("intersects(the_place, 'POLYGON (("):
+            return numbers[0] <= x <= numbers[2] and numbers[1] <= y <= numbers[5]
+        name = condition.partition("::number between ")[0]
+        least, most = numbers
+        return least <= (x if name == "lon" else y) <= most
+
+
+STAND_INS = (ArcGIS, Wfs, WfsOfGml, OgcFeatures, Ckan, Socrata)

@@ -25,12 +25,15 @@ if TYPE_CHECKING:
 # The module of this package that reads what a catalogue's `reader` names.
 READERS = {
     "arcgis": "services.layers",
+    "ckan": "services.layers",
     "mapillary": "mapillary",
+    "ogc_features": "services.layers",
     "opendatasoft": "services.layers",
     "osm_features": "osm.features",
     "osm_file": "osm.file",
     "overpass": "osm.overpass",
     "overture": "overture",
+    "socrata": "services.layers",
     "vector_file": "vector",
     "wfs": "services.layers",
 }

@@ -96,7 +96,7 @@ class Positions:
         self._x, self._y = own(spec.x_field), own(spec.y_field)
         named = spec.x_field or (self._shape or self._point) or table.has_geometry
         if not named:
-            self._x, self._y = _known_coordinates(table.fields)
+            self._x, self._y = known_coordinates(table.fields)
             self._shape = None if self._x else known_field(SHAPE_NAMES, table.fields)
         columns = (self._shape, self._point, self._x, self._y)
         self.fields = tuple(field for field in columns if field is not None)
@@ -134,7 +134,7 @@ def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
     return next((field for field in fields if field.lower() in names), None)
 
 
-def _known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
+def known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
     """Return two fields whose names say that they are coordinates."""
     for xs, ys in KNOWN_NAMES:
         x, y = known_field(xs, fields), known_field(ys, fields)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import html
 import importlib
 import json
 import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
-from urllib.parse import urljoin, urlsplit
+from urllib.parse import urlsplit
 
 from semsig_gis.core.errors import CatalogError, SourceError, nearest_name
 from semsig_gis.sources.http.errors import error_text
@@ -42,7 +41,10 @@ T = TypeVar("T")
 # The module of this package that asks each kind of service, by the name of its reader.
 SERVICES = {
     "arcgis": "arcgis",
+    "ckan": "ckan",
+    "ogc_features": "ogc_features",
     "opendatasoft": "opendatasoft",
+    "socrata": "socrata",
     "wfs": "wfs",
 }
 NAMES_TOLD = 12
@@ -71,7 +73,7 @@ class Page:
     it.
     """
 
-    rows: Sequence[object]
+    rows: Sequence[Any]
     told: int | None = None
     more: bool | None = None
     following: str | None = None
@@ -232,7 +234,16 @@ class Client:
 
 
 def json_object(content: bytes, url: str) -> dict[str, Any]:
-    """Return a JSON object that a service sent.
+    """Return a JSON object that a service sent, as `json_value` does; SourceError if it is none."""
+    reply = json_value(content, url)
+    if not isinstance(reply, dict):
+        msg = f"{host_of(url)} sent JSON that is no object; check the address {url}."
+        raise SourceError(msg)
+    return reply
+
+
+def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
+    """Return JSON that a service sent.
 
     SourceError if it is something else, such as a web page, HttpError if it is the service's word
     for an error, PassingError where a later answer may be better.
@@ -244,10 +255,7 @@ def json_object(content: bytes, url: str) -> dict[str, Any]:
     except ValueError as error:
         what = "sent JSON that is not whole"
         raise PassingError(what) from error
-    if not isinstance(reply, dict):
-        msg = f"{host} sent a JSON list where an object was expected; check the address {url}."
-        raise SourceError(msg)
-    failed = reply.get("error")
+    failed = reply.get("error") if isinstance(reply, dict) else None
     if failed:
         code = failed.get("code") if isinstance(failed, dict) else None
         status = code if isinstance(code, int) else 0
@@ -341,8 +349,3 @@ def fetch_layers(
             msg = f"layer {layer.name!r}: {error}"
             raise HttpError(msg, error.status) from error
     return downloads
-
-
-def next_page(page: Page, url: str) -> Query | None:
-    """Return the query of the page that a page names as the next one."""
-    return Query(urljoin(url, html.unescape(page.following))) if page.following else None

@@ -1,0 +1,202 @@
+"""Datasets of CKAN portals: the file of a resource, or its rows in the portal's datastore."""
+
+from __future__ import annotations
+
+import functools
+from fnmatch import fnmatchcase
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote, urljoin, urlsplit
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.http.fetch import HttpError, host_of
+from semsig_gis.sources.services.layers import Download, Positions
+from semsig_gis.sources.services.pages import HTML, NOT_FOUND, Page, Query, json_object
+from semsig_gis.sources.services.table import Table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.services.pages import Client
+
+    Resource = dict[str, Any]
+
+PAGE_ROWS = 10_000
+# What portals call the formats that can be read, best first, and the suffixes of their files.
+FORMATS = {
+    "geojson": ".geojson",
+    "geopackage": ".gpkg",
+    "gpkg": ".gpkg",
+    "flatgeobuf": ".fgb",
+    "fgb": ".fgb",
+    "shp": ".zip",
+    "shapefile": ".zip",
+    "zip": ".zip",
+    "gml": ".gml",
+    "csv": ".csv",
+    "json": ".json",
+    "parquet": ".parquet",
+}
+# Of these, the datastore has the rows with their types.
+TABLES = frozenset({".csv", ".json", ""})
+
+
+def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 - not in CKAN
+    """Fetch a dataset by its name: rows of the datastore, or the file of a resource.
+
+    The resource is the one of the best format; of several, the newest whose name is one of the
+    layer's `files`. ``server_where`` is a filter of the datastore in JSON. No area can be asked
+    for.
+    """
+    package = _package(client)
+    resource, suffix = _resource(client, list(package.get("resources") or ()))
+    owner = (package.get("organization") or {}).get("title")
+    spec = client.licensed(
+        package.get("license_title") or package.get("license_id"), owner or package.get("author")
+    )
+    if resource.get("datastore_active") and suffix in TABLES:
+        return _rows(client, spec, str(resource.get("id")))
+    if client.layer.server_where:
+        msg = (
+            f"layer {client.layer.name!r} has a server_where, and the datastore of "
+            f"{host_of(client.endpoint)} does not hold it; write it as `where`, which holds here."
+        )
+        raise CatalogError(msg)
+    address = urljoin(f"{client.endpoint}/", str(resource.get("url") or ""))
+    file = client.file(
+        Query(address),
+        lambda path: _refuse_page(path, address),
+        suffix=suffix,
+        progress=client.progress,
+    )
+    return Download(spec=spec, files=(file,))
+
+
+def _action(client: Client, name: str) -> str:
+    return f"{client.endpoint}/api/3/action/{name}"
+
+
+def _package(client: Client) -> dict[str, Any]:
+    """Return the description of a dataset; CatalogError, with the nearest name, if it is none."""
+    try:
+        reply = client.json(Query(_action(client, "package_show"), {"id": client.dataset}))
+    except HttpError as error:
+        if error.status != NOT_FOUND:
+            raise
+        listed = client.json(Query(_action(client, "package_list")))
+        names = listed.get("result")
+        names = [str(name) for name in names] if isinstance(names, list) else []
+        raise client.unknown(names, what="dataset") from error
+    package = reply.get("result")
+    if not isinstance(package, dict):
+        msg = (
+            "what the portal sends is no description of a dataset; check that the address is that "
+            "of a CKAN portal."
+        )
+        raise SourceError(msg)
+    return package
+
+
+def _file_name(resource: Resource) -> str:
+    return unquote(PurePosixPath(urlsplit(str(resource.get("url") or "")).path).name)
+
+
+def _suffix(resource: Resource) -> str | None:
+    """Return the suffix of what a resource is, or None where that is not read."""
+    said = str(resource.get("format") or "").lower()
+    words = said.replace("(", " ").replace(")", " ").replace(".", " ").split()
+    words.append(PurePosixPath(_file_name(resource)).suffix.lower().lstrip("."))
+    found = next((FORMATS[word] for word in FORMATS if word in words), None)
+    return "" if found is None and resource.get("datastore_active") else found
+
+
+def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]:
+    """Return the resource to fetch, and the suffix of its file."""
+    usable = [(item, suffix) for item in resources if (suffix := _suffix(item)) is not None]
+    names = [_shown(item) for item in resources]
+    if not usable:
+        msg = (
+            f"dataset {client.dataset!r} of layer {client.layer.name!r} has no resource that can "
+            f"be read, only {', '.join(names) or 'none at all'}; choose another dataset."
+        )
+        raise CatalogError(msg)
+    named = [pair for pair in usable if _is_named(pair[0], client.layer.files)]
+    order = [*dict.fromkeys(FORMATS.values()), ""]
+    chosen = named or usable
+    best = min((suffix for _, suffix in chosen), key=order.index)
+    chosen = [pair for pair in chosen if pair[1] == best]
+    if len(chosen) > 1 and not named:
+        listed = ", ".join(_shown(item) for item, _ in chosen)
+        msg = (
+            f"dataset {client.dataset!r} of layer {client.layer.name!r} has several resources "
+            f"({listed}); name the one that is meant in `files`, by a pattern such as "
+            f"{_file_name(chosen[0][0])!r}."
+        )
+        raise CatalogError(msg)
+    return max(chosen, key=lambda pair: _changed(pair[0]))
+
+
+def _shown(resource: Resource) -> str:
+    return _file_name(resource) or str(resource.get("name") or resource.get("id"))
+
+
+def _is_named(resource: Resource, patterns: tuple[str, ...]) -> bool:
+    names = [_file_name(resource).casefold(), str(resource.get("name") or "").casefold()]
+    return any(fnmatchcase(name, pattern.casefold()) for name in names for pattern in patterns)
+
+
+def _changed(resource: Resource) -> str:
+    return str(resource.get("last_modified") or resource.get("created") or "")
+
+
+def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:
+    """Fetch the rows that the datastore has of a resource, in its order."""
+    query = Query(_action(client, "datastore_search"), {"resource_id": resource})
+    described = client.document(query.also(limit=0), lambda content: _result(content, client))
+    names = tuple(str(item.get("id")) for item in described.get("fields") or ())
+    fields = client.fields(names)
+    if fields:
+        table = Table(names, lambda _: iter(()))
+        places = Positions(spec, table, where=f"dataset {client.dataset!r}").fields
+        query = query.also(fields=",".join(dict.fromkeys([*fields, *places])))
+    if client.layer.server_where:
+        query = query.also(filters=client.layer.server_where)
+    query = query.also(limit=PAGE_ROWS, sort="_id")
+
+    def then(page: Page, rows: int) -> Query | None:
+        rest = page.rows and (page.told is None or rows < page.told)
+        return query.also(offset=rows) if rest else None
+
+    read = functools.partial(_page, client=client)
+    return Download(spec=spec, files=client.pages(query.also(offset=0), read, then), fields=names)
+
+
+def _result(content: bytes, client: Client) -> dict[str, Any]:
+    result = json_object(content, client.endpoint).get("result")
+    if not isinstance(result, dict) or not isinstance(result.get("records"), list):
+        msg = (
+            f"{host_of(client.endpoint)} sent JSON without records; check the address "
+            f"{client.endpoint}."
+        )
+        raise SourceError(msg)
+    return result
+
+
+def _page(content: bytes, client: Client) -> Page:
+    result = _result(content, client)
+    told = result.get("total")
+    sure = isinstance(told, int) and not result.get("total_was_estimated")
+    return Page(result["records"], told=told if sure else None)
+
+
+def _refuse_page(path: Path, address: str) -> None:
+    """Refuse a web page in the place of a file."""
+    with path.open("rb") as stream:
+        if HTML.match(stream.read(200).lstrip()):
+            msg = (
+                f"{host_of(address)} sent a web page where the file {address} was expected; "
+                "download it by hand, or tell its publisher."
+            )
+            raise SourceError(msg)

@@ -1,0 +1,102 @@
+"""Collections of services that speak OGC API - Features, page by page along their links."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, urljoin
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.http.fetch import HttpError, host_of
+from semsig_gis.sources.services.layers import Download
+from semsig_gis.sources.services.pages import NOT_FOUND, Query, geojson_page
+
+if TYPE_CHECKING:
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.http.cache import Fetched
+    from semsig_gis.sources.services.pages import Client, Page
+
+PAGE_ROWS = 1_000
+GEOJSON, JSON = ("application/geo+json", "application/json"), ("application/json",)
+SCHEMA = ("application/schema+json", "application/json")
+CORE, FILTER = "ogcapi-features-1", "ogcapi-features-3/1.0/conf/features-filter"
+QUERYABLES = "http://www.opengis.net/def/rel/ogc/1.0/queryables"
+
+
+def fetch_layer(client: Client, area: Area | None) -> Download:
+    """Fetch a collection, which comes in WGS 84 with longitude first.
+
+    ``server_where`` is a filter in CQL2 text, where the service says that it takes such.
+    """
+    conformance = client.json(Query(f"{client.endpoint}/conformance"), accept=JSON)
+    classes = [str(name) for name in conformance.get("conformsTo") or ()]
+    if not any(CORE in name for name in classes):
+        msg = (
+            f"{host_of(client.endpoint)} does not say that it speaks OGC API - Features; check the "
+            f"address {client.endpoint}."
+        )
+        raise SourceError(msg)
+    params: dict[str, str | float] = {"limit": PAGE_ROWS}
+    if client.layer.server_where:
+        if not any(FILTER in name for name in classes):
+            msg = (
+                f"layer {client.layer.name!r} has a server_where, and {host_of(client.endpoint)} "
+                "takes no filter; write it as `where`, which holds here."
+            )
+            raise CatalogError(msg)
+        params |= {"filter": client.layer.server_where, "filter-lang": "cql2-text"}
+    collection, address = _collection(client)
+    items = _link(collection, "items", GEOJSON[0]) or f"{address}/items"
+    items = urljoin(f"{address}/", items)
+    fields = dict.fromkeys(_queryables(client, collection, address))
+
+    def read(content: bytes) -> Page:
+        page = geojson_page(content, client)
+        for row in page.rows:
+            fields.update(dict.fromkeys(row.get("properties") or {}))
+        return page
+
+    def then(page: Page, _: int) -> Query | None:
+        return Query(urljoin(items, page.following)) if page.following and page.rows else None
+
+    files: tuple[Fetched, ...] = ()
+    for box in area.boxes if area is not None else (None,):
+        inside = {} if box is None else {"bbox": ",".join(f"{number:.7f}" for number in box)}
+        query = Query(items, {**params, **inside})
+        files += client.pages(query, read, then, accept=GEOJSON)
+    if fields:
+        client.fields(list(fields))
+    licence = _link(collection, "license")
+    return Download(
+        spec=client.licensed(licence, collection.get("attribution")),
+        files=files,
+        fields=tuple(fields),
+    )
+
+
+def _collection(client: Client) -> tuple[dict[str, Any], str]:
+    """Return a collection and its address; CatalogError, with those there are, if it is none."""
+    address = f"{client.endpoint}/collections/{quote(client.dataset, safe='')}"
+    try:
+        return client.json(Query(address), accept=JSON), address
+    except HttpError as error:
+        if error.status != NOT_FOUND:
+            raise
+        listed = client.json(Query(f"{client.endpoint}/collections"), accept=JSON)
+        names = [str(item.get("id")) for item in listed.get("collections") or ()]
+        raise client.unknown(names, what="collection") from error
+
+
+def _link(collection: dict[str, Any], relation: str, kind: str = "") -> str:
+    """Return where a link of a collection leads, the first of that kind if it has one."""
+    links = [item for item in collection.get("links") or () if item.get("rel") == relation]
+    links.sort(key=lambda item: kind not in str(item.get("type")))
+    return str(links[0].get("href") or "") if links else ""
+
+
+def _queryables(client: Client, collection: dict[str, Any], address: str) -> list[str]:
+    """Return the fields that the service names, of which a page may lack some."""
+    link = _link(collection, QUERYABLES)
+    if not link:
+        return []
+    schema = client.json(Query(urljoin(f"{address}/", link)), accept=SCHEMA)
+    return list(schema.get("properties") or {})

@@ -1,0 +1,160 @@
+"""Datasets of Socrata portals, by their Open Data API (SODA 2.1)."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources.http.fetch import HttpError
+from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
+from semsig_gis.sources.services.pages import (
+    NOT_FOUND,
+    Page,
+    Query,
+    geojson_page,
+    json_value,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.http.cache import Fetched
+    from semsig_gis.sources.services.pages import Client
+
+    Box = tuple[float, float, float, float]
+
+PAGE_ROWS = 10_000
+LOCATION = "location"  # coordinates and an address, of which there is no GeoJSON
+POINTS = frozenset({"location", "multipoint", "point"})
+SHAPES = frozenset({"line", "multiline", "multipolygon", "polygon"})
+
+
+def fetch_layer(client: Client, area: Area | None) -> Download:
+    """Fetch a dataset by its identifier, such as ``uvpi-gqnh``, ordered by its rows' own.
+
+    ``server_where`` is a condition in SoQL. Of several columns with a geometry, that of an alias
+    holds, or the first.
+    """
+    about = _about(client)
+    types = _types(about)
+    layer = client.licensed((about.get("license") or {}).get("name"), about.get("attribution"))
+    places = [name for name, kind in types.items() if kind in POINTS | SHAPES]
+    place = find_field(SHAPE, layer, places) or find_field(POINT, layer, places)
+    place = place or next(iter(places), None)
+    as_geojson = place is not None and types[place] != LOCATION
+    if place is not None and not as_geojson:
+        layer = dataclasses.replace(layer, aliases=(*layer.aliases, (POINT, (place,))))
+    kind = "geojson" if as_geojson else "json"
+    address = f"{client.endpoint}/resource/{quote(client.dataset, safe='')}"
+    fields = client.fields(list(types))
+    if not fields and len(places) > 1:
+        fields = [name for name in types if name not in places]
+    beside = (place, *_coordinates(client, list(types)))
+    listed = dict.fromkeys([*fields, *(name for name in beside if name)])
+    files: tuple[Fetched, ...] = ()
+    for box in area.boxes if area is not None else (None,):
+        where = _where(client, types, place, box)
+        params: dict[str, str | float] = {"$where": where} if where else {}
+        counted = client.document(
+            Query(f"{address}.json", {**params, "$select": "count(*)"}),
+            lambda content: _count(content, client),
+        )
+        if fields:
+            params["$select"] = ",".join(listed)
+        params |= {"$order": ":id", "$limit": PAGE_ROWS}
+        files += _fetch_pages(client, Query(f"{address}.{kind}", params), told=counted)
+    return Download(spec=layer, files=files, fields=tuple(types))
+
+
+def _about(client: Client) -> dict[str, Any]:
+    address = f"{client.endpoint}/api/views/{quote(client.dataset, safe='')}.json"
+    try:
+        return client.json(Query(address))
+    except HttpError as error:
+        if error.status != NOT_FOUND:
+            raise
+        msg = (
+            f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
+            f"layer {client.layer.name!r}; look for it at {client.endpoint}/browse and correct "
+            "`dataset` in the catalogue."
+        )
+        raise CatalogError(msg) from error
+
+
+def _types(about: Mapping[str, Any]) -> dict[str, str]:
+    """Return the columns of a dataset and their types, without those that the portal computes."""
+    columns = about.get("columns")
+    if not isinstance(columns, list):
+        msg = (
+            "the portal does not describe its dataset as Socrata does; check that the address is "
+            "that of a Socrata portal."
+        )
+        raise SourceError(msg)
+    types = {item.get("fieldName", ""): item.get("dataTypeName", "") for item in columns}
+    return {name: kind for name, kind in types.items() if name and not name.startswith(":")}
+
+
+def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | None]:
+    """Return the columns of longitude and latitude, by the catalogue or by their names."""
+    layer = client.layer
+    if layer.x_field and layer.y_field:
+        x, y = (find_field(name, layer, fields) for name in (layer.x_field, layer.y_field))
+        return x, y
+    return known_coordinates(fields)
+
+
+def _where(
+    client: Client, types: Mapping[str, str], place: str | None, box: Box | None
+) -> str | None:
+    """Return the condition for an area and the layer's filter."""
+    conditions = [client.layer.server_where] if client.layer.server_where else []
+    if box is not None:
+        conditions += _inside(client, types, place, box)
+    return " AND ".join(f"({condition})" for condition in conditions) or None
+
+
+def _inside(client: Client, types: Mapping[str, str], place: str | None, box: Box) -> list[str]:
+    """Return the conditions that a row is in a box, none where that cannot be asked."""
+    west, south, east, north = (f"{number:.7f}" for number in box)
+    if place is not None and types[place] in POINTS:
+        return [f"within_box({place}, {north}, {west}, {south}, {east})"]
+    if place is not None:
+        corners = [(west, south), (east, south), (east, north), (west, north), (west, south)]
+        ring = ", ".join(f"{x} {y}" for x, y in corners)
+        return [f"intersects({place}, 'POLYGON (({ring}))')"]
+    names = _coordinates(client, list(types))
+    return [
+        f"{name}::number between {least} and {most}"
+        for name, least, most in zip(names, (west, south), (east, north), strict=True)
+        if name is not None
+    ]
+
+
+def _fetch_pages(client: Client, query: Query, *, told: int | None) -> tuple[Fetched, ...]:
+    def then(page: Page, rows: int) -> Query | None:
+        rest = page.rows and (told is None or rows < told)
+        return Query(query.url, {**query.params, "$offset": rows}) if rest else None
+
+    read = functools.partial(_page, client=client)
+    return client.pages(Query(query.url, {**query.params, "$offset": 0}), read, then, told=told)
+
+
+def _page(content: bytes, client: Client) -> Page:
+    """Return a page of GeoJSON, or a list of rows."""
+    value = json_value(content, client.endpoint)
+    if isinstance(value, list):
+        return Page(value)
+    return geojson_page(content, client)
+
+
+def _count(content: bytes, client: Client) -> int | None:
+    """Return the only number in the only row of an answer."""
+    value = json_value(content, client.endpoint)
+    try:
+        return int(next(iter(value[0].values())))
+    except (AttributeError, LookupError, TypeError, ValueError, StopIteration):
+        return None
