@@ -90,6 +90,7 @@ from .likelihood.locate import (
     locate_route as locate_route,
 )
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
+from .likelihood.questions import next_questions as next_questions
 from .likelihood.noise.age import (
     Drift as Drift,
     aged_noise as aged_noise,

@@ -19,6 +19,8 @@ from semsig_gis.cli import (  # noqa: F401
     maps,
     view,
     localize,
+    route,
+    suggest,
     serve,
     learn,
     evaluate,

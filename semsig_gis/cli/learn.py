@@ -200,7 +200,6 @@ def calibrate(
         on_grid=on_grid,
         refine=refine,
         objects=objects,
-        top=1,
     )
     locator = options.locator(city)
     radius = locator.rule.radius

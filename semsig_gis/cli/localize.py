@@ -5,19 +5,17 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from semsig_gis.cli.console import (
     MOST_METRES,
     AsJson,
-    Database,
     MethodText,
     Paper,
     chosen_method,
     keep_inputs,
-    numbers,
     print_json,
     print_rows,
     progress,
@@ -27,12 +25,20 @@ from semsig_gis.cli.console import (
     tell_if_online,
 )
 from semsig_gis.cli.maps import draw_ground
-from semsig_gis.cli.options import SearchOptions, command
+from semsig_gis.cli.options import (
+    Explain,
+    QueryOptions,
+    SearchOptions,
+    Top,
+    command,
+    seen_north,
+    with_unplaced,
+)
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 from semsig_gis.core.method import LIKELIHOOD
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from semsig_gis.core.view import View
     from semsig_gis.database.answer import Answer, Locator
@@ -41,70 +47,19 @@ if TYPE_CHECKING:
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.north import North
     from semsig_gis.matching.method import Method
-    from semsig_gis.queries.file import QueryLine, Route
+    from semsig_gis.queries.file import QueryLine
 
 
 @dataclass(frozen=True, kw_only=True)
-class QueryOptions:
-    """What is asked of which database, and how cells are ranked."""
+class RankedOptions(QueryOptions):
+    """One query or many, and what ranks the cells."""
 
-    database: Database
-    types: Annotated[
-        str | None,
-        typer.Option(help="Symbols clockwise from north, such as DDBL; ? where one is unknown."),
-    ] = None
-    bearings: Annotated[
-        str | None, typer.Option(help="Degrees clockwise from north, such as 10,80,200,310.")
-    ] = None
-    ranges: Annotated[
-        str | None,
-        typer.Option(help="Rough distances: metres, near, middle, far or ?, such as 12,?,near."),
-    ] = None
-    see: Annotated[
-        str | None,
-        typer.Option(
-            help="Say it in words instead: 'bench at 40, lamp at 80 within 12 m, bus stop at 120 "
-            "far', or '20 left' and '10 right' of where the camera looks."
-        ),
-    ] = None
-    fov: Annotated[
-        float | None,
-        typer.Option(
-            min=0.001, max=360, help="Field of view of a photo, in degrees, around --look."
-        ),
-    ] = None
-    look: Annotated[
-        float | None,
-        typer.Option(min=-360, max=360, help="Bearing of the middle of the photo, in degrees."),
-    ] = None
-    sectors: Annotated[
-        str | None,
-        typer.Option(
-            help="What was looked at, if not all round: bearings clockwise, as 20-90,180-250."
-        ),
-    ] = None
     queries: Annotated[
         str | None,
         typer.Option(
             help="Many queries: a CSV or JSON lines file with such columns, or - for JSON lines "
             "from standard input; the answers are JSON lines, one for each, or its error."
         ),
-    ] = None
-    route: Annotated[
-        bool,
-        typer.Option(
-            "--route",
-            help="Take --queries as one route, each line after the first with dx,dy or "
-            "distance,bearing (metres, degrees) from the line before, and its sigma.",
-        ),
-    ] = False
-    north: Annotated[
-        Literal["grid", "true", "magnetic"],
-        typer.Option(help="Count the bearings from this north, of the database's grid by default."),
-    ] = "grid"
-    date: Annotated[
-        str | None,
-        typer.Option(help="Day of the view, as 2024-05-31, for magnetic north.  [default: today]"),
     ] = None
     method: MethodText = None
     paper: Paper = False
@@ -113,40 +68,6 @@ class QueryOptions:
     def ranking(self) -> str:
         """The text of the method."""
         return chosen_method(self.method, paper=self.paper)
-
-    def seen_north(self, city: City) -> North:
-        """Return what the bearings count from."""
-        import datetime as dt
-
-        from semsig_gis.database.north import GRID_NORTH, North
-
-        try:
-            day = None if self.date is None else dt.date.fromisoformat(self.date)
-        except ValueError as error:
-            msg = f"--date was given as {self.date!r}; give a day as 2024-05-31."
-            raise InputError(msg) from error
-        if day is not None and self.north != "magnetic":
-            msg = f"--date was given with --north {self.north}, which stays; leave it out."
-            raise InputError(msg)
-        return GRID_NORTH if self.north == "grid" else North.of(self.north, city.dataset, date=day)
-
-    def query(self, dataset: SignatureDatabase | PartitionedDatabase) -> View:
-        """Return the query of the options."""
-        from semsig_gis.database.observation import parse_view
-
-        told = {
-            "types": self.types,
-            "bearings": None if self.bearings is None else numbers(self.bearings, "--bearings"),
-            "ranges": self.ranges,
-            "see": self.see,
-            "fov": self.fov,
-            "heading": self.look,
-            "sectors": self.sectors,
-        }
-        if self.types is None and self.bearings is None and self.see is None:
-            msg = "nothing was asked; give --see, --types, --bearings or both, or --queries."
-            raise InputError(msg)
-        return parse_view(told, taxonomy=dataset.taxonomy, radius=dataset.spec.radius)
 
     @property
     def source(self) -> str:
@@ -162,20 +83,13 @@ class QueryOptions:
             return parse_queries(sys.stdin.buffer, self.source, **city)
         return read_queries(self.source, **city)
 
-    def read_route(self, dataset: SignatureDatabase | PartitionedDatabase, north: North) -> Route:
-        """Return the views of a route with their names, and the legs between them."""
-        from semsig_gis.queries.file import parse_route, read_route
-
-        city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
-        if self.queries == "-":
-            return parse_route(sys.stdin.buffer, self.source, north=north, **city)
-        return read_route(self.source, north=north, **city)
-
 
 @dataclass(frozen=True, kw_only=True)
-class LocalizeOptions(SearchOptions, QueryOptions):
+class LocalizeOptions(SearchOptions, RankedOptions):
     """The options of `semsig localize`."""
 
+    top: Top = 10
+    explain: Explain = False
     map_: Annotated[Path | None, typer.Option("--map", help="Map to write (.html).")] = None
     out: Annotated[
         Path | None,
@@ -200,16 +114,14 @@ class LocalizeOptions(SearchOptions, QueryOptions):
 
     def __post_init__(self) -> None:
         """Refuse options that do not go together."""
-        single = ("types", "bearings", "ranges", "see", "fov", "look", "sectors", "map_", "out")
+        single = ("types", "bearings", "ranges", "fov", "look", "sectors", "map_", "out")
         given = [f"--{name.strip('_')}" for name in single if getattr(self, name) is not None]
+        given = ([] if self.seen is None else [repr(self.seen)]) + given
         if self.queries is not None and given:
             msg = f"--queries was given with {' and '.join(given)}; give a file or one query."
             raise InputError(msg)
         if self.out is None and (self.share is not None or self.within):
             msg = "--share and --within are for the regions of --out; give that too."
-            raise InputError(msg)
-        if self.route and self.queries is None:
-            msg = "--route was given without --queries; give the file of its views."
             raise InputError(msg)
         read = (self.database, self.objects, self.area, self.popularity, self.rule, self.noise)
         keep_inputs(self.map_, self.out, read=(*read, self.drift_report))
@@ -230,11 +142,10 @@ class LocalizeOptions(SearchOptions, QueryOptions):
 
     def _refuse_likelihood(self) -> None:
         """Refuse options that only the likelihood has."""
-        shared = {"require", "top"}
-        names = [field.name for field in fields(SearchOptions) if field.name not in shared]
+        names = [field.name for field in fields(SearchOptions) if field.name != "require"]
         options = [
             f"--{name.replace('_', '-')}"
-            for name in (*names, "route", "share")
+            for name in (*names, "explain", "share")
             if getattr(self, name) != getattr(LocalizeOptions, name)  # the default
         ]
         if options:
@@ -247,9 +158,9 @@ class LocalizeOptions(SearchOptions, QueryOptions):
 
 @command(LocalizeOptions)
 def localize(options: LocalizeOptions) -> None:
-    """Rank the cells of a database for a query, or for many.
+    """Tell where a query was seen from, or many.
 
-    The options --route, --share and those from --noise to --objects are for likelihood alone.
+    The options --explain, --share and those from --noise to --objects are for likelihood alone.
     """
     from semsig_gis.database.city import open_city
 
@@ -260,20 +171,39 @@ def localize(options: LocalizeOptions) -> None:
         method = Method.parse(options.ranking)
     city = open_city(options.database)
     # Queries are read before the index, which takes much longer than to find a slip in a query.
-    north = options.seen_north(city)
-    if options.route:
-        views, legs = options.read_route(city.dataset, north)
-        locations = options.locator(city, north).locate_route([query for _, query in views], legs)
-        for (name, _), location in zip(views, locations, strict=True):
-            print_json({"id": name, **location.to_dict()}, indent=None)
-        return
-    locator = None if method is None else _distance_locator(options, city, method, north)
+    north = seen_north(city, options.north, options.date)
+
     if options.queries is None:
-        query = options.query(city.dataset)
-        _answer(options, city, locator or options.locator(city, north), query)
+        query = options.query(city.dataset, others=", or --queries")
+        unplaced = options.unplaced(city.dataset)
+        if unplaced and method is not None:
+            msg = (
+                f"{options.seen!r} has objects without a direction beside others, which the method "
+                f"{options.ranking!r} cannot take; give all of them one, or none, or leave out the "
+                "method."
+            )
+            raise InputError(msg)
+        locator = _locator(options, city, method, north, query=query, unplaced=unplaced)
+        _answer(options, city, locator, query)
         return
     queries = options.read_queries(city.dataset)
-    _answer_lines(queries, locator or options.locator(city, north), options.source)
+    _answer_lines(queries, _locator(options, city, method, north), options.source)
+
+
+def _locator(
+    options: LocalizeOptions,
+    city: City,
+    method: Method | None,
+    north: North,
+    *,
+    query: View | None = None,
+    unplaced: Sequence[int] = (),
+) -> Locator[Any]:
+    """Return what answers the queries; `unplaced` was seen beside the one query."""
+    if method is not None:
+        return _distance_locator(options, city, method, north)
+    locator = options.locator(city, north, top=options.top, explain=options.explain)
+    return locator if query is None else with_unplaced(locator, query, unplaced)
 
 
 def _distance_locator(
@@ -392,12 +322,12 @@ def print_answer(result: dict[str, Any]) -> None:
     if by_chance:
         _print_known(result["prior"] or {})
         _print_explanations(candidates)
-        _print_place(result, north=result["north"]["name"])
+        print_place(result)
     elif result["tied_beyond"]:
         tied = result["tied_beyond"]
         more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
         say(f"{more} with the last one.")
-    _print_query(result["query"])
+    print_query(result)
     north = result["north"]
     if north["name"] != "grid":
         day = f" of {north['date']}" if north["date"] else ""
@@ -409,8 +339,9 @@ def print_answer(result: dict[str, Any]) -> None:
         say(f"Note: {note}")
 
 
-def _print_query(query: dict[str, Any]) -> None:
+def print_query(result: dict[str, Any]) -> None:
     """Say again what was seen, photo by photo, as it was understood."""
+    query = result["query"]
     photos = query.get("photos", [query])
     owners = query.get("photo", [0] * query["length"])
     for number, photo in enumerate(photos):
@@ -424,6 +355,8 @@ def _print_query(query: dict[str, Any]) -> None:
         )
         of = f" of photo {number + 1}" if len(photos) > 1 else ""
         say(f"Seen{of}: {seen}{looked}{north}.")
+    if unplaced := (result.get("prior") or {}).get("seen"):
+        say(f"Seen somewhere: {', '.join(unplaced)}.")
 
 
 def _object_text(query: dict[str, Any], row: int) -> str:
@@ -456,7 +389,8 @@ def _print_known(prior: dict[str, Any]) -> None:
         say(f"Known: sees {require['text']}, as {require['cells']:,} cells do.")
 
 
-def _print_place(result: dict[str, Any], *, north: str) -> None:
+def print_place(result: dict[str, Any]) -> None:
+    """Print the place of an answer by likelihood, or that it cannot be told."""
     place, region = result["place"], result["region"]
     where = f"{place['lat']:.6f}, {place['lon']:.6f} (lat, lon)"
     chance = f"within {place['within_m']:g} m of it with a chance of {place['chance']:.1%}"
@@ -473,7 +407,7 @@ def _print_place(result: dict[str, Any], *, north: str) -> None:
     if place["heading"] is not None:
         say(
             f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}° "
-            f"from {north} north."
+            f"from {result['north']['name']} north."
         )
     say(
         f"{region['share']:.0%} of the chance is in {region['cells']:,} "

@@ -1,25 +1,27 @@
-"""Options that several commands share: what a query was seen with, and what is known of it."""
+"""Options that several commands share: what was seen, with what, and what is known of it."""
 
 from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import typer
 
-from semsig_gis.cli.console import app, remark
+from semsig_gis.cli.console import Database, app, numbers, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.view import View
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.north import North
     from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.age import Drift
@@ -27,6 +29,29 @@ if TYPE_CHECKING:
 
 EXPLAINED = 3  # candidates
 MOST_TOP = 10_000
+
+Top = Annotated[int, typer.Option(min=1, max=MOST_TOP, help="Number of candidates.")]
+Explain = Annotated[
+    bool,
+    typer.Option(
+        "--explain",
+        help="Tell which objects of the query are which street objects, which were missed, and "
+        "which look false.",
+    ),
+]
+NorthText = Literal["grid", "true", "magnetic"]
+NorthName = Annotated[
+    NorthText,
+    typer.Option(
+        "--north", help="Count the bearings from this north, of the database's grid by default."
+    ),
+]
+Day = Annotated[
+    str | None,
+    typer.Option(
+        "--date", help="Day of the view, as 2024-05-31, for magnetic north.  [default: today]"
+    ),
+]
 
 NoiseName = Annotated[
     str,
@@ -117,15 +142,127 @@ def command(options: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..
     return register
 
 
+def seen_north(city: City, north: NorthText, date: str | None) -> North:
+    """Return what the bearings of a query count from."""
+    import datetime as dt
+
+    from semsig_gis.database.north import GRID_NORTH, North
+
+    try:
+        day = None if date is None else dt.date.fromisoformat(date)
+    except ValueError as error:
+        msg = f"--date was given as {date!r}; give a day as 2024-05-31."
+        raise InputError(msg) from error
+    if day is not None and north != "magnetic":
+        msg = f"--date was given with --north {north}, which stays; leave it out."
+        raise InputError(msg)
+    return GRID_NORTH if north == "grid" else North.of(north, city.dataset, date=day)
+
+
+@dataclass(frozen=True, kw_only=True)
+class QueryOptions:
+    """What was seen, and which database is asked."""
+
+    database: Database
+    seen: Annotated[
+        str | None,
+        typer.Argument(
+            help="What was seen, clockwise from north: symbols such as DDBL, or words, as 'bench "
+            "at 40, lamp at 80 within 12 m, bus stop 20 left far'."
+        ),
+    ] = None
+    types: Annotated[
+        str | None,
+        typer.Option(help="Symbols clockwise from north, such as DDBL; ? where one is unknown."),
+    ] = None
+    bearings: Annotated[
+        str | None, typer.Option(help="Degrees clockwise from north, such as 10,80,200,310.")
+    ] = None
+    ranges: Annotated[
+        str | None,
+        typer.Option(help="Rough distances: metres, near, middle, far or ?, such as 12,?,near."),
+    ] = None
+    fov: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001, max=360, help="Field of view of a photo, in degrees, around --look."
+        ),
+    ] = None
+    look: Annotated[
+        float | None,
+        typer.Option(min=-360, max=360, help="Bearing of the middle of the photo, in degrees."),
+    ] = None
+    sectors: Annotated[
+        str | None,
+        typer.Option(
+            help="What was looked at, if not all round: bearings clockwise, as 20-90,180-250."
+        ),
+    ] = None
+    north: NorthName = "grid"
+    date: Day = None
+
+    def query(self, dataset: SignatureDatabase | PartitionedDatabase, *, others: str = "") -> View:
+        """Return the query of the options; `others` says what else may be given."""
+        from semsig_gis.database.observation import parse_view, said_row, unplaced_parts
+
+        taxonomy = dataset.taxonomy
+        told: dict[str, Any] = {
+            "types": self.types,
+            "bearings": None if self.bearings is None else numbers(self.bearings, "--bearings"),
+            "ranges": self.ranges,
+            "fov": self.fov,
+            "heading": self.look,
+            "sectors": self.sectors,
+        }
+        if self.seen is None and self.types is None and self.bearings is None:
+            msg = (
+                "nothing was asked; say what was seen, such as 'bench at 40, lamp at 80', or give "
+                f"--types, --bearings or both{others}."
+            )
+            raise InputError(msg)
+        if self.seen is not None:
+            if self.types is not None:
+                msg = f"{self.seen!r} was given with --types; tell what was seen in one way."
+                raise InputError(msg)
+            told |= said_row(unplaced_parts(self.seen)[0], taxonomy)
+        return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
+
+    def unplaced(self, dataset: SignatureDatabase | PartitionedDatabase) -> list[int]:
+        """Return the class codes of what was seen in a direction that nobody tells."""
+        from semsig_gis.database.observation import unplaced_parts
+
+        if self.seen is None or not (words := unplaced_parts(self.seen)[1]):
+            return []
+        from semsig_gis.objects.keywords import class_code
+
+        return [class_code(word, dataset.taxonomy) for word in words]
+
+
+def with_unplaced(
+    locator: LikelihoodLocator, query: View, unplaced: Sequence[int]
+) -> LikelihoodLocator:
+    """Return what answers a query beside which objects were seen that nobody knows where."""
+    if not unplaced:
+        return locator
+    from semsig_gis.likelihood.questions import unplaced_prior
+
+    titles = [locator.index.database.taxonomy.by_code(code).title.lower() for code in unplaced]
+    prior = unplaced_prior(locator.index, query, unplaced)
+    return replace(
+        locator,
+        log_prior=prior if locator.log_prior is None else locator.log_prior + prior,
+        known={**locator.known, "seen": titles},
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """How cells are searched: `require` and `top` by any method, the others by likelihood."""
+    """How cells are searched: `require` by any method, the others by likelihood."""
 
     require: Annotated[
         str | None,
         typer.Option(help="What a cell must see: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
     ] = None
-    top: Annotated[int, typer.Option(min=1, max=MOST_TOP, help="Number of candidates.")] = 10
     noise: NoiseName = "generic"
     map_age: MapAge = 0.0
     drift_report: DriftReport = None
@@ -153,17 +290,11 @@ class SearchOptions:
         ),
     ] = None
     refine: Refine = None
-    explain: Annotated[
-        bool,
-        typer.Option(
-            "--explain",
-            help="Tell which objects of the query are which street objects, which were missed, "
-            "and which look false.",
-        ),
-    ] = False
     objects: Objects = None
 
-    def locator(self, city: City, north: North | None = None) -> LikelihoodLocator:
+    def locator(
+        self, city: City, north: North | None = None, *, top: int = 1, explain: bool = False
+    ) -> LikelihoodLocator:
         """Return what answers queries by likelihood, whose bearings count from a north."""
         from semsig_gis.database.north import GRID_NORTH
         from semsig_gis.likelihood.index import build_index
@@ -178,7 +309,7 @@ class SearchOptions:
             )
             raise InputError(msg)
         refined = False if self.on_grid else self.refine
-        needs_objects = refined is not False or self.explain
+        needs_objects = refined is not False or explain
         if self.objects is not None and not needs_objects:
             option = "--on-grid" if self.on_grid else "--no-refine"
             msg = (
@@ -200,10 +331,10 @@ class SearchOptions:
             north_sigma=sigma,
             log_prior=log_prior,
             rule=rule,
-            top=self.top,
+            top=top,
             store=store,
             refined=refined,
-            explained=EXPLAINED if self.explain else 0,
+            explained=EXPLAINED if explain else 0,
             known=known,
             north=north or GRID_NORTH,
         )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.geometry import wrap_degrees
 from semsig_gis.core.signature import Signature, SignatureSpec, wrapped_bearings
 from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
@@ -120,6 +120,24 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
     return _column_view(told, taxonomy, radius)
 
 
+def said_row(text: str, taxonomy: Taxonomy) -> Row:
+    """Return what somebody says was seen as keys of a row: symbols are types, all else a sentence.
+
+    One word is symbols if each of its letters is one and it is no word for a class, or if it has
+    capitals alone, so that ``DDBQ`` is refused for its ``Q``.
+    """
+    from semsig_gis.objects.keywords import class_code  # noqa: PLC0415 - it loads slowly
+
+    word = text.strip()
+    symbols = {"?", *(item.symbol for item in taxonomy.classes)}
+    if word and (symbols.issuperset(word) or (word.isalpha() and word.isupper())):
+        try:
+            class_code(word, taxonomy)
+        except UnknownNameError:
+            return {"types": word}
+    return {"see": text}
+
+
 def require_seen(row: Row) -> None:
     """Refuse a row that does not say what was seen, not even that it was nothing."""
     # Without their names, an empty row would be one that saw nothing, whatever it was meant for.
@@ -218,10 +236,29 @@ def _columns(items: Sequence[Row], told: Row, taxonomy: Taxonomy) -> Row:
     return columns
 
 
+def unplaced_parts(text: str) -> tuple[str, list[str]]:
+    """Return a sentence without the objects that have no direction while others do, and these.
+
+    >>> unplaced_parts("bench at 40, bus stop, lamp at 80")
+    ('bench at 40, lamp at 80', ['bus stop'])
+    >>> unplaced_parts("bench, lamp")
+    ('bench, lamp', [])
+    """
+    parts = _parts(text)
+    placed = [part for part in parts if _PLACED.fullmatch(part)]
+    if not placed:
+        return text, []
+    return ", ".join(placed), [part for part in parts if part not in placed]
+
+
+def _parts(text: str) -> list[str]:
+    return [part for part in map(_spaced, re.split(r"[,;\n]", text)) if part]
+
+
 def _said(text: str) -> list[Row]:
     """Return the detections that a sentence tells of."""
     found = []
-    for part in filter(None, map(_spaced, re.split(r"[,;\n]", text))):
+    for part in _parts(text):
         match = _PLACED.fullmatch(part)
         if match is None:
             found.append({"class": part})

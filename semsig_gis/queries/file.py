@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.view import View
 from semsig_gis.database.north import GRID_NORTH
 from semsig_gis.database.observation import RADIUS_M, parse_view, require_seen
 from semsig_gis.likelihood.route import Leg
+from semsig_gis.queries.track import STEP_ERROR_M, parse_time
 from semsig_gis.storage.rows import (
     file_rows,
     json_rows,
@@ -20,11 +23,13 @@ from semsig_gis.storage.rows import (
 )
 
 if TYPE_CHECKING:
+    import datetime as dt
     from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.north import North
+    from semsig_gis.queries.track import Track
     from semsig_gis.storage.rows import Row
 
 Route = tuple[list[tuple[str | int, View]], list[Leg]]
@@ -81,18 +86,20 @@ def read_route(
     taxonomy: Taxonomy,
     north: North = GRID_NORTH,
     radius: float = RADIUS_M,
+    track: Track | None = None,
 ) -> Route:
     """Read the views of a route from a file of queries (see `read_queries`).
 
     A line that does not say what was seen, like one where that is empty, has seen nothing. Each
     line but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
     grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from
-    `north`), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing).
-    There is one leg fewer than views. Raises InputError if the file cannot be read or a line of it
-    is no view of a route.
+    `north`), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing). With a
+    `track`, that tells the ways, to 5 m where ``sigma`` is missing: by the ``time`` of each line,
+    or where none has one, by their order. There is one leg fewer than views. Raises InputError if
+    the file cannot be read, a line of it is no view of a route, or the track is of another one.
     """
     rows = read_rows(path, _route_reader(taxonomy, north, radius), what="view")
-    return _route(rows, str(path))
+    return _route(rows, str(path), track)
 
 
 def parse_route(
@@ -102,33 +109,49 @@ def parse_route(
     taxonomy: Taxonomy,
     north: North = GRID_NORTH,
     radius: float = RADIUS_M,
+    track: Track | None = None,
 ) -> Route:
     """Read a route as `read_route` does, from JSON lines that messages call `source`."""
     rows = parse_rows(lines, source, _route_reader(taxonomy, north, radius), what="view")
-    return _route(rows, source)
+    return _route(rows, source, track)
 
 
-def _route_reader(
-    taxonomy: Taxonomy, north: North, radius: float
-) -> Callable[[Row], tuple[object, View, Leg | None]]:
-    """Return what reads a line of a route: its name, its view, and the way to it."""
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class _Stop:
+    """A line of a route: what it tells of its view and of the way to it."""
 
-    def read(row: Row) -> tuple[object, View, Leg | None]:
-        view = parse_view(row, taxonomy=taxonomy, radius=radius)
-        return row_value(row, "id"), view, _leg(row, north)
+    name: object
+    view: View
+    leg: Leg | None
+    sigma: float | None
+    time: dt.datetime | None
+
+
+def _route_reader(taxonomy: Taxonomy, north: North, radius: float) -> Callable[[Row], _Stop]:
+    """Return what reads a line of a route."""
+
+    def read(row: Row) -> _Stop:
+        sigma, time = row_value(row, "sigma"), row_value(row, "time")
+        sigma = None if sigma is None else float(sigma)
+        return _Stop(
+            name=row_value(row, "id"),
+            view=parse_view(row, taxonomy=taxonomy, radius=radius),
+            leg=_leg(row, north, sigma or 0.0),
+            sigma=sigma,
+            time=None if time is None else parse_time(time),
+        )
 
     return read
 
 
-def _leg(row: Row, north: North) -> Leg | None:
+def _leg(row: Row, north: North, sigma: float) -> Leg | None:
     values = {
         name: float(row_value(row, name))
-        for name in (*PLAIN_LEG, *TOWARDS, "sigma")
+        for name in (*PLAIN_LEG, *TOWARDS)
         if row_value(row, name) is not None
     }
     if not values:
         return None
-    sigma = values.pop("sigma", 0.0)
     if values.keys() == set(PLAIN_LEG):
         return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
     if values.keys() == set(TOWARDS):
@@ -137,17 +160,25 @@ def _leg(row: Row, north: North) -> Leg | None:
     raise InputError(msg)
 
 
-def _route(rows: list[tuple[int, tuple[object, View, Leg | None]]], source: str) -> Route:
-    for number, (line, (_, _, leg)) in enumerate(rows):
-        if (leg is None) != (number == 0):
-            fault = "does not tell the way from the line before" if number else "tells a way"
-            msg = (
-                f"line {line} of {source} {fault}; give dx and dy, or distance and bearing, on "
-                "every line of a route but the first."
-            )
+def _route(rows: list[tuple[int, _Stop]], source: str, track: Track | None) -> Route:
+    views = [(_name(stop.name, line), stop.view) for line, stop in rows]
+    stops = [stop for _, stop in rows]
+    advice = "leave that to the track"
+    if track is None:
+        advice = "give dx and dy, or distance and bearing, on every line of a route but the first"
+    for number, (line, stop) in enumerate(rows):
+        if (stop.leg is None) != (number == 0 or track is not None):
+            told = "tells a way" if number == 0 or track else ""
+            fault = told or "does not tell the way from the line before"
+            msg = f"line {line} of {source} {fault}; {advice}."
             raise InputError(msg)
-    legs = [leg for _, (_, _, leg) in rows if leg is not None]
-    return [(_name(name, line), query) for line, (name, query, _) in rows], legs
+    if track is None:
+        return views, [stop.leg for stop in stops if stop.leg is not None]
+    steps = np.diff(track.places([stop.time for stop in stops]), axis=0).tolist()
+    sigmas = [STEP_ERROR_M if stop.sigma is None else stop.sigma for stop in stops[1:]]
+    return views, [
+        Leg(dx=dx, dy=dy, sigma=sigma) for (dx, dy), sigma in zip(steps, sigmas, strict=True)
+    ]
 
 
 def _name(name: Any, line: int) -> str | int:  # noqa: ANN401 - any value of JSON

@@ -105,16 +105,16 @@ class Question:
 
     def command(self, taxonomy: Taxonomy, *, options: Sequence[str]) -> str:
         """Return the command line that gives the same answer, with options of the database."""
-        words = ["semsig", "localize", *options, "--method", "likelihood"]
+        rows = self.rows(taxonomy)
+        words = ["semsig", "localize" if len(rows) == 1 else "route", *options]
         words += ["--on-grid"] if self.seen_from == "cells" else []
         words += ["--top", str(self.top)] if self.top != 10 else []  # noqa: PLR2004 - its default
-        rows = self.rows(taxonomy)
         plain = _options(rows[0]) if len(rows) == 1 else None
         if plain is not None:
             return shlex.join([*words, *plain])
         lines = shlex.join(["printf", "%s\\n", *map(json.dumps, rows)])
-        route = ["--route"] if len(rows) > 1 else []
-        return f"{lines} | {shlex.join([*words, '--queries', '-', *route])}"
+        words += ["--queries", "-"] if len(rows) == 1 else ["-", "--json"]
+        return f"{lines} | {shlex.join(words)}"
 
 
 def degrees(told: object) -> tuple[float, float]:

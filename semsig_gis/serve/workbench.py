@@ -6,7 +6,6 @@ import hashlib
 import math
 import tempfile
 import time
-from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -24,6 +23,7 @@ from semsig_gis.exports import export_answer
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
+from semsig_gis.likelihood.questions import next_questions
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
 from semsig_gis.maps.parts import (
@@ -334,33 +334,8 @@ class Workbench:
     def suggest(self, told: object) -> list[dict[str, Any]]:
         """Return what to look for next, what is expected to tell most first."""
         question, location = self._located(told)
-        database, table = self.database, self._locator(question).index.table
-        types = database.type_sequences
-        weights = np.bincount(types.inverse, location.chances, minlength=len(types))
-        lengths = table.length_rows(types.lengths)
-        view = question.views[question.shown]
-        marked = Counter([] if view.codes is None else view.codes.tolist())
-        found = []
-        for row, code in enumerate(table.codes.tolist()):
-            more = types.histogram[:, code] > marked[code]
-            false = 1.0 - math.exp(-float(table.clutter[row]))
-            detected = 1.0 - (1.0 - table.detected[lengths, row]) * (1.0 - false)
-            yes = np.where(more, detected, false)
-            gain = _bits(float(weights @ yes)) - float(weights @ _bits(yes))
-            item = database.taxonomy.by_code(code)
-            metres = database.spec.radius if item.range_m is None else item.range_m
-            title = item.title.lower()
-            article = "another" if marked[code] else "an" if title[0] in "aeiou" else "a"
-            found.append(
-                {
-                    "class": item.name,
-                    "title": item.title,
-                    "symbol": item.symbol,
-                    "gain": round(max(gain, 0.0), 4),
-                    "question": f"Is there {article} {title} within {metres:g} m?",
-                }
-            )
-        return sorted(found, key=lambda one: -one["gain"])
+        questions = next_questions(self._locator(question).index, location)
+        return [one.to_dict() for one in questions]
 
     def cell(self, told: Mapping[str, Any]) -> dict[str, Any]:
         """Return what is seen from the middle of the cell at a place, and how many see alike."""
@@ -441,12 +416,6 @@ class Workbench:
             footprints=self.store.buildings_around(place, distance=self.database.reach),
         )
         return Sight(codes=views.codes, bearings=views.bearings, distances=views.distances)
-
-
-def _bits(chance: Any) -> Any:  # noqa: ANN401 - a number, or an array of them
-    """Return the entropy of a question that is answered with yes by chance."""
-    sure = np.clip(chance, 1e-12, 1.0 - 1e-12)
-    return -(sure * np.log2(sure) + (1.0 - sure) * np.log2(1.0 - sure))
 
 
 def _shot(photo: Mapping[str, Any]) -> Shot:

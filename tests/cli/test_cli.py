@@ -372,7 +372,6 @@ def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: st
     query = (
         "localize city.parquet --top 2 --method",
         method,
-        "--see",
         words,
         "--fov",
         70,

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 WORLD = random_town()
 CITY = WORLD.database
 STORE = ObjectStore.of(WORLD.street_objects)
-BY = ("--method", "likelihood")
 
 
 @pytest.fixture
@@ -78,7 +77,7 @@ SEEN = seen_from(PLACE)
 
 
 def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
-    query = "localize", city, *options(SEEN), *BY
+    query = "localize", city, *options(SEEN)
     code, out, _ = run(*query, "--json", "--top", 3)
     assert code == 0
     answer = json.loads(out)
@@ -89,13 +88,13 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     out = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)[1]
     for words in ("2 best of", "Estimated position: x", "North of the query: "):
         assert words in out
-    code, out, _ = run("localize", city, "--types", SEEN["types"][:1], *BY)
+    code, out, _ = run("localize", city, "--types", SEEN["types"][:1])
     assert code == 0
     assert "Cannot tell: the best place is" in out
     assert "of the chance is in" in out
     x, y = PLACE
     lon, lat = Transformer.from_crs(2154, 4326, always_xy=True).transform(x, y)
-    query = "localize", city, *options(SEEN), *BY, "--near", f"{lon},{lat},15"
+    query = "localize", city, *options(SEEN), "--near", f"{lon},{lat},15"
     assert f"x {x:.1f}, y {y:.1f}, ± 15 m, read as LON,LAT" in run(*query)[1]
     known = json.loads(run(*query, "--require", SEEN["types"][0], "--json")[1])["prior"]
     assert known["near"]["x"] == pytest.approx(x, abs=0.01)
@@ -105,7 +104,7 @@ def test_the_likelihood_answers_or_cannot_tell(city: Path, run: Run) -> None:
     prior = "--near", f"{x},{y},15", "--require", SEEN["types"][0]
     assert run(*query, *prior, "--heading", 10)[0] == 0
     area = written_area(city.with_name("square.gpkg"), shapely.box(x - 6, y - 6, x + 6, y + 6))
-    inside = json.loads(run("localize", city, "--types", SEEN["types"], *BY, *area, "--json")[1])
+    inside = json.loads(run("localize", city, "--types", SEEN["types"], *area, "--json")[1])
     assert inside["answered"]
     assert inside["prior"]["area"] == {"file": str(area[1]), "cells": 1}
     assert sum(row["chance"] for row in inside["candidates"][:4]) == pytest.approx(1.0)
@@ -118,7 +117,7 @@ def test_a_raster_tells_where_people_are(city: Path, run: Run) -> None:
     place = rasterio.Affine(200.0, 0.0, x - 300.0, 0.0, -200.0, y + 300.0)
     with rasterio.open(people, "w", transform=place, **spec) as file:
         file.write(np.array([[0, 0, 0], [0, 9, 0], [0, 0, 0]], np.uint8), 1)
-    query = "localize", city, "--types", SEEN["types"][:1], *BY
+    query = "localize", city, "--types", SEEN["types"][:1]
     found = json.loads(run(*query, "--popularity", people, "--json", "--top", 500)[1])
     likely = [row for row in found["candidates"] if row["chance"] > 0]
     assert likely
@@ -127,7 +126,7 @@ def test_a_raster_tells_where_people_are(city: Path, run: Run) -> None:
 
 def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
     cell = int(CITY.lengths.argmax())
-    query = "localize", city, *options(seen_from(CITY.xy[cell])), *BY, "--json"
+    query = "localize", city, *options(seen_from(CITY.xy[cell])), "--json"
     sure, likely = (
         json.loads(run(*query, *more)[1])["candidates"][0] for more in (("--on-grid",), ())
     )
@@ -140,7 +139,7 @@ def test_a_query_from_the_middle_of_a_cell(city: Path, run: Run) -> None:
 
 def test_a_place_is_refined_explained_and_drawn(city: Path, run: Run) -> None:
     page = city.with_name("map.html")
-    query = "localize", city, *options(SEEN), *BY, "--explain"
+    query = "localize", city, *options(SEEN), "--explain"
     code, out, _ = run(*query, "--map", page)
     assert code == 0
     for words in ("Rank 1, at x", "matched", "world", "Rank 3, at x", f"map: {page}"):
@@ -159,7 +158,7 @@ def test_a_place_is_refined_explained_and_drawn(city: Path, run: Run) -> None:
 
 
 def test_street_objects_from_elsewhere_or_from_nowhere(city: Path, run: Run) -> None:
-    query = "localize", city, *options(SEEN), *BY
+    query = "localize", city, *options(SEEN)
     moved = city.with_name("elsewhere")
     city.with_suffix(".objects").rename(moved)
     sentence(run(*query, "--refine"), "no object store", "build the database again")
@@ -180,7 +179,7 @@ def test_a_route_is_answered_line_by_line(
     places, rows = walk(4)
     rows[1] = {"types": "", "bearings": [], "distance": 15.0, "bearing": 90.0, "sigma": 1.0}
     file = written(city.with_name("route.jsonl"), rows)
-    query = "localize", city, *BY, "--route", "--queries"
+    query = "route", city, "--json"
     for more in (("--no-refine",), ("--refine", "--explain"), ("--heading", "unknown")):
         code, out, _ = run(*query, file, *more)
         assert code == 0
@@ -191,6 +190,86 @@ def test_a_route_is_answered_line_by_line(
             assert answer["answered"]
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(file.read_bytes())))
     assert len(run(*query, "-")[1].splitlines()) == 4
+
+
+def gpx(file: Path, places: np.ndarray, *, timed: bool) -> Path:
+    """Write a track that begins at ten, with twenty seconds between its points."""
+    degrees = Transformer.from_crs(CITY.crs, 4326, always_xy=True).transform(*np.transpose(places))
+    points = "".join(
+        f'<trkpt lat="{lat}" lon="{lon}">'
+        + (f"<time>2026-05-31T10:00:{20 * number:02}Z</time>" if timed else "")
+        + "</trkpt>"
+        for number, (lon, lat) in enumerate(zip(*degrees, strict=True))
+    )
+    schema = 'xmlns="http://www.topografix.com/GPX/1/1"'
+    file.write_text(f"<gpx {schema}><trk><trkseg>{points}</trkseg></trk></gpx>")
+    return file
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_a_track_tells_the_way_of_a_route(city: Path, run: Run, timed: bool) -> None:  # noqa: FBT001
+    places, rows = walk(3)
+    told = [{key: row[key] for key in ("types", "bearings")} for row in rows]
+    track = gpx(city.with_name("way.gpx"), places, timed=timed)
+    if timed:  # the last view is from halfway between the last two points, by another clock
+        halfway = (places[1] + places[2]) / 2
+        told[2] |= {"types": "", "bearings": []}
+        for row, time in zip(told, ("10:00:00Z", "10:00:20+00:00", "12:00:30+02:00"), strict=True):
+            row["time"] = f"2026-05-31T{time}"
+    file = written(city.with_name("route.jsonl"), told)
+    code, out, _ = run("route", city, file, "--track", track, "--json")
+    assert code == 0
+    answers = [json.loads(line)["place"] for line in out.splitlines()]
+    wanted = [*places[:2], halfway] if timed else places
+    for place, xy in zip(answers, wanted, strict=True):
+        assert math.dist((place["x"], place["y"]), xy) < 15.0
+    printed = run("route", city, file, "--track", track)[1]
+    assert "3 views of city.parquet" in printed
+    assert "lat, lon" in printed
+
+    for change, words in (
+        ({"dx": 1, "dy": 2}, ["line 3", "leave that to the track"]),
+        ({"time": "2026-05-31T09:00:00Z"}, ["view 3" if timed else "view 1", "time"]),
+        ({"time": "noon"}, ["'noon'", "2024-05-31T14:05:09Z"]),
+    ):
+        slipped = written(city.with_name("slip.jsonl"), [*told[:2], {**told[2], **change}])
+        sentence(run("route", city, slipped, "--track", track), *words)
+    short = gpx(city.with_name("short.gpx"), places[:2], timed=False)
+    words = ["does not tell when"] if timed else ["2 points for 3 views"]
+    sentence(run("route", city, file, "--track", short), *words)
+
+
+def test_what_was_seen_is_said_without_an_option(city: Path, run: Run) -> None:
+    asked = "localize", city, "--json"
+    angles = ",".join(map(str, SEEN["bearings"]))
+    symbols = json.loads(run(*asked, SEEN["types"], "--bearings", angles)[1])
+    assert symbols == json.loads(run(*asked, *options(SEEN))[1])
+    names = [CITY.taxonomy.by_symbol(symbol).name for symbol in SEEN["types"]]
+    words = [f"{name} at {at}" for name, at in zip(names, SEEN["bearings"], strict=True)]
+    said = json.loads(run(*asked, ", ".join(words))[1])
+    assert said["candidates"] == symbols["candidates"]
+    # The last one in a direction that nobody knows: cells that see it are likelier for it.
+    code, out, _ = run("localize", city, ", ".join([*words[:-1], names[-1]]))
+    assert code == 0
+    title = CITY.taxonomy.by_symbol(SEEN["types"][-1]).title.lower()
+    assert f"Seen somewhere: {title}." in out
+    mixed = run("localize", city, ", ".join([*words[:-1], names[-1]]), "--paper")
+    sentence(mixed, "without a direction", "'edit+edit:5%'")
+
+
+def test_what_to_look_for_next_is_suggested(city: Path, run: Run) -> None:
+    few = {key: values[:2] for key, values in SEEN.items()}
+    asked = "suggest", city, *options(few)
+    told = json.loads(run(*asked, "--json")[1])
+    gains = [one["gain"] for one in told["questions"]]
+    assert gains == sorted(gains, reverse=True)
+    assert {one["symbol"] for one in told["questions"]} == {
+        CITY.taxonomy.by_code(code).symbol for code in CITY.present_codes
+    }
+    code, out, _ = run(*asked)
+    assert code == 0
+    assert told["questions"][0]["question"] in out
+    assert "lat, lon" in out
 
 
 def samples(count: int, *, seed: int = 0) -> list[dict[str, Any]]:
@@ -223,7 +302,7 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
     assert noise.name == "noise"
     assert noise.to_dict()["position_sigma"] == 0.0
     assert noise.to_dict()["bearing_sigma"] == pytest.approx(4.0, abs=0.5)
-    query = "localize", city, *options(SEEN), *BY, "--refine", "--json", "--noise", out
+    query = "localize", city, *options(SEEN), "--refine", "--json", "--noise", out
     answer = json.loads(run(*query)[1])
     assert answer["noise"] == "noise"
     assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 1.0
@@ -250,7 +329,7 @@ def test_ranges_and_fading_are_learnt_and_told(city: Path, run: Run) -> None:
     shares = [share for _, share in noise["fading"]["all"]]
     assert shares == sorted(shares, reverse=True)
     assert shares[-1] < 0.3
-    query = "localize", city, *options(SEEN), *BY, "--json", "--noise", out
+    query = "localize", city, *options(SEEN), "--json", "--noise", out
     assert json.loads(run(*query)[1])["noise"] == "noise"
 
 
@@ -262,7 +341,7 @@ def test_the_age_of_the_map_is_told_and_taken_off_what_is_learnt(city: Path, run
     update = "update", city, "--objects", fewer, "--out", newer
     report.write_text(run(*update, "--years", 2, "--json")[1], encoding="utf-8")
     old = "--map-age", 2, "--drift-report", report
-    query = "localize", city, *options(SEEN), *BY
+    query = "localize", city, *options(SEEN)
     assert "by likelihood (2-year-old map with generic noise)" in run(*query, *old)[1]
     answers = [json.loads(run(*query, *more, "--json")[1]) for more in ((), old)]
     assert [one["noise"] for one in answers] == ["generic", "2-year-old map with generic"]
@@ -282,7 +361,7 @@ def test_the_age_of_the_map_is_told_and_taken_off_what_is_learnt(city: Path, run
         rules.append(open_rule(rule))
     assert rules[0].threshold != rules[1].threshold
     folder = city.with_name("evaluation")
-    assert run("evaluate", city, *BY, *old, "--queries", 20, "--out", folder)[0] == 0
+    assert run("evaluate", city, *old, "--queries", 20, "--out", folder)[0] == 0
     method = open_evaluation(folder).method
     assert str(method) == "likelihood:2-year-old map with generic:on_grid"
 
@@ -317,7 +396,7 @@ def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
     told = json.loads(run(*calibrate, "--json")[1])
     assert told["coverage"] >= rule.coverage
     assert told["precision"] == 0.9
-    query = "localize", city, *options(SEEN), *BY, "--json", "--rule", out
+    query = "localize", city, *options(SEEN), "--json", "--rule", out
     assert json.loads(run(*query)[1])["threshold"] == open_rule(out).threshold
     code, printed, _ = run("calibrate", city, "--samples", file, "--out", out, "--no-refine")
     assert "nothing is answered" in printed
@@ -328,7 +407,7 @@ def test_a_rule_is_calibrated_and_used(city: Path, run: Run) -> None:
 
 def test_a_query_writes_nothing(city: Path, run: Run) -> None:
     before = sorted(city.parent.rglob("*"))
-    code, _, told = run("localize", city, *options(SEEN), *BY, "--json")
+    code, _, told = run("localize", city, *options(SEEN), "--json")
     assert (code, told) == (0, "")
     assert sorted(city.parent.rglob("*")) == before
 
@@ -337,14 +416,14 @@ def test_a_query_longer_than_any_signature(city: Path, run: Run) -> None:
     symbols = CITY.taxonomy.decode(CITY.present_codes) * 60
     angles = ",".join(str(number * 360 / len(symbols)) for number in range(len(symbols)))
     query = "localize", city, "--types", symbols, "--bearings", angles, "--json"
-    for more in (BY, (*BY, "--no-refine"), (*BY, "--no-refine", "--heading", "unknown"), ()):
+    for more in ((), ("--no-refine",), ("--no-refine", "--heading", "unknown"), ("--paper",)):
         code, out, _ = run(*query, *more)
         assert code == 0
         assert json.loads(out)["query"]["length"] == len(symbols)
 
 
 def test_bearings_of_360_and_minus_10(city: Path, run: Run) -> None:
-    query = "localize", city, "--types", SEEN["types"][:3], *BY, "--json"
+    query = "localize", city, "--types", SEEN["types"][:3], "--json"
     plain = run(*query, "--bearings", "0,350,20")
     assert run(*query, "--bearings", "360,-10,20")[1] == plain[1]
     assert json.loads(plain[1])["query"]["bearings"] == [0.0, 20.0, 350.0]
@@ -352,11 +431,11 @@ def test_bearings_of_360_and_minus_10(city: Path, run: Run) -> None:
 
 def test_bearings_from_another_north(city: Path, run: Run) -> None:
     query = "localize", city, *options(SEEN), "--north", "magnetic", "--date", "2024-05-31"
-    for more in ((), BY):
+    for more in ((), ("--paper",)):
         north = json.loads(run(*query, *more, "--json")[1])["north"]
         assert (north["name"], north["date"]) == ("magnetic", "2024-05-31")
         assert "from magnetic north of 2024-05-31, at 1.6° from grid" in run(*query, *more)[1]
-    out = run(*query, *BY, "--heading", "unknown", "--map", city.with_name("map.html"))[1]
+    out = run(*query, "--heading", "unknown", "--map", city.with_name("map.html"))[1]
     assert "° from magnetic north." in out
     page = city.with_name("map.html").read_text(encoding="utf-8")
     assert "count from magnetic north of 2024-05-31" in page
@@ -368,7 +447,7 @@ def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:
     corner = shapely.box(*CORNER, *(CORNER + 50.0))
     area = written_area(city.with_name("corner.gpkg"), corner)
     near = "--near", f"{CORNER[0] + 900.0},{CORNER[1]},1"
-    code, out, _ = run("localize", city, *options(SEEN), *BY, *area, *near, "--json")
+    code, out, _ = run("localize", city, *options(SEEN), *area, *near, "--json")
     assert code == 0
     best = json.loads(out)["place"]
     assert shapely.Point(best["x"], best["y"]).within(corner)
@@ -376,7 +455,7 @@ def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:
 
 def test_what_stands_outside_the_photo_is_counted_apart(city: Path, run: Run) -> None:
     seen = "--types", "D", "--bearings", "90", "--ranges", "12", "--fov", "60", "--look", "90"
-    query = "localize", city, *seen, *BY, "--refine", "--explain"
+    query = "localize", city, *seen, "--refine", "--explain"
     printed = run(*query)[1]
     assert "outside the photos" in printed
     assert "90.0°, 12.0 m" in printed

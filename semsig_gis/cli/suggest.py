@@ -1,0 +1,50 @@
+"""`semsig suggest`: what to look for next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from semsig_gis.cli.console import AsJson, print_json, print_rows, say
+from semsig_gis.cli.localize import print_place, print_query
+from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north, with_unplaced
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuggestOptions(SearchOptions, QueryOptions):
+    """The options of `semsig suggest`."""
+
+    as_json: AsJson = False
+
+
+@command(SuggestOptions)
+def suggest(options: SuggestOptions) -> None:
+    """Suggest what to look for next, what tells most first."""
+    from semsig_gis.database.city import open_city
+    from semsig_gis.likelihood.questions import next_questions
+
+    city = open_city(options.database)
+    north = seen_north(city, options.north, options.date)
+    query = options.query(city.dataset)
+    unplaced = options.unplaced(city.dataset)
+    locator = with_unplaced(options.locator(city, north), query, unplaced)
+    location = locator.locate(query)
+    answer = location.to_dict()
+    questions = [
+        one.to_dict() for one in next_questions(locator.index, location, unplaced=unplaced)
+    ]
+    if options.as_json:
+        shared = ("query", "prior", "answered", "place", "region", "notes")
+        print_json({**{name: answer[name] for name in shared}, "questions": questions})
+        return
+    print_rows(
+        "What to look for next",
+        ("question", "symbol", "yes", "bits"),
+        [
+            [one["question"], one["symbol"], f"{one['chance']:.1%}", f"{one['gain']:.3f}"]
+            for one in questions
+        ],
+    )
+    print_place(answer)
+    print_query(answer)
+    for note in answer["notes"]:
+        say(f"Note: {note}")
