@@ -212,7 +212,7 @@ class Wfs(StandIn):
     dataset = "lamps"
     wrong = "city:lampposts"
     others = ("city:lamps", "city:kerbs")
-    formats: tuple[str, ...] = ("text/xml; subtype=gml/3.2", "application/json")
+    formats: tuple[str, ...] = ("text/xml; subtype=gml/3.2", "application/json; subtype=geojson")
     constraints: tuple[tuple[str, str], ...] = (("CountDefault", "2"),)
     turned = False
 
@@ -232,9 +232,9 @@ class Wfs(StandIn):
         assert (asked["service"], asked["version"]) == ("WFS", "2.0.0")
         if asked["request"] == "GetCapabilities":
             return self.capabilities()
-        if asked["typeNames"] != "city:lamps":
-            return self.refusal("InvalidParameterValue", "Feature type unknown.")
-        if asked["request"] == "DescribeFeatureType":
+        described = asked["request"] == "DescribeFeatureType"
+        assert asked["typeName" if described else "typeNames"] == "city:lamps"
+        if described:
             return self.schema()
         rows = self.found(asked)
         return rows if isinstance(rows, Answer) else self.get_features(asked, rows)
@@ -250,7 +250,7 @@ class Wfs(StandIn):
         if self.constraints and "startIndex" in asked and asked.get("sortBy") != "OBJECTID":
             return self.refusal("NoApplicableCode", "Cannot do natural order. Add a key.")
         some = self.part(rows, asked.get("startIndex", 0), asked.get("count", len(rows)))
-        if asked.get("outputFormat") == "application/json":
+        if asked.get("outputFormat") == "application/json; subtype=geojson":
             assert asked["srsName"] == "EPSG:4326"
             crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}
             listed = features(some, [name for name in names if name != "geom"])

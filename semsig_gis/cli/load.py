@@ -138,7 +138,8 @@ def load(
         )
         found += read_small(catalog, [*specs, *others], files, filters=filters, crs=crs)
     notes = [
-        f"layer {spec.name!r} has no file here ({', '.join(spec.files)}); it is left out"
+        f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); it is "
+        "left out"
         for spec in absent
         if spec not in others
     ]

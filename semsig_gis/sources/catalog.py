@@ -252,7 +252,7 @@ def layer_of(
         msg = f"{where} has unique_id = true without an id_field; name the field of the ids."
         raise CatalogError(msg)
     files = texts(item.get("files", list(shared["files"])), "files", where)
-    if not files:
+    if not files and ("files" in item or "dataset" not in item):
         msg = f"{where} has files = []; write a list of file names or patterns."
         raise CatalogError(msg)
     kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)

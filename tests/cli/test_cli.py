@@ -19,11 +19,14 @@ import shapely
 from osm_xml import node, way, write_osm
 from sentences import sentence
 from servers import Answer, Server
+from stand_ins import STAND_INS
 
 from semsig_gis import __version__
 from semsig_gis.database.file import open_database
 
 if TYPE_CHECKING:
+    from stand_ins import StandIn
+
     from conftest import Done, Run
 
 DATA = Path(__file__).with_name("data")
@@ -272,6 +275,30 @@ def test_fetch_from_a_portal_and_again_without_it(city: Path, run: Run) -> None:
     code, out, err = run(fetch, "2,48,3,49", "--offline")
     assert (code, "from the cache" in err, json.loads(out)["objects"]) == (0, True, 1)
     sentence(run(fetch, "5,48,6,49", "--offline"), "127.0.0.1")
+
+
+@pytest.mark.parametrize("kind", STAND_INS, ids=lambda kind: kind.__name__)
+def test_fetch_from_a_service_needs_no_more_than_its_address_and_a_dataset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run, kind: type[StandIn]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with Server() as server:
+        service = kind(server)
+        Path("somewhere.toml").write_text(
+            f'name = "somewhere"\ntitle = "Somewhere"\nreader = "{service.reader}"\n'
+            f'endpoints = ["{service.endpoint}"]\n[[layers]]\nname = "lamps"\n'
+            f'class = "street_light"\ndataset = "{service.dataset}"\nid_field = "objectid"\n',
+            encoding="utf-8",
+        )
+        fetch = "fetch somewhere.toml --area 2.355,48.8,2.385,48.9 --cache c --out o.parquet --json"
+        code, out, err = run(fetch)
+        assert code == 0, err
+        found = json.loads(out)
+        assert found["objects"] == 3
+        assert f"lamps: {3 if service.cuts else 5} rows, 0.00 MB, from the portal" in err
+        service.page = Answer(b"<html></html>")
+        shutil.rmtree("c")
+        sentence(run(fetch), "a web page")
 
 
 def test_demo(tmp_path: Path, done: Done) -> None:

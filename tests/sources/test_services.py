@@ -236,6 +236,19 @@ def test_arcgis_errors_come_with_status_200(server: Server, fetched: Fetch) -> N
         fetched(service, replace(LAMPS, dataset="Parks"))
 
 
+def test_arcgis_may_fail_for_a_while_and_send_an_empty_page_that_is_not_the_last(
+    server: Server, fetched: Fetch, slept: list[float]
+) -> None:
+    service = ArcGIS(server)
+    path = "/arcgis/rest/services/Street/FeatureServer/0/query"
+    busy = sent({"error": {"code": 503, "message": "Service is busy"}})
+    empty = sent({"features": [], "exceededTransferLimit": True})
+    rest = sent({"type": "FeatureCollection", "features": features(ROWS)})
+    server.on(path, sent({"count": 5}), busy, empty, rest)
+    assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
+    assert (len(slept), service.pages_asked()[-1].query["resultOffset"]) == (1, "2")
+
+
 # --- WFS --------------------------------------------------------------------------------------
 
 LAMP = (

@@ -94,10 +94,11 @@ def _json(path: Path) -> Table:
     if isinstance(content, dict) and isinstance(content.get("result"), dict):
         content = content["result"]  # of CKAN, in an envelope
     collection = isinstance(content, dict) and content.get("type") == "FeatureCollection"
-    items, system = content, None
+    items, system, places = content, None, False
     if isinstance(content, dict):
         keys = ("features",) if collection else ("features", "results", "records")
         items = next((content[key] for key in keys if key in content), None)
+        places = "features" in content
         system = _member_crs(content, path) if collection else _esri_crs(content, path)
     records = [_record(item) for item in items] if isinstance(items, list) else [""]
     good = [record for record in records if isinstance(record, Record)]
@@ -110,7 +111,7 @@ def _json(path: Path) -> Table:
     return Table(
         fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
         records=lambda _: iter(records),
-        has_geometry=collection or any(record.geometry for record in good),
+        has_geometry=places or any(record.geometry for record in good),
         crs=system,
         empty=not records,
         rest=_rest(content, len(records)),

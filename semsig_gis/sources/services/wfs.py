@@ -22,7 +22,10 @@ VERSION = "2.0.0"
 PAGE_ROWS = 5_000
 # Of these, GML has latitude first, and GeoJSON as asked for by its short name has longitude first.
 URN, SHORT = "urn:ogc:def:crs:EPSG::4326", "EPSG:4326"
-JSON_FORMATS = ("application/geo+json", "application/json", "json", "geojson")
+# How services call GeoJSON, before a semicolon and what they say beside it.
+JSON_FORMATS = frozenset(
+    {"application/geo+json", "application/json", "application/vnd.geo+json", "geojson", "json"}
+)
 FILTER = (
     '<fes:Filter xmlns:fes="http://www.opengis.net/fes/2.0" '
     'xmlns:gml="http://www.opengis.net/gml/3.2">{}</fes:Filter>'
@@ -59,11 +62,12 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     )
     name = _type_name(client, said)
     types = client.document(
-        _query(client, "DescribeFeatureType").also(typeNames=name),
+        _query(client, "DescribeFeatureType").also(typeName=name),
         lambda content: _field_types(xml_root(content, client.endpoint)),
     )
     fields = (*types, GML_ID) if types else ()
-    json_format = next((text for text in said.formats if text.lower() in JSON_FORMATS), None)
+    names = {text.partition(";")[0].strip().lower(): text for text in reversed(said.formats)}
+    json_format = next((text for kind, text in names.items() if kind in JSON_FORMATS), None)
     query = _query(client, "GetFeature").also(typeNames=name, srsName=SHORT if json_format else URN)
     wanted = client.fields(fields)
     if wanted:
