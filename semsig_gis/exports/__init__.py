@@ -22,7 +22,13 @@ from semsig_gis.evaluation.field import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
 from semsig_gis.exports.files import write_csv, write_flatgeobuf, write_geojson, write_geoparquet
-from semsig_gis.exports.layers import answer_layers, cells_layer, evaluation_layers, objects_layer
+from semsig_gis.exports.layers import (
+    answer_layers,
+    cells_layer,
+    evaluation_layers,
+    figures_apart,
+    objects_layer,
+)
 from semsig_gis.exports.rasters import cell_errors, export_field, export_geotiff
 
 if TYPE_CHECKING:
@@ -215,7 +221,7 @@ def export_database(
     if objects is not None:
         by_name["objects"] = objects_layer(objects)
     if evaluation is not None:
-        by_name |= {one.name: one for one in evaluation_layers(evaluation, database.licenses)}
+        by_name |= {one.name: one for one in evaluation_layers(evaluation, database)}
     if h3 is not None:
         from semsig_gis.exports.areas import hexagons_layer  # noqa: PLC0415 - where it is used
 
@@ -223,6 +229,9 @@ def export_database(
             database, h3, objects=objects, identifiability=identifiability, evaluation=evaluation
         )
     written = [by_name[name] for name in names]
+    if suffix == ".gpkg" and "evaluation" in names:
+        at = names.index("evaluation")
+        written[at : at + 1] = figures_apart(written[at])
     if suffix in _MANY_LAYERS:
         _MANY_LAYERS[suffix](written, path, progress=progress)
     else:
@@ -417,9 +426,9 @@ def export_answer(
         facts = {name: facts[name] for name in ("query", "north", "prior", "notes")}
         export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
     elif suffix in _ANSWER:
-        _ANSWER[suffix](answer_layers(answer, regions), path)
+        _ANSWER[suffix](answer_layers(answer, database, regions), path)
     else:
-        _ONE_LAYER[suffix](answer_layers(answer, regions)[0], path)
+        _ONE_LAYER[suffix](answer_layers(answer, database, regions)[0], path)
     return regions
 
 

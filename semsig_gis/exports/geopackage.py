@@ -34,6 +34,7 @@ from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.file import database_of
 from semsig_gis.exports.layers import GEOMETRY_TYPES
+from semsig_gis.exports.project import layer_style, project_archive, shown_layers
 from semsig_gis.objects.table import objects_of
 from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import whole_file
@@ -56,6 +57,7 @@ OBJECT_COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT, MERGED)
 IDENTIFIABILITY_COLUMNS = ("chance_", "bits_", "lookalike_", "gain_")
 ROWS_A_BATCH = 1 << 16
 
+PROJECT_NAME = "semsig"
 VERSION = "1.2"  # the newest that QGIS 3.22 opens without a warning
 # As QGIS makes it, but for the dates, which it leaves to the rules of GeoPackages.
 STYLES = """
@@ -74,6 +76,33 @@ INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geome
   styleName, styleQML, styleSLD, useAsDefault, description, owner)
 SELECT '', '', table_name, column_name, ?, ?, '', ?, ?, '' FROM gpkg_geometry_columns
 WHERE table_name = ?
+"""
+# What fields are called, as the schema extension of GeoPackages has it.
+FIELDS = """
+CREATE TABLE gpkg_data_columns (
+  table_name TEXT NOT NULL, column_name TEXT NOT NULL, name TEXT, title TEXT, description TEXT,
+  mime_type TEXT, constraint_name TEXT,
+  CONSTRAINT pk_gdc PRIMARY KEY (table_name, column_name),
+  CONSTRAINT gdc_tn UNIQUE (table_name, name)
+);
+CREATE TABLE gpkg_data_column_constraints (
+  constraint_name TEXT NOT NULL, constraint_type TEXT NOT NULL, value TEXT, min NUMERIC,
+  min_is_inclusive BOOLEAN, max NUMERIC, max_is_inclusive BOOLEAN, description TEXT,
+  CONSTRAINT gdcc_ntv UNIQUE (constraint_name, constraint_type, value)
+);
+INSERT INTO gpkg_extensions (table_name, extension_name, definition, scope)
+SELECT column1, 'gpkg_schema', 'http://www.geopackage.org/spec121/#extension_schema', 'read-write'
+FROM (VALUES ('gpkg_data_columns'), ('gpkg_data_column_constraints'));
+"""
+FIELD = """
+INSERT INTO gpkg_data_columns (table_name, column_name, name, title, description)
+VALUES (?, ?, ?, ?, ?)
+"""
+# As QGIS makes it; the content is a .qgz file in hexadecimal digits.
+PROJECTS = "CREATE TABLE qgis_projects (name TEXT PRIMARY KEY, metadata BLOB, content BLOB)"
+PROJECT = """
+INSERT INTO qgis_projects VALUES (?, json_object('last_modified_time',
+  strftime('%Y-%m-%dT%H:%M:%S', 'now'), 'last_modified_user', 'semsig'), ?)
 """
 
 
@@ -274,7 +303,7 @@ def write_layers(
             for done in itertools.accumulate(itertools.chain.from_iterable(blocks)):
                 if progress is not None:
                     progress(done, rows)
-            _add_styles(layers, partial)
+            _add_looks(layers, partial, target.name)
             _check_indexes(layers, partial)
         except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
             # GDAL's own words are pages of SQL; they stay with the cause.
@@ -301,15 +330,18 @@ def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
             "DESCRIPTION": "\n".join([layer.description, *layer.licenses]),
         },
     }
+    about = {
+        "geometry_name": GEOMETRY,
+        "geometry_type": GEOMETRY_TYPES.get(layer.geometry),
+        "crs": layer.crs.to_wkt() if code is None else f"EPSG:{code}",
+    }
     for number, block in enumerate(layer.blocks()):
         pyogrio.write_arrow(
             block,
             path,
             layer=layer.name,
             driver="GPKG",
-            geometry_name=GEOMETRY,
-            geometry_type=GEOMETRY_TYPES[layer.geometry],
-            crs=layer.crs.to_wkt() if code is None else f"EPSG:{code}",
+            **(about if layer.geometry in GEOMETRY_TYPES else {}),
             append=number > 0,
             dataset_options={"VERSION": VERSION},
             **(once if number == 0 else {}),
@@ -317,14 +349,23 @@ def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
         yield len(block)
 
 
-def _add_styles(layers: Sequence[Layer], path: Path) -> None:
-    """Write how QGIS draws the layers."""
+def _add_looks(layers: Sequence[Layer], path: Path, file: str) -> None:
+    """Write how QGIS shows the layers: styles, names of fields, and a project of that file."""
+    titles = {layer.name: layer.title for layer in layers}
+    shown = shown_layers(layers, file)
     with contextlib.closing(sqlite3.connect(path)) as connection, connection:
-        connection.executescript(STYLES)
-        for layer in layers:
+        connection.executescript(STYLES + FIELDS + PROJECTS)
+        by_name = {layer.key: layer for layer in shown}
+        for layer in (by_name[name] for name in titles):
             for number, style in enumerate(layer.styles):
-                values = (style.name, style.qml, number == 0, layer.title, layer.name)
+                qml = layer_style(layer, style)
+                values = (style.name, qml, number == 0, layer.title, layer.key)
                 connection.execute(STYLE, values)
+            for field in layer.fields:
+                said = (field.alias, field.alias, field.about)
+                connection.execute(FIELD, (layer.key, field.name, *said))
+        archive = project_archive(layers, shown, Path(file).stem)
+        connection.execute(PROJECT, (PROJECT_NAME, archive.hex()))
 
 
 def _check_indexes(layers: Sequence[Layer], path: Path) -> None:
@@ -333,7 +374,7 @@ def _check_indexes(layers: Sequence[Layer], path: Path) -> None:
     They are the last to be written, when a layer is closed, and GDAL keeps quiet if that fails.
     """
     with contextlib.closing(sqlite3.connect(path)) as connection:
-        for layer in layers:
+        for layer in (one for one in layers if one.geometry in GEOMETRY_TYPES):
             count = f"SELECT count(*) FROM rtree_{layer.name}_geom"  # noqa: S608 - our own names
             if connection.execute(count).fetchone()[0] != layer.rows:
                 msg = "the spatial indexes are not complete"

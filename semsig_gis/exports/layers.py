@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
     from pyproj import CRS
 
+    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.table import CellGeometry
@@ -53,23 +55,27 @@ if TYPE_CHECKING:
 
 ROWS_A_BLOCK = 1 << 16
 GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
+# Figures by which queries are compared, too many to be read beside all else.
+FIGURE = re.compile(r"(p|near)\d+")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Layer:
-    """A table with geometry, of which some rows at a time are in memory."""
+    """A table, mostly with geometry, of which some rows at a time are in memory."""
 
     name: str
     title: str
     description: str
-    geometry: str  # polygon, line or point
+    geometry: str  # polygon, line, point or none
     crs: CRS
     rows: int
     bounds: tuple[float, float, float, float]
     read: Callable[[slice], pa.Table]  # the geometry, as WKB, is the last column
     licenses: tuple[str, ...]
     facts: Mapping[str, Any]  # plain values for JSON
-    styles: tuple[Style, ...]  # the first is the default
+    styles: tuple[Style, ...] = ()  # the first is the default
+    taxonomy: Taxonomy | None = None  # of the symbols in its texts
+    reach: float = 1.0  # metres to the edge of what is seen
 
     @property
     def credits(self) -> dict[str, Any]:
@@ -129,6 +135,8 @@ def cells_layer(
         licenses=database.licenses,
         facts=facts,
         styles=tuple(styles),
+        taxonomy=database.taxonomy,
+        reach=database.reach,
     )
 
 
@@ -164,10 +172,11 @@ def objects_layer(objects: StreetObjects) -> Layer:
         licenses=tuple(map(str, objects.licenses)),
         facts={**objects_specs(objects), "crs": objects.crs.to_json_dict()},
         styles=(by_class(objects.taxonomy, objects.class_counts),),
+        taxonomy=objects.taxonomy,
     )
 
 
-def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list[Layer]:
+def evaluation_layers(evaluation: Evaluation, database: SignatureDatabase) -> list[Layer]:
     """Return the queries at their true places, and lines from there to the best places."""
     queries = evaluation.queries
     successful, failed = OUTCOMES
@@ -184,7 +193,13 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     lines = lines[lines["off_m"] > 0]  # a line has a length
     summary = evaluation.summary()
     facts = {name: summary[name] for name in ("settings", "database", "versions")}
-    layer = functools.partial(table_layer, licenses=licenses, facts=facts)
+    layer = functools.partial(
+        table_layer,
+        licenses=database.licenses,
+        facts=facts,
+        taxonomy=database.taxonomy,
+        reach=database.reach,
+    )
     return [
         layer(
             queries,
@@ -209,13 +224,43 @@ def evaluation_layers(evaluation: Evaluation, licenses: tuple[str, ...]) -> list
     ]
 
 
-def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
+def figures_apart(queries: Layer) -> list[Layer]:
+    """Return queries without their many figures, and a table of these by seed and number."""
+    names = queries.read(slice(0, 0)).column_names
+    figures = [name for name in names if FIGURE.fullmatch(name)]
+    return [
+        replace(queries, read=lambda rows: queries.read(rows).drop_columns(figures)),
+        replace(
+            queries,
+            name="evaluation_figures",
+            title="Figures of the queries",
+            description="The chances of each query, of errors up to so many metres, and more.",
+            geometry="none",
+            styles=(),
+            read=lambda rows: queries.read(rows).select(["seed", "number", *figures]),
+        ),
+    ]
+
+
+def answer_layers(
+    answer: Answer, database: SignatureDatabase, regions: SearchRegions
+) -> list[Layer]:
     """Return the regions that must be searched, the candidates and, if estimated, the place."""
+    candidates = answer.to_geodataframe()
+    cells = CellTable(database.select(candidates["cell"].to_numpy()))
+    seen = cells.columns(slice(0, len(candidates)))
+    candidates = candidates.assign(bearings=seen["bearings"], distances=seen["distances"])
     facts = answer.to_dict()
     licenses, place = tuple(facts["licenses"]), facts.get("place")
     facts = {name: facts[name] for name in facts if name not in {"candidates", "crs", "licenses"}}
     facts["searched"] = regions.to_dict()
-    layer = functools.partial(table_layer, licenses=licenses, facts=facts)
+    layer = functools.partial(
+        table_layer,
+        licenses=licenses,
+        facts=facts,
+        taxonomy=answer.taxonomy,
+        reach=database.reach,
+    )
     layers = [
         layer(
             regions.table,
@@ -226,7 +271,7 @@ def answer_layers(answer: Answer, regions: SearchRegions) -> list[Layer]:
             styles=(by_rank("rank", geometry="polygon"),),
         ),
         layer(
-            answer.to_geodataframe(),
+            candidates,
             name="candidates",
             title="Candidates",
             description="The best cells for the query.",

@@ -76,10 +76,11 @@ SymbolLayer = tuple[str, Options] | tuple[str, Options, "SymbolLayer"]
 
 
 class Style(NamedTuple):
-    """A style of a layer."""
+    """A way to draw a layer: its name, an element of QML, and how opaque it is (0 to 1)."""
 
     name: str
-    qml: str
+    renderer: str
+    opacity: float = 1.0
 
 
 class Entry(NamedTuple):
@@ -95,12 +96,12 @@ def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     present = set(codes)
     entries = {
         str(code): Entry(
-            {"value": str(code)}, _label(f"{sign.symbol}  {sign.title}"), _class_layers(sign)
+            {"value": str(code)}, shown_line(f"{sign.symbol}  {sign.title}"), _class_layers(sign)
         )
         for code, sign in class_signs(taxonomy).items()
         if code in present
     }
-    return Style("Classes", _document("class_code", entries, "point"))
+    return Style("Classes", _renderer("class_code", entries, "point"))
 
 
 def _class_layers(sign: ClassSign) -> tuple[SymbolLayer, SymbolLayer]:
@@ -143,7 +144,7 @@ def by_amount(name: str, column: str, classes: Classes, *, geometry: str, size: 
     """Return a style of cells by a number, each as its square."""
     symbols = [_area(colour, geometry, size) for _, colour in classes.values()]
     entries = _ranges(classes, symbols)
-    return Style(name, _document(column, entries, geometry, opacity=CELLS_OPACITY))
+    return Style(name, _renderer(column, entries, geometry), CELLS_OPACITY)
 
 
 def by_rank(column: str, *, geometry: str) -> Style:
@@ -160,7 +161,7 @@ def by_rank(column: str, *, geometry: str) -> Style:
             edge, metres, smallest = RANK_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
             symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
     entries = _ranges(RANKS, symbols)
-    return Style("Rank", _document(column, entries, geometry, last_first=True))
+    return Style("Rank", _renderer(column, entries, geometry, last_first=True))
 
 
 def by_outcome(*, geometry: str) -> Style:
@@ -170,7 +171,7 @@ def by_outcome(*, geometry: str) -> Style:
         str(number): Entry({"value": outcome}, outcome, draw(mark))
         for number, (outcome, mark) in enumerate(OUTCOMES.items())
     }
-    return Style("Outcome", _document("outcome", entries, geometry))
+    return Style("Outcome", _renderer("outcome", entries, geometry))
 
 
 def by_answer() -> Style:
@@ -179,7 +180,7 @@ def by_answer() -> Style:
         str(number): Entry({"value": name}, name, _outcome_point(mark))
         for number, (name, mark) in enumerate(ANSWERS.items())
     }
-    return Style("Answer", _document("answer", entries, "point"))
+    return Style("Answer", _renderer("answer", entries, "point"))
 
 
 def _outcome_point(mark: Mark) -> tuple[SymbolLayer, ...]:
@@ -252,23 +253,17 @@ def _add_symbol(parent: ET.Element, name: str, kind: str, *layers: SymbolLayer) 
             _add_symbol(layer, f"@{name}@{number}", "marker", inner)
 
 
-def _document(
-    column: str,
-    entries: Mapping[str, Entry],
-    geometry: str,
-    *,
-    opacity: float = 1.0,
-    last_first: bool = False,
+def _renderer(
+    column: str, entries: Mapping[str, Entry], geometry: str, *, last_first: bool = False
 ) -> str:
-    """Return a document that draws by a column: its entries by the names of their symbols."""
-    root = ET.Element("qgis", version="3.22.0", styleCategories="Symbology")
+    """Return an element that draws by a column: its entries by the names of their symbols."""
     ranges = any("lower" in entry.values for entry in entries.values())
     kind, parent, child = (
         ("graduatedSymbol", "ranges", "range")
         if ranges
         else ("categorizedSymbol", "categories", "category")
     )
-    renderer = ET.SubElement(root, "renderer-v2", type=kind, attr=column)
+    renderer = ET.Element("renderer-v2", type=kind, attr=column)
     if ranges:
         renderer.set("graduatedMethod", "GraduatedColor")
     if last_first:  # so that the least number lies on top
@@ -281,15 +276,13 @@ def _document(
             listed, child, {**entry.values, "symbol": name, "label": entry.label, "render": "true"}
         )
         _add_symbol(symbols, name, SYMBOLS[geometry], *entry.symbol)
-    ET.SubElement(root, "layerOpacity").text = str(opacity)
-    ET.SubElement(root, "layerGeometryType").text = str(list(SYMBOLS).index(geometry))
-    return ET.tostring(root, encoding="unicode")
+    return ET.tostring(renderer, encoding="unicode")
 
 
-def _label(text: str) -> str:
-    """Return text from data for a legend: one short line, in which QGIS evaluates nothing."""
+def shown_line(text: str, letters: int = LABEL_LETTERS) -> str:
+    """Return text from data for QGIS: one short line, in which it evaluates nothing."""
     line = one_line(text).replace("[%", "[ %")
-    return line if len(line) <= LABEL_LETTERS else f"{line[: LABEL_LETTERS - 1].rstrip()}…"
+    return line if len(line) <= letters else f"{line[: letters - 1].rstrip()}…"
 
 
 def _rgba(colour: str, opacity: int = 255) -> str:

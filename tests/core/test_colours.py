@@ -209,7 +209,7 @@ def test_the_colours_of_reports_mean_nothing_else() -> None:
 
 def test_web_and_qgis_draw_from_the_same_tables() -> None:
     assert len({mark.shape for mark in OUTCOMES.values()}) == len(OUTCOMES)
-    root = ET.fromstring(by_outcome(geometry="point").qml)  # noqa: S314 - our own
+    root = ET.fromstring(by_outcome(geometry="point").renderer)  # noqa: S314 - our own
     for (outcome, mark), category in zip(OUTCOMES.items(), root.iter("category"), strict=True):
         assert (category.get("value"), category.get("label")) == (outcome, outcome)
         symbol = root.find(f".//symbol[@name='{category.get('symbol')}']")

@@ -52,9 +52,11 @@ def test_a_geopackage_holds_all_or_what_is_named(tmp_path: Path) -> None:
     export_database(CITY, tmp_path / "CITY.GPKG", geometry="point", **everything)
     layers = dict(pyogrio.list_layers(tmp_path / "CITY.GPKG").tolist())
     assert [layers[name] for name in LAYERS] == [*["Point"] * 3, "LineString", "Polygon"]
+    assert layers["evaluation_figures"] is None
     file, names = tmp_path / "queries.gpkg", ["evaluation", "evaluation_lines"]
     export_database(CITY, file, layers=names, **OF_QUERIES)
-    assert pyogrio.list_layers(file)[:, 0].tolist() == [*names, "layer_styles"]
+    names += ["evaluation_figures", "layer_styles"]
+    assert pyogrio.list_layers(file)[:, 0].tolist() == names
 
 
 @pytest.mark.parametrize("layer", LAYERS)

@@ -55,7 +55,8 @@ if TYPE_CHECKING:
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"
 PROGRAM = Path(__file__).parents[1] / "qgis_draw.py"
-LAYERS = ["cells", "objects", "evaluation", "evaluation_lines", "layer_styles"]
+FEATURES = ["cells", "objects", "evaluation", "evaluation_lines"]
+LAYERS = [*FEATURES, "evaluation_figures", "layer_styles"]
 FORMULA = '=cmd|"/C calc"!A0 <script>'
 
 # A city on a grid of its own, with texts that are hard to write.
@@ -173,6 +174,7 @@ def test_specs_and_licences_travel_along(file: Path) -> None:
         "objects": "Street objects",
         "evaluation": "Queries",
         "evaluation_lines": "From the true to the best place",
+        "evaluation_figures": "Figures of the queries",
         "layer_styles": "layer_styles",
     }
     assert all(LICENSE in description for *_, description in contents[:-1])
@@ -185,16 +187,16 @@ def test_it_is_a_sound_geopackage_1_2(file: Path) -> None:
     assert query(file, "PRAGMA integrity_check") == [("ok",)]
     assert query(file, "PRAGMA foreign_key_check") == []
     index = "SELECT table_name FROM gpkg_extensions WHERE extension_name = 'gpkg_rtree_index'"
-    assert {name for (name,) in query(file, index)} == set(LAYERS[:-1])
+    assert {name for (name,) in query(file, index)} == set(FEATURES)
     tables = query(file, "SELECT DISTINCT table_name FROM gpkg_extensions")
     assert {("gpkg_metadata",), ("gpkg_metadata_reference",)} <= set(tables)
     kinds = query(file, "SELECT table_name, data_type, srs_id FROM gpkg_contents")
     system = query(file, "SELECT srs_id FROM gpkg_geometry_columns")[0][0]
-    features = [(name, "features", system) for name in LAYERS[:-1]]
-    assert kinds == [*features, ("layer_styles", "attributes", 0)]
+    features = [(name, "features", system) for name in FEATURES]
+    assert kinds == [*features, *((name, "attributes", 0) for name in LAYERS[4:])]
     extents = query(file, "SELECT table_name, min_x, min_y, max_x, max_y FROM gpkg_contents")
     boxes = {name: box for name, *box in extents}
-    for layer in LAYERS[:-1]:
+    for layer in FEATURES:
         assert np.allclose(boxes[layer], gpd.read_file(file, layer=layer).total_bounds)
     assert list(file.parent.iterdir()) == [file]
 
@@ -352,7 +354,7 @@ def test_a_file_that_is_opened_meanwhile_is_left_alone(tmp_path: Path) -> None:
 
 def test_objects_have_the_signs_of_their_classes() -> None:
     taxonomy = paper_taxonomy()
-    root = ET.fromstring(by_class(taxonomy, [1, 5, 11]).qml)  # noqa: S314 - our own
+    root = ET.fromstring(by_class(taxonomy, [1, 5, 11]).renderer)  # noqa: S314 - our own
     symbols = {item.attrib["name"]: item for item in root.iter("symbol")}
     assert sorted(symbols, key=int) == ["1", "5", "11"]
     for code, symbol in symbols.items():

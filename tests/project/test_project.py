@@ -90,9 +90,9 @@ def test_data_sources_hold_data_only() -> None:
 def test_the_wheel_is_complete(wheel: dict[str, str]) -> None:
     files = (path for path in ROOT.glob("data_sources/**/*") if path.is_file())
     data = {f"semsig_gis/{path.relative_to(ROOT)}" for path in files}
-    suffixes = {".css", ".js", ".py"}
+    suffixes = {".css", ".html", ".js", ".py", ".qgs", ".qml", ".xml"}
     code = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*") if path.suffix in suffixes}
-    others = {"py.typed", "assets/manifest.toml", "templates/report.html"}
+    others = {"py.typed", "assets/manifest.toml", "exports/shown.toml"}
     assert data | code | {f"semsig_gis/{name}" for name in others} <= wheel.keys()
     if page.available():
         assert {f"semsig_gis/assets/{name}" for name in page.assets()} <= wheel.keys()
