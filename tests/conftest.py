@@ -94,7 +94,7 @@ def qgis_process() -> Path:
     return Path(program)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def qgis_python(qgis_process: Path) -> str:  # noqa: ARG001
     """Return QGIS's own Python."""
     python = shutil.which("python3", path=os.defpath)

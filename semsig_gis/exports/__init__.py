@@ -157,7 +157,8 @@ def export_database(
     Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
     to the best place where that is another one: the columns of `Evaluation.queries` and
     ``outcome``: ``successful`` (the best place is within 50 m with a probability of 0.5 or more)
-    or ``failed``.
+    or ``failed``. In a GeoPackage, the columns ``p0``, ``p5``, ..., ``near1``, ... stand in a table
+    of their own, ``evaluation_figures``, by ``seed`` and ``number``.
 
     Layer ``hexagons``, those of H3 that hold a cell, an object or a query: ``h3`` (index),
     ``cells`` (their number), ``mean_length`` (objects seen from the mean cell), ``ambiguous``
@@ -230,8 +231,8 @@ def export_database(
         )
     written = [by_name[name] for name in names]
     if suffix == ".gpkg" and "evaluation" in names:
-        at = names.index("evaluation")
-        written[at : at + 1] = figures_apart(written[at])
+        written[names.index("evaluation")], figures = figures_apart(by_name["evaluation"])
+        written.append(figures)
     if suffix in _MANY_LAYERS:
         _MANY_LAYERS[suffix](written, path, progress=progress)
     else:
