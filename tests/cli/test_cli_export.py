@@ -47,7 +47,8 @@ def test_a_city_goes_into_a_geopackage_and_back(run: Run) -> None:
     code, out, err = run(f"export city.parquet --out city.gpkg {more}")
     assert (code, err, "city.gpkg" in out) == (0, "", True)
     assert set(pyogrio.list_layers("city.gpkg")[:, 0]) == {
-        *("cells", "objects", "evaluation", "evaluation_lines", "layer_styles")
+        *("cells", "objects", "evaluation", "evaluation_lines"),
+        *("evaluation_figures", "layer_styles"),
     }
     code, out, err = run("import city.gpkg --out back.parquet --objects back_objects.parquet")
     assert (code, err, f"{len(small_city()[0]):,} cells" in out) == (0, "", True)
