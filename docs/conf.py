@@ -16,5 +16,6 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings say the types, with shapes and units
 numpydoc_show_class_members = False  # autodoc lists them
 
+html_extra_path = ["../data_sources/catalog.schema.json"]  # editors ask for it
 html_theme = "alabaster"
 html_theme_options = {"description": "Semantic signatures from open data"}

@@ -20,7 +20,18 @@ __all__ = [
     "require_likelihood",
 ]
 
-CATALOGS = ("mapillary", "montpellier", "opendata_paris", "openstreetmap", "overture")
+CATALOGS = (
+    "barcelona",
+    "mapillary",
+    "melbourne",
+    "montpellier",
+    "new_york",
+    "opendata_paris",
+    "openstreetmap",
+    "overture",
+    "vienna",
+    "washington",
+)
 LIKELIHOOD = "likelihood"
 METHODS = (
     LIKELIHOOD,

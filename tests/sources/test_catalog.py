@@ -36,7 +36,18 @@ if TYPE_CHECKING:
     Town = Callable[..., Path]
     Snapshot = Callable[[str, str], None]
 
-NAMES = ("mapillary", "montpellier", "opendata_paris", "openstreetmap", "overture")
+NAMES = (
+    "barcelona",
+    "mapillary",
+    "melbourne",
+    "montpellier",
+    "new_york",
+    "opendata_paris",
+    "openstreetmap",
+    "overture",
+    "vienna",
+    "washington",
+)
 DATA = Path(__file__).with_name("data")
 TOWN = (DATA / "town.toml").read_text(encoding="utf-8")
 

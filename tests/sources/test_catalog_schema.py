@@ -1,0 +1,156 @@
+"""The JSON Schema of catalogues says what the reader of catalogues says."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+import jsonschema
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from semsig_gis.core.errors import CatalogError
+from semsig_gis.sources import READERS
+from semsig_gis.sources.catalog import (
+    CATALOG_KEYS,
+    CLASS_BY_KEYS,
+    CLASS_KEYS,
+    LAYER_KEYS,
+    MEASURES,
+    WIDTH_BY_KEYS,
+    ElementKind,
+    GeometryKind,
+    Role,
+    _catalog,
+    catalog_names,
+    data_folder,
+    paper_taxonomy,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+SCHEMA = json.loads((data_folder() / "catalog.schema.json").read_text("utf-8"))
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+DATA = Path(__file__).with_name("data")
+TOWN = (DATA / "town.toml").read_text("utf-8")
+MISTAKES = (DATA / "mistakes.txt").read_text("utf-8").splitlines()[2:]
+# What only the reader can know: names that exist, two of one name, CRSs, patterns, the order of
+# numbers, NaN, and whether a whole number has a point.
+BEYOND = (
+    "street_ligth", "bus_stopp", "bus_shelter", "street_lamp = 5", 'symbol = "B"', "code = 3 ",
+    '"bench"\\ntitle', "two layers named", "range_m of", "EPSG:99", "WGS 84", "Mercator",
+    "Lambert", "[10, 1]", "/[/", "not valid TOML", "nan", "30.0",
+)  # fmt: skip
+
+
+def accepts(content: dict[str, Any]) -> bool:
+    """Tell whether the reader takes a catalogue."""
+    try:
+        _catalog(copy.deepcopy(content), "it")
+    except CatalogError:
+        return False
+    return True
+
+
+def changed(row: str) -> str:
+    """Return the catalogue of the town with a mistake; see `test_catalog`."""
+    change = row.replace(r"\n", "\n").partition(" | ")[0]
+    old, sign, new = change.partition(" -> ")
+    if not sign:
+        old, _, line = change.partition(" + ")
+        new = f"{old}\n{line}"
+    if old.endswith("..."):
+        old = TOWN[TOWN.index(old.removesuffix("...")) :]
+    return TOWN.replace(old, new)
+
+
+def test_the_schema_is_one_and_names_what_the_reader_knows() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    layer, of_class = SCHEMA["$defs"]["layer"]["properties"], SCHEMA["$defs"]["class"]["properties"]
+    assert SCHEMA["properties"].keys() == CATALOG_KEYS.keys()
+    assert layer.keys() == LAYER_KEYS.keys()
+    assert of_class.keys() == {*CLASS_KEYS, *MEASURES}
+    assert layer["class_by"]["properties"].keys() == {*CLASS_BY_KEYS, "otherwise"}
+    assert layer["width_by"]["properties"].keys() == WIDTH_BY_KEYS.keys()
+    assert {key: of_class[key]["maximum"] for key in MEASURES} == MEASURES
+    assert tuple(layer["role"]["enum"]) == get_args(Role)
+    assert tuple(layer["geometry"]["enum"]) == get_args(GeometryKind)
+    assert tuple(layer["elements"]["items"]["enum"]) == get_args(ElementKind)
+    assert SCHEMA["properties"]["reader"]["anyOf"][0]["enum"] == sorted(READERS)
+    names = [item.name for item in paper_taxonomy().classes]
+    assert SCHEMA["$defs"]["class_name"]["anyOf"][0]["enum"] == names
+
+
+@pytest.mark.parametrize("name", catalog_names())
+def test_a_catalogue_says_where_its_schema_is(name: str) -> None:
+    text = (data_folder() / f"{name}.toml").read_text("utf-8")
+    assert text.startswith("#:schema ./catalog.schema.json\n")
+    VALIDATOR.validate(tomllib.loads(text))
+
+
+@pytest.mark.parametrize("row", MISTAKES)
+def test_a_mistake_is_one_to_both(row: str) -> None:
+    try:
+        content = tomllib.loads(changed(row))
+    except tomllib.TOMLDecodeError:
+        assert "not valid TOML" in row
+        return
+    assert not accepts(content)
+    assert VALIDATOR.is_valid(content) == any(words in row for words in BEYOND)
+
+
+VALUES = st.sampled_from([
+    "", "a", "bench", "objects", "streets", "point", "node", "class", "EPSG:4326", "<0", "<x",
+    ">=0 or none", "a or <", "/a.*/", "=1", "*", 0, 1, 7.5, -1, True, False, [], ["a"], [""], [1],
+    ["node"], [0, 5], [5], {}, {"a": "b"}, {"a": 1}, {"a": []}, {"bench": 5}, [{}], [{"a": "b"}],
+    {"field": "f", "values": {"a": "bench"}}, {"field": "f", "values": {"a": 9}, "default": 5},
+    {"field": "f", "values": {"a": "bench"}, "otherwise": "class"},
+])  # fmt: skip
+LAYER = {"name": "l", "class": "bench", "files": ["*"]}
+CLASS = {"code": 30, "symbol": "Z", "name": "kiosk", "title": "Kiosk"}
+
+
+@st.composite
+def catalogs(draw: st.DrawFn) -> dict[str, Any]:
+    """Return a catalogue of which some keys are absent, and some hold anything."""
+
+    def table(good: dict[str, Any], keys: Mapping[str, object]) -> dict[str, Any]:
+        item = {key: value for key, value in good.items() if draw(st.integers(0, 9))}
+        for key in draw(st.lists(st.sampled_from([*sorted(keys), "zzz"]), max_size=2)):
+            item[key] = draw(VALUES)
+        return item
+
+    good = {"name": "n", "title": "t", "layers": [LAYER], "classes": [CLASS]}
+    catalog = table(good, CATALOG_KEYS)
+    if catalog.get("layers") == [LAYER]:
+        catalog["layers"] = [table(LAYER, LAYER_KEYS)]
+    if catalog.get("classes") == [CLASS]:
+        catalog["classes"] = [table(CLASS, {**CLASS_KEYS, **MEASURES})]
+    return catalog
+
+
+def names_that_exist(content: dict[str, Any]) -> bool:
+    """Tell whether nothing is wrong with a valid catalogue that only the reader can know."""
+    layers, classes = content["layers"], {"bench", *(c["name"] for c in content.get("classes", ()))}
+    named = {layer["class"] for layer in layers if "class" in layer}
+    for layer in layers:
+        named.update(layer.get("class_by", {}).get("values", {}).values())
+    named.update(content.get("ranges", {}), content.get("conflate", {}))
+    systems = {layer.get("crs", "EPSG:4326") for layer in layers}
+    fields = [item.get("rows", [0, 0]) for item in layers]
+    ordered = all(least <= most for least, most in fields)
+    return named <= classes and systems == {"EPSG:4326"} and ordered and "metric_crs" not in content
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
+@given(catalogs())
+def test_the_schema_and_the_reader_agree(content: dict[str, Any]) -> None:
+    valid, taken = VALIDATOR.is_valid(content), accepts(content)
+    assert valid or not taken  # what the schema refuses, the reader refuses
+    if valid and names_that_exist(content):
+        assert taken
