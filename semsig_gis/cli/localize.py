@@ -95,7 +95,7 @@ class LocalizeOptions(SearchOptions, RankedOptions):
         Path | None,
         typer.Option(
             help="Search regions to write: with candidates for QGIS (.gpkg) or in degrees "
-            "(.geojson, .kml), or alone (.parquet, .csv); or the chance of every cell (.tif)."
+            "(.geojson, .kml), or alone (.parquet, .fgb, .csv); or the chance of every cell (.tif)."
         ),
     ] = None
     share: Annotated[

@@ -7,6 +7,8 @@ from xml.etree import ElementTree as ET
 
 import geopandas as gpd
 import pandas as pd
+import pyarrow as pa
+import pyogrio
 import shapely
 
 from semsig_gis.core.geometry import GEOMETRY
@@ -16,7 +18,7 @@ from semsig_gis.exports.styles import RANKS
 from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Mapping, Sequence
+    from collections.abc import Hashable, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from shapely.geometry.base import BaseGeometry
@@ -34,14 +36,23 @@ def write_answer_geojson(layers: Sequence[Layer], path: str | Path) -> None:
     ``layer`` names the layer of a feature, and ``Name`` says it with the rank. The member
     ``semsig`` holds what `Answer.to_dict` tells beside the candidates.
     """
-    joined = pd.concat([_table(layer) for layer in layers], ignore_index=True)
+    parts = []
+    for layer in layers:
+        table = layer.read(slice(0, layer.rows))
+        names = _names(layer, table.column(0).to_pylist())
+        kinds = pa.repeat(_kind(layer), layer.rows)
+        parts.append(table.append_column("Name", [names]).append_column("layer", kinds))
     about = {**layers[0].facts, **layers[0].credits}
     with whole_file(path) as partial, whole_by_gdal(path):
-        joined.to_file(
+        pyogrio.write_arrow(
+            pa.concat_tables(parts, promote_options="permissive"),
             partial,
+            layer="answer",
             driver="GeoJSON",
-            engine="pyogrio",
-            **geojson_options("\n".join([TITLE, *layers[0].licenses]), about),
+            geometry_name=GEOMETRY,
+            geometry_type="Unknown",
+            crs=layers[0].crs.to_wkt(),
+            layer_options=geojson_options("\n".join([TITLE, *layers[0].licenses]), about),
         )
 
 
@@ -58,28 +69,31 @@ def write_answer_kml(layers: Sequence[Layer], path: str | Path) -> None:
     colours = [*(colour for _, colour in RANKS.values()), *(one.colour for one in ANSWERS.values())]
     for colour in colours:
         _add_style(document, colour)
-    tables = {layer.name: _table(layer) for layer in layers}
-    for name, table in tables.items():
-        _add_schema(document, name, table)
-    for layer in layers:
+    tables = [layer.read(slice(0, layer.rows)).to_pandas() for layer in layers]
+    for layer, table in zip(layers, tables, strict=True):
+        _add_schema(document, layer.name, table.drop(columns=GEOMETRY))
+    for layer, table in zip(layers, tables, strict=True):
         folder = ET.SubElement(document, "Folder")
         _add_text(folder, "name", layer.title)
         _add_text(folder, "description", layer.description)
-        table = tables[layer.name]
-        rows = table.drop(columns=["layer", "Name", GEOMETRY]).to_dict("records")
-        for name, row, shape in zip(table["Name"], rows, table.geometry, strict=True):
+        shapes = gpd.GeoSeries.from_wkb(table.pop(GEOMETRY), crs=layer.crs).to_crs("EPSG:4326")
+        names = _names(layer, table.iloc[:, 0])
+        for name, row, shape in zip(names, table.to_dict("records"), shapes, strict=True):
             _add_place(folder, layer.name, name, row, shape)
+    ET.indent(root)
     with whole_file(path) as partial:
         ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
 
 
-def _table(layer: Layer) -> gpd.GeoDataFrame:
-    """Return the rows of a layer in degrees, with a name each."""
-    table = layer.read(slice(0, layer.rows)).to_pandas()
-    shapes = gpd.GeoSeries.from_wkb(table.pop(GEOMETRY), crs=layer.crs).to_crs("EPSG:4326")
-    kind = layer.name.removesuffix("s")
-    names = [kind] if layer.name == "place" else [f"{kind} {rank}" for rank in table.iloc[:, 0]]
-    return gpd.GeoDataFrame(table.assign(Name=names, layer=kind), geometry=shapes)
+def _kind(layer: Layer) -> str:
+    """Return what a row of a layer is."""
+    return layer.name.removesuffix("s")
+
+
+def _names(layer: Layer, first: Iterable[object]) -> list[str]:
+    """Return a name for each row: what it is, and of many the rank, which comes first."""
+    kind = _kind(layer)
+    return [kind if kind == layer.name else f"{kind} {rank}" for rank in first]
 
 
 def _add_text(parent: ET.Element, tag: str, text: object) -> ET.Element:
@@ -97,11 +111,11 @@ def _add_style(document: ET.Element, colour: str) -> None:
     _add_text(ET.SubElement(style, "PolyStyle"), "color", f"aa{turned}")
 
 
-def _add_schema(document: ET.Element, name: str, table: gpd.GeoDataFrame) -> None:
+def _add_schema(document: ET.Element, name: str, table: pd.DataFrame) -> None:
     # Its whole numbers are too short for the ids of cells.
     kinds = {"b": "bool", "i": "double", "f": "double"}
     schema = ET.SubElement(document, "Schema", id=name, name=name)
-    for column in table.columns.drop(["Name", "layer", GEOMETRY]):
+    for column in map(str, table):
         kind = kinds.get(table[column].dtype.kind, "string")
         ET.SubElement(schema, "SimpleField", name=column, type=kind)
 
@@ -115,8 +129,10 @@ def _add_place(
     _add_text(place, "styleUrl", f"#c{_colour(next(iter(row.values())))[1:]}")
     data = ET.SubElement(ET.SubElement(place, "ExtendedData"), "SchemaData", schemaUrl=f"#{layer}")
     for column, value in row.items():
-        text = one_line(value) if isinstance(value, str) else value
-        _add_text(data, "SimpleData", text).set("name", str(column))
+        if not pd.isna(value):
+            known = int(value) if isinstance(value, bool) else value  # as GDAL reads it
+            text = one_line(known) if isinstance(known, str) else known
+            _add_text(data, "SimpleData", text).set("name", str(column))
     _add_shape(place, shape)
 
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 PARQUET = "application/vnd.apache.parquet"
 SHA2_256 = "1220"  # how a multihash begins that is a SHA-256 of 32 bytes
 # How a line of licences says whose the data are, and under which licence.
-LICENCE = re.compile(r"(?P<owner>.+?) \((?P<licence>[^()]*)\)(?::.*)?")
-NAMED = re.compile(r"[\w.+-]+")
+LICENCE = re.compile(r"(?P<owner>[^(]+) \((?P<licence>.*)\)(?::[^()]*)?")
+NAMED = re.compile(r"(?!unknown$)[\w.+-]+")
 LEFT_OUT = {"licenses", "kind", "format"}
 
 
@@ -83,7 +83,7 @@ def write_item(city: City, path: str | Path, *, objects: str | Path | None = Non
         content = FileExtension.ext(asset, add_if_missing=True)
         content.apply(size=file.stat().st_size, checksum=SHA2_256 + digest(file))
     told: Mapping[str, Any] = item.to_dict(include_self_link=False)
-    write_whole(path, json.dumps(told, indent=2, allow_nan=False) + "\n")
+    write_whole(path, json.dumps(told, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def _written(file: Path) -> datetime:

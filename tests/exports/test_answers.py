@@ -58,6 +58,7 @@ def test_all_of_an_answer(answer: Location | Localization, suffix: str, tmp_path
         assert np.hypot(row.geometry.x - estimate.x, row.geometry.y - estimate.y) < 0.02
         assert row.answer == ("given" if LOCATION.answer.given else "withheld")
         assert float(row.sigma) == pytest.approx(estimate.sigma)
+        assert bool(row.refined) is estimate.refined
 
 
 def test_both_name_the_licences_and_load_nothing(tmp_path: Path) -> None:
@@ -71,6 +72,9 @@ def test_both_name_the_licences_and_load_nothing(tmp_path: Path) -> None:
     assert [one.text for one in document.iter(f"{KML}href")] == []
     styles = {f"#{style.get('id')}" for style in document.iter(f"{KML}Style")}
     assert {one.text for one in document.iter(f"{KML}styleUrl")} <= styles
-    told = json.loads((tmp_path / "a.geojson").read_text())["semsig"]
-    assert told["licenses"] == [harmful]
-    assert told["searched"]["cells"] > 0
+    told = json.loads((tmp_path / "a.geojson").read_text())
+    assert told["semsig"]["licenses"] == [harmful]
+    assert told["semsig"]["searched"]["cells"] > 0
+    first = told["features"][0]["properties"]
+    # Whole numbers stay whole, though other rows lack them.
+    assert (first["Name"], repr(first["rank"])) == ("region 1", "1")

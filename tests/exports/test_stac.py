@@ -104,22 +104,26 @@ def test_an_item_is_valid_and_says_what_the_database_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("licenses", "licence"),
+    ("licenses", "licence", "owners"),
     [
-        ((), "other"),
-        (("OpenStreetMap contributors (ODbL-1.0): trees",), "ODbL-1.0"),
-        (("A (ODbL-1.0): trees", "B (CC0-1.0): lamps"), "other"),
-        (("A (Licence Ouverte 2.0)",), "other"),
-        (("no brackets",), "other"),
+        ((), "other", []),
+        (("OSM (ODbL-1.0): trees",), "ODbL-1.0", ["OSM"]),
+        (("A (ODbL-1.0): trees", "B (CC0-1.0): lamps"), "other", ["A", "B"]),
+        (("A (Open (Etalab)): trees, lamps", "A (APIE): lamps"), "other", ["A"]),
+        (("no attribution given (unknown)",), "other", ["no attribution given"]),
+        (("no brackets",), "other", ["no brackets"]),
     ],
 )
-def test_the_licence_of_all(licenses: tuple[str, ...], licence: str, tmp_path: Path) -> None:
+def test_the_licence_of_all(
+    licenses: tuple[str, ...], licence: str, owners: list[str], tmp_path: Path
+) -> None:
     save_database(dataclasses.replace(CITY, licenses=licenses), tmp_path / "a.parquet")
     export_item(tmp_path / "a.parquet", tmp_path / "a.json")
     item = pystac.Item.from_dict(json.loads((tmp_path / "a.json").read_text()))
     item.validate()
     assert item.properties["license"] == licence
-    assert len(item.properties["providers"]) == len(licenses)
+    told = [provider["name"] for provider in item.properties["providers"]]
+    assert told == owners
 
 
 def test_what_cannot_be_an_item_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
