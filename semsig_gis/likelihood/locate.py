@@ -227,28 +227,38 @@ class LikelihoodLocator:
             msg = "a place between the viewpoints was asked for; give the store of the database."
             raise InputError(msg)
 
-    def locate(self, query: Signature, *, top: int | None = None) -> Location:
-        """Find where a query was seen from."""
-        scores = self._scores(query, self.log_prior)
+    def locate(
+        self, query: Signature, *, top: int | None = None, scores: CellScores | None = None
+    ) -> Location:
+        """Find where a query was seen from, by its `scores` if these are known already."""
+        scores = scores or self.scores(query, self.log_prior)
         chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
         store, ratio = self._store_for([query]), None
         if self.log_prior is not None:
-            ratio = prior_ratio(self._scores(query, None).loglik, self.log_prior)
+            ratio = prior_ratio(self.scores(query).loglik, self.log_prior)
         top = top or self.top
         return self._location(query, scores, chances, top=top, store=store, ratio=ratio)
 
     def locate_route(
-        self, queries: Sequence[Signature], legs: Sequence[Leg]
+        self,
+        queries: Sequence[Signature],
+        legs: Sequence[Leg],
+        *,
+        scores: Sequence[CellScores] | None = None,
     ) -> tuple[Location, ...]:
-        """Find where the views of a route were seen from; any of them may have no objects."""
-        first = [self._scores(query, self.log_prior) for query in queries[:1]]
-        scores = first + [self._scores(query, None) for query in queries[1:]]
+        """Find where the views of a route were seen from; any of them may have no objects.
+
+        Their `scores` are worked out unless they are known already.
+        """
+        if scores is None:
+            first = [self.scores(query, self.log_prior) for query in queries[:1]]
+            scores = first + [self.scores(query) for query in queries[1:]]
         logliks = [view.loglik for view in scores]
         database, log_prior = self.index.database, self.log_prior
         chances = route_posteriors(database, logliks, legs, log_prior=log_prior)
         store, ratio = self._store_for(queries), None
         if log_prior is not None:
-            logliks[0] = self._scores(queries[0], None).loglik
+            logliks[0] = self.scores(queries[0]).loglik
             start = route_posteriors(database, logliks, legs)[0].chances
             ratio = prior_ratio(np.log(np.maximum(start, TINY)), log_prior)
         return tuple(
@@ -290,7 +300,7 @@ class LikelihoodLocator:
         known = query.among(self.index.database.present_codes)
         return query if known.all() else query.select(known)
 
-    def _scores(self, query: Signature, log_prior: NDArray[np.float64] | None) -> CellScores:
+    def scores(self, query: Signature, log_prior: NDArray[np.float64] | None = None) -> CellScores:
         """Return the scores of all cells, the best ones by one-to-one associations."""
         query, sigma = self._known(query), self.north_sigma
         scores = self.index.scores(query, north_sigma=sigma)

@@ -45,7 +45,8 @@ class Question:
     """Views of one or several places, and how they are to be answered.
 
     `views` has one view for each place, `marks` which mark each of its objects is, and `legs` the
-    ways between the places. `shown` is the place that is asked for.
+    ways between the places. `shown` is the place that is asked for. A `quick` answer is by cells
+    alone.
     """
 
     views: tuple[View, ...]
@@ -56,6 +57,7 @@ class Question:
     seen_from: SeenFrom
     noise: object
     truth: tuple[float, float] | None
+    quick: bool = False
 
     @classmethod
     def parse(cls, told: object, *, taxonomy: Taxonomy, radius: float) -> Question:
@@ -94,6 +96,7 @@ class Question:
             seen_from=seen_from,
             noise=body.get("noise"),
             truth=None if truth is None else degrees(truth),
+            quick=body.get("quick") is True,
         )
 
     def rows(self, taxonomy: Taxonomy) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import tempfile
 import time
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.index import CellScores
     from semsig_gis.likelihood.locate import Location
     from semsig_gis.likelihood.noise.model import Noise
 
@@ -67,6 +69,7 @@ FORMATS = {
     "kml": "application/vnd.google-earth.kml+xml",
 }
 MARKS_TO_PREPARE = 5
+QUICKLY_EXPLAINED = 3
 PANORAMA = 2  # times as wide as high
 
 
@@ -93,6 +96,7 @@ class Workbench:
     options: Sequence[str] = ()
     _locators: dict[tuple[str, str], LikelihoodLocator] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
+    _scores: dict[str, CellScores] = field(default_factory=dict)
 
     @property
     def database(self) -> SignatureDatabase:
@@ -278,6 +282,7 @@ class Workbench:
         return drawing | {
             "command": question.command(self.taxonomy, options=options),
             "views": question.rows(self.taxonomy),
+            "quick": self._is_quick(question),
             "seconds": time.perf_counter() - start,
         }
 
@@ -316,18 +321,34 @@ class Workbench:
                 store=self.store,
                 refined=None if question.seen_from == "anywhere" else False,
             )
-        return replace(self._locators[key], top=question.top, explained=question.top)
+        locator = replace(self._locators[key], top=question.top, explained=question.top)
+        if self._is_quick(question):
+            return replace(locator, refined=False, explained=QUICKLY_EXPLAINED)
+        return locator
+
+    def _is_quick(self, question: Question) -> bool:
+        """Tell whether an answer leaves out what takes long, and there is something to leave."""
+        return question.quick and self.store is not None and question.seen_from == "anywhere"
 
     def _located(self, told: object) -> tuple[Question, Location]:
         """Return a question and its answer, which is found once."""
         question = Question.parse(told, taxonomy=self.taxonomy, radius=self.database.spec.radius)
-        key = question.rows(self.taxonomy), self._noise(question), question.seen_from, question.top
+        rows = question.rows(self.taxonomy)
+        setting = self._noise(question), question.seen_from
+        key = rows, *setting, question.top, self._is_quick(question)
         if self._last is None or self._last[0] != key:
             locator = self._locator(question)
+            # Views that did not change are not compared with the city again.
+            names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in question.views]
+            self._scores = {
+                name: self._scores.get(name) or locator.scores(view)
+                for name, view in zip(names, question.views, strict=True)
+            }
+            scores = [self._scores[name] for name in names]
             if question.legs:
-                locations = locator.locate_route(question.views, question.legs)
+                locations = locator.locate_route(question.views, question.legs, scores=scores)
             else:
-                locations = (locator.locate(question.views[0]),)
+                locations = (locator.locate(question.views[0], scores=scores[0]),)
             self._last = key, locations
         return question, self._last[1][question.shown]
 

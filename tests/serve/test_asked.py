@@ -24,14 +24,13 @@ from semsig_gis.database.views import views_at
 from semsig_gis.queries.detections.camera import Camera
 from semsig_gis.serve.ground import city_ground
 from semsig_gis.serve.question import Question
+from semsig_gis.serve.workbench import Workbench
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from workbench import Page
-
-    from semsig_gis.serve.workbench import Workbench
 
     Done = Callable[..., str]
 
@@ -167,6 +166,27 @@ def bomb() -> bytes:
 def test_what_is_no_picture_gets_one_sentence(page: Page, content: bytes, word: str) -> None:
     code, text = page.refused("/api/photo?name=x.jpg", content)
     assert (code, word in text, "x.jpg" in text) == (422, True, True)
+
+
+@pytest.mark.parametrize("heading", [None, 80.0])
+def test_a_quick_answer_comes_before_the_same_answer(
+    page: Page, bench: Workbench, heading: float | None
+) -> None:
+    cell = longest(bench)
+    one = {"photos": [photo(bench, cell, 80.0, heading=heading)]}
+    on = {"photos": [photo(bench, cell, 200.0)], "step": {"bearing": 90.0, "metres": 0.0}}
+    for views in ([one], [one, on]):
+        quick = page.ask("/api/answer", {"views": views, "quick": True})
+        after = page.ask("/api/answer", {"views": views})
+        alone = Workbench(city=bench.city, store=bench.store).answer({"views": views})
+        assert (quick["quick"], after["quick"]) == (True, False)
+        for told, count in ((quick, 3), (after, 10)):
+            assert sum(bool(one["rays"]) for one in told["candidates"]) == count
+        assert quick["candidates"][0]["cell"] == after["candidates"][0]["cell"]
+        del after["seconds"], alone["seconds"]
+        assert after == json.loads(json.dumps(alone))
+    grid = {"views": [one], "quick": True, "seen_from": "cells"}
+    assert not page.ask("/api/answer", grid)["quick"]  # which leaves nothing for later
 
 
 @pytest.mark.parametrize("heading", [None, 80.0])

@@ -56,9 +56,10 @@ semsig.Answer = class {
     } else this.region = this.region?.remove() && null;
     await new Promise((done) => { requestAnimationFrame(done); });
     if (asked && answeredAt) {
-      performance.measure("semsig-answer", {start: answeredAt, end: performance.now()});
+      performance.measure(session.first ? "semsig-answer" : "semsig-closer",
+        {start: answeredAt, end: performance.now()});
     }
-    document.body.dataset.answered = answeredAt || 0;
+    if (!asked?.quick) document.body.dataset.answered = answeredAt || 0;
     if (asked) box.dataset.city = city.name;
   }
   // The map goes where the answer is, unless that is in sight.

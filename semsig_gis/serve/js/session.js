@@ -90,13 +90,15 @@ semsig.Session = class extends EventTarget {
     const box = document.getElementById("answer");
     box.ariaBusy = "true";
     let asked = null;
-    while (asked !== this.changedAt) {
+    while (asked !== this.changedAt || this.answer?.quick) {
+      // First by cells alone, then, unless something changed meanwhile, from close to.
+      const quick = asked !== this.changedAt;
       asked = this.changedAt;
       const question = this.views;
       let answer = {};
       try {
         if (this.scenes.some((scene) => (scene.marks || scene.compass).length)) {
-          answer = await (await semsig.api("answer", this.body())).json();
+          answer = await (await semsig.api("answer", {...this.body(), quick})).json();
         }
       } catch (error) {
         // Another page of this server asked meanwhile.
@@ -104,7 +106,7 @@ semsig.Session = class extends EventTarget {
         answer = {error: error.message};
       }
       if (this.views !== question || asked === null) continue;
-      Object.assign(this, {answer, chosen: 0, answeredAt: asked});
+      Object.assign(this, {answer, chosen: 0, answeredAt: asked, first: quick});
       this.tell("answer");
     }
     box.ariaBusy = null;
