@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -67,7 +67,8 @@ def build_database(
     footprints : GeoDataFrame, optional
         Buildings (polygons) in any CRS; what they hide is not seen.
     streets : GeoDataFrame, optional
-        Centre lines in any CRS; a column ``half_width`` holds metres where it is there.
+        Centre lines in any CRS; a column ``half_width`` holds metres where it is there. Of a table
+        of OpenStreetMap's elements, either takes what `read_surroundings` finds in it.
     progress : callable, optional
         Called with the number of cells done and in all.
 
@@ -101,6 +102,7 @@ def build_database(
         from semsig_gis.objects.frame import objects_from_frame  # noqa: PLC0415 - it loads slowly
 
         objects = objects_from_frame(objects)
+    footprints, streets = elements_of(footprints, "buildings"), elements_of(streets, "streets")
     grid, spec = grid or GridSpec(), spec or SignatureSpec()
     reach = float(objects.taxonomy.ranges(spec.radius).max())
     database = build_cells(
@@ -243,6 +245,17 @@ def require_room(pairs: float, *, cells: int, objects: int, processes: int = 1) 
     if processes > 1:
         what += f" by each of {processes} processes"
     require_memory(processes * needed, what, advice=advice)
+
+
+def elements_of(
+    table: gpd.GeoDataFrame | None, role: Literal["buildings", "streets"]
+) -> gpd.GeoDataFrame | None:
+    """Return what a table is, or what of OpenStreetMap's elements in it (see `elements_in`)."""
+    if table is None:
+        return None
+    from semsig_gis.objects.surroundings import elements_in  # noqa: PLC0415 - it loads slowly
+
+    return elements_in(table, role)
 
 
 def moved(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:

@@ -111,10 +111,13 @@ class ObjectStore(Displayed):
         `footprints` and `streets` are those that `build_database` got; CrsError if they have no
         CRS.
         """
+        from semsig_gis.database.build import elements_of  # noqa: PLC0415 - it loads slowly
+
+        houses, lines = elements_of(footprints, "buildings"), elements_of(streets, "streets")
         return cls(
             objects=objects,
-            footprints=None if footprints is None else _stored(footprints, objects.crs),
-            streets=None if streets is None else _stored(streets, objects.crs, HALF_WIDTH, NAME),
+            footprints=None if houses is None else _stored(houses, objects.crs),
+            streets=None if lines is None else _stored(lines, objects.crs, HALF_WIDTH, NAME),
         )
 
     @cached_property

@@ -6,6 +6,7 @@ left; when all are there, the folder is renamed to ``OUT``.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -36,7 +37,7 @@ from semsig_gis.core.geometry import (
 )
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.ranges import MOST_METRES, require_number
-from semsig_gis.core.scratch import HALF_DONE
+from semsig_gis.core.scratch import HALF_DONE, own_folder
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
@@ -71,7 +72,7 @@ from semsig_gis.storage.runs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     import geopandas as gpd
 
@@ -143,8 +144,8 @@ def build_tiles(
     grid: GridSpec | None = None,
     spec: SignatureSpec | None = None,
     viewpoints: ViewpointSpec | None = None,
-    buildings: str | Path | None = None,
-    streets: str | Path | None = None,
+    buildings: str | Path | gpd.GeoDataFrame | None = None,
+    streets: str | Path | gpd.GeoDataFrame | None = None,
     workers: int = 0,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -162,9 +163,9 @@ def build_tiles(
         Size of a tile; 2000 m by default.
     grid, spec, viewpoints : optional
         As in `build_database`.
-    buildings, streets : str or Path, optional
-        Files that `read_surroundings` reads. Those that cannot be read by box are copied into such
-        a file first.
+    buildings, streets : str, Path or GeoDataFrame, optional
+        Files that `read_surroundings` reads, or tables. Those that cannot be read by box are copied
+        into such a file first.
     workers : int, default 0
         How many processes of this machine build tiles; 0 builds them here, without dask.
     scheduler : str, optional
@@ -209,17 +210,57 @@ def build_tiles(
     True
     """
     check_workers(workers, scheduler)
-    plan = plan_tiles(
-        objects,
-        out,
-        tile=tile or TileSpec(),
-        grid=grid or GridSpec(),
-        spec=spec or SignatureSpec(),
-        viewpoints=viewpoints or ViewpointSpec(),
-        buildings=buildings,
-        streets=streets,
-        tell=tell,
-    )
+    with _in_files(objects, out, buildings=buildings, streets=streets) as surroundings:
+        plan = plan_tiles(
+            objects,
+            out,
+            tile=tile or TileSpec(),
+            grid=grid or GridSpec(),
+            spec=spec or SignatureSpec(),
+            viewpoints=viewpoints or ViewpointSpec(),
+            tell=tell,
+            **surroundings,
+        )
+        return _build_all(
+            plan, objects, workers=workers, scheduler=scheduler, progress=progress, tell=tell
+        )
+
+
+@contextlib.contextmanager
+def _in_files(
+    objects: str | Path, out: str | Path, **tables: str | Path | gpd.GeoDataFrame | None
+) -> Iterator[dict[str, Path]]:
+    """Give the files of buildings and streets; tables are written to some beside the result.
+
+    There workers elsewhere find them.
+    """
+    files = {name: Path(path) for name, path in tables.items() if isinstance(path, str | Path)}
+    in_memory: dict[Any, gpd.GeoDataFrame] = {
+        name: table for name, table in tables.items() if table is not None and name not in files
+    }
+    if not in_memory:
+        yield files
+        return
+    crs = open_objects(objects, box=NOWHERE).crs
+    parent = Path(os.path.realpath(out)).parent
+    parent.mkdir(parents=True, exist_ok=True)
+    with own_folder(parent) as folder:
+        for name, table in in_memory.items():
+            files[name] = folder / f"{name}.parquet"
+            save_surroundings(read_surroundings(table, role=name, crs=crs), files[name])
+        yield files
+
+
+def _build_all(
+    plan: TilePlan,
+    objects: str | Path,
+    *,
+    workers: int,
+    scheduler: str | None,
+    progress: Callable[[int, int], None] | None,
+    tell: Callable[[str], None] | None,
+) -> Manifest:
+    """Build the tiles of a plan that are not there yet, and put the database in its place."""
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
         done = finished_tiles(plan.folder, tiles)

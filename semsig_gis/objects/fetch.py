@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from types import ModuleType
 
+    import geopandas as gpd
+
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import Catalog, LayerSpec
@@ -162,13 +164,16 @@ def open_cache(
     )
 
 
-def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> Area:
+def find_area(
+    text: str | gpd.GeoDataFrame, catalog: Catalog, *, cache: Cache, http: HttpSpec
+) -> Area:
     """Return an area from what a user says of it.
 
     Parameters
     ----------
-    text : str
-        ``west,south,east,north`` in degrees, the path of a polygon file, or the name of a place.
+    text : str or GeoDataFrame
+        ``west,south,east,north`` in degrees, the path of a polygon file, polygons, or the name of a
+        place.
     catalog : Catalog
         Whose geocoder knows places by name.
     cache, http : Cache, HttpSpec
@@ -188,7 +193,7 @@ def find_area(text: str, catalog: Catalog, *, cache: Cache, http: HttpSpec) -> A
     >>> find_area("2.3,48.8,2.4,48.9", osm, cache=cache, http=http).bounds
     (2.3, 48.8, 2.4, 48.9)
     """
-    if not names_place(text):
+    if not isinstance(text, str) or not names_place(text):
         return parse_area(text)
     if catalog.geocoder is None:
         msg = (

@@ -6,15 +6,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import geopandas as gpd
+import numpy as np
 import shapely
 
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.core.geometry import LICENSES
+from semsig_gis.core.geometry import CLASS_NAME, LICENSES
 from semsig_gis.objects.table import layer_licences
+from semsig_gis.sources import file_reader, reader
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
 from semsig_gis.sources.catalog import LayerSpec, load_catalog
-from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.osm.features import frame_fields, frame_layers, tells_elements
 from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.raw_layer import WGS84
 from semsig_gis.storage.geoparquet import (
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
     from pyproj import CRS
 
+    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.catalog import GeometryKind
 
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
@@ -76,7 +79,7 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
 
 
 def read_surroundings(
-    path: str | Path,
+    path: str | Path | gpd.GeoDataFrame,
     *,
     role: Literal["buildings", "streets"],
     crs: CRS | str,
@@ -87,10 +90,11 @@ def read_surroundings(
 
     Parameters
     ----------
-    path : str or Path
-        Any vector file that `read_layer` reads, an OpenStreetMap file, or a ``.parquet`` file such
-        as ``semsig load --buildings`` writes. SourceError if it is missing, damaged, or of another
-        kind.
+    path : str, Path or GeoDataFrame
+        Any vector file that `read_layer` reads, a ``.parquet`` file such as ``semsig load
+        --buildings`` writes, or a table. Of one that tells elements of OpenStreetMap and their
+        tags, what the catalogue calls buildings or streets. SourceError if it is missing, damaged,
+        or of another kind.
     role : {"buildings", "streets"}
         What the file holds: polygons or lines. InputError if it has none, or something else too.
     crs : pyproj.CRS or str
@@ -118,58 +122,69 @@ def read_surroundings(
     >>> houses.area.round().tolist()
     [25.0]
     """
-    return _read(Path(path), role, crs, box, tell)
+    return _read(path, role, crs, box, tell)
 
 
-def read_area(area: str | Path, *, crs: CRS | str) -> shapely.Polygon | shapely.MultiPolygon:
-    """Return ``west,south,east,north`` in degrees, or all polygons of a file, moved to a CRS.
+def elements_in(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame:
+    """Return the buildings or streets of a table of OpenStreetMap's elements, any other as it is.
+
+    InputError if there are none.
+    """
+    if not tells_elements(frame_fields(table)):
+        return table
+    (layer,) = frame_layers(table, [load_catalog("openstreetmap").layer(role)])
+    if layer.table.empty:
+        msg = f"the table of OpenStreetMap's elements has no {role}; give one that has."
+        raise InputError(msg)
+    return _with_licences(layer)
+
+
+def _with_licences(layer: RawLayer) -> gpd.GeoDataFrame:
+    table = layer.table.drop(columns=CLASS_NAME)
+    table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
+    return table
+
+
+def read_area(
+    area: str | Path | gpd.GeoDataFrame, *, crs: CRS | str
+) -> shapely.Polygon | shapely.MultiPolygon:
+    """Return ``west,south,east,north`` in degrees, or all polygons of a file or table, in a CRS.
 
     Errors are as of `parse_area` and `read_surroundings`.
     """
-    if NUMBERS.fullmatch(str(area)):
+    if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
         # In metres an edge of the box is a curve.
         box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
         shapes = gpd.GeoSeries([box], crs=WGS84).to_crs(crs)
     else:
-        shapes = _read(Path(area), "area", crs).geometry
+        shapes = _read(area, "area", crs).geometry
     joined = join_areas(shapes.to_numpy())
     if joined is None:
-        msg = f"{area} encloses no area; give a file of polygons."
+        msg = f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}."
         raise InputError(msg)
     return joined
 
 
 def _read(
-    path: Path,
-    role: str,
+    path: str | Path | gpd.GeoDataFrame,
+    role: Literal["buildings", "streets", "area"],
     crs: CRS | str,
     box: Sequence[float] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> gpd.GeoDataFrame:
     kind = KIND_OF[role]
     notes: tuple[str, ...] = ()
-    if path.suffix.lower() == ".parquet":
-        table = read_parquet(path, kind=f"{kind}s", box=box)
-    elif path.name.lower().endswith(tuple(osm_file.FORMATS)) and role != "area":
-        spec = load_catalog("openstreetmap").layer(role)
-        (layer,) = osm_file.read_layers(path, [spec])
-        table = layer.table
-        table.attrs[LICENSES] = [str(licence) for licence in layer_licences([layer])]
-        notes = layer.notes
+    where = _named(path)
+    if isinstance(path, gpd.GeoDataFrame):
+        table = path if role == "area" else elements_in(path, role)
+        table = table if box is None else table.iloc[np.sort(table.sindex.intersection(box))]
     else:
-        layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
-        if layer.errors:
-            msg = (
-                f"{path} has {layer.counts.unreadable} features that cannot be read "
-                f"({layer.errors[0]}); correct the file."
-            )
-            raise SourceError(msg)
-        table, notes = layer.table, layer.notes
+        table, notes = _read_file(Path(path), role, kind, box)
     if tell is not None:
         for note in notes:
-            tell(f"{path}: {note}")
+            tell(f"{where}: {note}")
     if table.crs is None:
-        msg = f"{path} states no coordinate reference system; write it with one."
+        msg = f"{where} states no coordinate reference system; write it with one."
         raise SourceError(msg)
     geometry = table.geometry
     table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
@@ -177,6 +192,37 @@ def _read(
     others = table.geometry[dimensions != DIMENSIONS[kind]]
     if (len(table) == 0 and box is None) or len(others):
         content = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
-        msg = f"{path} {content}; give a file of {kind}s."
+        msg = f"{where} {content}; give {_of_kind(path, kind)}."
         raise InputError(msg)
     return table.to_crs(crs)
+
+
+def _named(path: object) -> str:
+    return "the table" if isinstance(path, gpd.GeoDataFrame) else str(path)
+
+
+def _of_kind(path: object, kind: str) -> str:
+    return f"a {'table' if isinstance(path, gpd.GeoDataFrame) else 'file'} of {kind}s"
+
+
+def _read_file(
+    path: Path,
+    role: Literal["buildings", "streets", "area"],
+    kind: GeometryKind,
+    box: Sequence[float] | None,
+) -> tuple[gpd.GeoDataFrame, tuple[str, ...]]:
+    """Read what a file holds, and remarks on it."""
+    told = None if role == "area" else file_reader(path, sure=True)
+    if told is not None:
+        (layer,) = reader(told)(path, [load_catalog("openstreetmap").layer(role)])
+        return _with_licences(layer), layer.notes
+    if path.suffix.lower() == ".parquet":
+        return read_parquet(path, kind=f"{kind}s", box=box), ()
+    layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+    if layer.errors:
+        msg = (
+            f"{path} has {layer.counts.unreadable} features that cannot be read "
+            f"({layer.errors[0]}); correct the file."
+        )
+        raise SourceError(msg)
+    return layer.table, layer.notes

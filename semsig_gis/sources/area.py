@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import CrsError, InputError
 from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
 from semsig_gis.sources import FILE_SUFFIXES
 from semsig_gis.sources import vector as vector_file
@@ -106,8 +107,10 @@ def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:
     return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
 
 
-def parse_area(text: str) -> Area:
-    """Return the area of ``"west,south,east,north"`` in degrees, or of a vector file's polygons."""
+def parse_area(text: str | gpd.GeoDataFrame) -> Area:
+    """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or a file of them."""
+    if isinstance(text, gpd.GeoDataFrame):
+        return _joined(text.geometry, "the table", name="table", kind="table")
     if NUMBERS.fullmatch(text):
         return _box(text)
     if names_place(text):
@@ -126,16 +129,16 @@ def names_place(text: str) -> bool:
     return not is_file and not NUMBERS.fullmatch(text)
 
 
-def clip_layers(layers: Sequence[RawLayer], text: str) -> tuple[RawLayer, ...]:
+def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tuple[RawLayer, ...]:
     """Leave out what is outside an area.
 
     Parameters
     ----------
     layers : sequence of RawLayer
         The layers.
-    text : str
-        ``west,south,east,north`` in degrees, the path of a file with polygons, or ``"box"`` for
-        the boxes that OpenStreetMap files say they cover.
+    text : str or GeoDataFrame
+        ``west,south,east,north`` in degrees, the path of a file with polygons, a table of them, or
+        ``"box"`` for the boxes that OpenStreetMap files say they cover.
 
     Returns
     -------
@@ -150,7 +153,7 @@ def clip_layers(layers: Sequence[RawLayer], text: str) -> tuple[RawLayer, ...]:
     >>> [layer.counts.kept for layer in clip_layers(layers[:2], "2.3,48.8,2.4,48.9")]
     [0, 0]
     """
-    if text != BOX:
+    if not isinstance(text, str) or text != BOX:
         area = parse_area(text)
     else:
         boxes = [layer.extent.polygon for layer in layers if layer.extent is not None]
@@ -245,15 +248,23 @@ def _outline(path: Path) -> Area:
     if layer.errors:
         msg = f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
         raise InputError(msg)
-    geometry = layer.table.geometry.dropna()
+    return _joined(layer.table.geometry, str(path), name=path.stem, kind="file")
+
+
+def _joined(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
+    """Return the area of polygons, which are all that there may be."""
+    if shapes.crs is None:
+        msg = f"{where} has no coordinate reference system; state it with set_crs."
+        raise CrsError(msg)
+    geometry = shapes.dropna()
     others = sorted(set(geometry.geom_type) - POLYGONAL)
     polygon = None if others else join_areas(geometry.to_crs(WGS84).to_numpy())
     if polygon is None:
         kinds = ", ".join(others) or "nothing"
         what = "encloses no area" if len(geometry) and not others else f"holds {kinds}"
-        msg = f"{path} {what}; give a file of polygons."
+        msg = f"{where} {what}; give a {kind} of polygons."
         raise InputError(msg)
-    return Area(polygon, path.stem)
+    return Area(polygon, name)
 
 
 def join_areas(geometry: NDArray[np.object_]) -> shapely.Polygon | shapely.MultiPolygon | None:

@@ -164,6 +164,22 @@ def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
     assert covered.any() == (mode == "all")
 
 
+def test_tables_of_buildings_and_streets_are_as_good_as_files(
+    objects_file: Path, tmp_path: Path
+) -> None:
+    tables = houses_and_streets()
+    files = {role: tmp_path / f"{role}.parquet" for role in tables}
+    for role, table in tables.items():
+        save_surroundings(table, files[role])
+    spec: dict[str, Any] = {"tile": TileSpec(100.0), "viewpoints": ViewpointSpec(mode="streets")}
+    by_table = build_tiles(objects_file, tmp_path / "new" / "tables", **tables, **spec)
+    by_file = build_tiles(objects_file, tmp_path / "files", **spec, **files)
+    assert [part.sha256 for part in by_table.parts] == [part.sha256 for part in by_file.parts]
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["tables"]
+    with refused(InputError, "the table holds a Polygon", "a table of lines"):
+        build_tiles(objects_file, tmp_path / "none", streets=tables["buildings"])
+
+
 def test_a_wall_whose_neighbour_is_far_hides_as_in_the_whole(tmp_path: Path) -> None:
     # A long house: its core is one piece only through a neighbour at the other end, three tiles
     # away. From inside its near end, its far side across the yard must not hide.

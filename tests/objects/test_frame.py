@@ -16,6 +16,8 @@ from sentences import refused
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.frame import objects_from_frame
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.sources.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
@@ -95,6 +97,24 @@ def test_a_frame_of_osmnx_is_built_in_one_call_as_from_the_extract(
     objects = objects_from_frame(frame.to_crs("EPSG:3857"))
     assert sorted(objects.table["source_id"]) == sorted(expected.table["source_id"])
     assert np.abs(objects.xy - expected.xy).max() < 1e-6
+
+
+def test_buildings_and_streets_may_be_a_frame_of_osmnx(
+    frame: gpd.GeoDataFrame, extract: Path
+) -> None:
+    """As they are, with what is neither among them."""
+    layers, _ = read_files(choose_layers(OSM, surroundings=True), [extract])
+    town = assemble(layers, OSM)
+    along = ViewpointSpec(mode="streets")
+    expected = build_database(
+        town.objects, footprints=town.buildings, streets=town.streets, viewpoints=along
+    )
+    database = build_database(frame, footprints=frame, streets=frame, viewpoints=along)
+    assert_same(database, expected)
+    assert database.licenses == expected.licenses
+    store = ObjectStore.of(town.objects, footprints=frame, streets=frame)
+    assert store.streets is not None
+    assert store.streets["name"].tolist() == ["Rue"]
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".geojson", ".fgb", ".parquet"])

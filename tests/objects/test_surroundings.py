@@ -123,6 +123,39 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
         read_surroundings(tmp_path / "empty.parquet", role="buildings", crs=CRS)
 
 
+def test_a_table_is_as_good_as_a_file() -> None:
+    assert len(read_surroundings(HOUSES, role="buildings", crs="EPSG:4326")) == len(HOUSES)
+    box = (770_106.0, 6_280_400.0, 770_130.0, 6_280_456.0)
+    near = read_surroundings(HOUSES, role="buildings", crs=CRS, box=box)
+    assert near["n"].tolist() == HOUSES["n"][HOUSES.intersects(shapely.box(*box))].tolist()
+    assert read_area(HOUSES, crs=CRS).area == pytest.approx(36 * len(HOUSES))
+    with refused(InputError, "the table holds a Polygon", "give a table of lines"):
+        read_surroundings(HOUSES, role="streets", crs=CRS)
+    with refused(SourceError, "the table states no coordinate reference system"):
+        read_surroundings(HOUSES.set_crs(None, allow_override=True), role="buildings", crs=CRS)
+
+
+def test_elements_of_openstreetmap_are_chosen_by_the_catalogue(tmp_path: Path) -> None:
+    """A node is no building, a footway no street, and a street has a width by its kind."""
+    shapes = [HOUSE, HOUSE.centroid, shapely.LineString([(1, 1), (2, 2)]), HOUSE.exterior]
+    columns = {
+        "element": ["way", "node", "way", "way"],
+        "id": [1, 2, 3, 4],
+        "building": ["yes", "yes", None, None],
+        "highway": [None, None, "footway", "residential"],
+    }
+    table = gpd.GeoDataFrame(columns, geometry=shapes, crs=CRS)
+    table.to_file(tmp_path / "town.gpkg")
+    for given in (table, tmp_path / "town.gpkg"):
+        houses = read_surroundings(given, role="buildings", crs=CRS)
+        streets = read_surroundings(given, role="streets", crs=CRS)
+        assert houses["source_id"].tolist() == ["way/1"]
+        assert streets[["source_id", "half_width"]].to_numpy().tolist() == [["way/4", 8.0]]
+        assert licenses_of(houses) == ("OpenStreetMap contributors (ODbL 1.0): buildings",)
+    with refused(InputError, "has no buildings"):
+        read_surroundings(table.iloc[2:], role="buildings", crs=CRS)
+
+
 def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
     table = HOUSES.copy()
     table.attrs["licenses"] = ["City (CC0): houses"]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pyproj import Geod
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core.errors import CrsError, InputError, SemsigError
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.area import (
     clip_layer,
@@ -107,6 +107,15 @@ def test_the_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
     assert len(area.polygon.geoms) == 2
     assert area.bounds == (3.8, 5, 6, 43.7)
     assert join_areas(np.array([shapely.Point(1, 2)])) is None
+
+
+def test_a_table_of_polygons_is_an_area() -> None:
+    table = gpd.GeoDataFrame(geometry=[shapely.box(*BOX)], crs="EPSG:4326")
+    assert parse_area(table.to_crs(2154)).bounds == pytest.approx(BOX, abs=1e-6)
+    with refused(InputError, "the table holds Point", "give a table of polygons"):
+        parse_area(table.set_geometry(shapely.centroid(table.geometry.array)))
+    with refused(CrsError, "the table has no coordinate reference system"):
+        parse_area(table.set_crs(None, allow_override=True))
 
 
 def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
