@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -24,7 +25,7 @@ from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
-    from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.catalog import Catalog, LayerSpec
     from semsig_gis.sources.conditions import Rules
 
 
@@ -291,7 +292,7 @@ def sources(
     *,
     as_json: AsJson = False,
 ) -> None:
-    """List the catalogues, or the layers of one."""
+    """List the catalogues, what they need and hold, or the layers of one."""
     import dataclasses
 
     from semsig_gis.core.plugins import installed_readers
@@ -301,18 +302,27 @@ def sources(
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]
         readers = sorted({*READERS, *installed_readers(taken=READERS)})
-        listed = [
-            {"name": c.name, "title": c.title, "layers": len(c.layers), "reader": c.reader}
-            for c in catalogs
-        ]
         if as_json:
-            print_json({"catalogs": listed, "readers": readers})
+            print_json({"catalogs": [_listed(c) for c in catalogs], "readers": readers})
             return
         print_rows(
             "Catalogues",
-            ("name", "title", "layers", "reader", "licence"),
-            ([*row.values(), c.license] for row, c in zip(listed, catalogs, strict=True)),
+            ("name", "place", "needs", "classes", "layers", "reader", "licence"),
+            (
+                [
+                    c.name,
+                    c.place,
+                    _needs_text(c),
+                    "".join(item.symbol for item in c.classes),
+                    len(c.layers),
+                    c.reader,
+                    c.license,
+                ]
+                for c in catalogs
+            ),
         )
+        symbols = {item.symbol: item.name for c in catalogs for item in c.classes}
+        say(f"classes: {', '.join(f'{symbol} {name}' for symbol, name in symbols.items())}")
         say(f"readers: {', '.join(readers)}")
         return
     catalog = load_catalog(name)
@@ -337,14 +347,39 @@ def sources(
             for spec in catalog.layers
         ),
     )
+    say(f"place: {catalog.place or 'not said'}; needs {_needs_text(catalog)}")
     if common:
         say(f"left out of every layer of objects: {', '.join(_rules(common))}")
-    used = {name for spec in catalog.layers for name in spec.classes}
     print_rows(
         "Classes",
         ("symbol", "code", "class", "title"),
-        ([c.symbol, c.code, c.name, c.title] for c in catalog.taxonomy.classes if c.name in used),
+        ([c.symbol, c.code, c.name, c.title] for c in catalog.classes),
     )
+
+
+def _listed(catalog: Catalog) -> dict[str, object]:
+    """Return what a program may want to know of a catalogue before it is loaded."""
+    live = bool(catalog.endpoints)
+    return {
+        "name": catalog.name,
+        "title": catalog.title,
+        "place": catalog.place,
+        "needs": {"files": not live, "network": live, "area": live, "token": catalog.token},
+        "classes": [item.name for item in catalog.classes],
+        "layers": len(catalog.layers),
+        "reader": catalog.reader,
+        "license": catalog.license,
+    }
+
+
+def _needs_text(catalog: Catalog) -> str:
+    """Say what has to be given for a catalogue."""
+    if not catalog.endpoints:
+        return "files"
+    if catalog.token is None:
+        return "files, or an area and the network"
+    state = "set" if os.environ.get(catalog.token) else "not set"
+    return f"files, or an area, the network and a token ({catalog.token}, {state})"
 
 
 def _class_text(spec: LayerSpec) -> str:

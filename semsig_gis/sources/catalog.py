@@ -390,6 +390,7 @@ NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "taxonomy"})
 CATALOG_KEYS = {
     "name": str,
     "title": str,
+    "place": str,
     "url": str,
     "license": str,
     "attribution": str,
@@ -425,6 +426,8 @@ class Catalog(Displayed):
     metric_crs : str, optional
         Coordinate reference system in metres in which distances are taken; by default the UTM zone
         of the data.
+    place : str
+        Where the data lies, such as ``"Vienna, Austria"``.
     url : str
         Where the data is published.
     reader : str
@@ -454,6 +457,7 @@ class Catalog(Displayed):
     taxonomy: Taxonomy
     layers: tuple[LayerSpec, ...]
     metric_crs: str | None = None
+    place: str = ""
     url: str = ""
     reader: str = "vector_file"
     endpoints: tuple[str, ...] = ()
@@ -471,6 +475,12 @@ class Catalog(Displayed):
             "classes": len(self.taxonomy.classes),
             "licence": self.license,
         }
+
+    @property
+    def classes(self) -> tuple[ObjectClass, ...]:
+        """The classes that its layers hold."""
+        held = {name for spec in self.layers for name in spec.classes}
+        return tuple(item for item in self.taxonomy.classes if item.name in held)
 
     def layer(self, name: str) -> LayerSpec:
         """Return the layer of that name; UnknownNameError, with the nearest, if there is none."""

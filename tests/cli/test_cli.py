@@ -151,10 +151,26 @@ def test_origin_moves_the_grid(done: Done) -> None:
 
 
 @pytest.mark.usefixtures("city")
-def test_sources(done: Done) -> None:
+def test_sources(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
     listed = json.loads(done("sources --json"))
     names = {item["name"] for item in listed["catalogs"]}
     assert names >= {"montpellier", "opendata_paris", "openstreetmap"}
+    facts = {item["name"]: item for item in listed["catalogs"]}
+    wanted = {"files": False, "network": True, "area": True, "token": "MAPILLARY_ACCESS_TOKEN"}
+    assert facts["mapillary"]["needs"] == wanted
+    assert facts["montpellier"]["needs"]["files"]
+    assert (facts["vienna"]["place"], facts["vienna"]["license"]) == (
+        "Vienna, Austria",
+        "CC BY 4.0",
+    )
+    assert facts["washington"]["classes"][0] == "alignment_tree"
+    monkeypatch.delenv("MAPILLARY_ACCESS_TOKEN", raising=False)
+    unset = "a token (MAPILLARY_ACCESS_TOKEN, not set)"
+    assert unset in done("sources")
+    monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", "MLY|secret")
+    out = done("sources mapillary")
+    assert "place: world; needs files, or an area" in out
+    assert "secret" not in out
     assert "osm_file" in listed["readers"]
     for line, words in {
         "sources": ("montpellier",),
