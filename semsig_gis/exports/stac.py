@@ -97,7 +97,8 @@ def _href(file: Path, folder: Path) -> str:
 
 def _licence(lines: tuple[str, ...]) -> str:
     """Return the one licence of all sources if it has a name of one word, else ``other``."""
-    found = {match["licence"] for line in lines if (match := LICENCE.fullmatch(line))}
+    matches = map(LICENCE.fullmatch, lines)
+    found = {match["licence"] if match else "" for match in matches}
     only = found.pop() if len(found) == 1 else ""
     return only if NAMED.fullmatch(only) else "other"
 

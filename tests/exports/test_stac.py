@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pystac
 import pytest
+from pyproj import CRS
 from pystac.extensions.file import FileExtension
 from pystac.extensions.projection import ProjectionExtension
 from pystac.validation import RegisteredValidator
@@ -111,7 +112,7 @@ def test_an_item_is_valid_and_says_what_the_database_is(tmp_path: Path) -> None:
         (("A (ODbL-1.0): trees", "B (CC0-1.0): lamps"), "other", ["A", "B"]),
         (("A (Open (Etalab)): trees, lamps", "A (APIE): lamps"), "other", ["A"]),
         (("no attribution given (unknown)",), "other", ["no attribution given"]),
-        (("no brackets",), "other", ["no brackets"]),
+        (("A (CC0-1.0)", "no brackets"), "other", ["A", "no brackets"]),
     ],
 )
 def test_the_licence_of_all(
@@ -124,6 +125,18 @@ def test_the_licence_of_all(
     assert item.properties["license"] == licence
     told = [provider["name"] for provider in item.properties["providers"]]
     assert told == owners
+
+
+def test_a_crs_of_its_own_is_told_whole(tmp_path: Path) -> None:
+    local = CRS("+proj=tmerc +lat_0=48 +lon_0=3.1 +x_0=500000 +y_0=5400000 +ellps=GRS80 +units=m")
+    save_database(dataclasses.replace(CITY, crs=local), tmp_path / "a.parquet")
+    export_item(tmp_path / "a.parquet", tmp_path / "a.json")
+    item = pystac.Item.from_file(str(tmp_path / "a.json"))
+    item.validate()
+    told = ProjectionExtension.ext(item)
+    assert told.code is None
+    assert told.projjson is not None
+    assert CRS.from_json_dict(told.projjson) == local
 
 
 def test_what_cannot_be_an_item_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
