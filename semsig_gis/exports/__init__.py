@@ -30,6 +30,7 @@ from semsig_gis.exports.layers import (
     objects_layer,
 )
 from semsig_gis.exports.rasters import cell_errors, export_field, export_geotiff
+from semsig_gis.objects.table import open_objects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -331,9 +332,12 @@ def export_item(
     Raises
     ------
     DatabaseError
-        If the database is missing, damaged, or holds something else.
+        If the database or the file of objects is missing, damaged, or holds something else.
+    EmptyResultError
+        If there is no cell or no object.
     InputError
-        If the suffix is another, pystac is not installed, or the file cannot be written.
+        If the suffix is another, pystac is not installed, the objects are those of another city,
+        or the file cannot be written.
 
     Notes
     -----
@@ -365,7 +369,10 @@ def export_item(
             "'semsig_gis[stac]'."
         )
         raise InputError(msg) from error
-    write_item(open_city(database), path, objects=objects)
+    city = open_city(database)
+    if objects is not None:
+        _require_one_city(path, city.database, open_objects(objects), None)
+    write_item(city, path, objects=objects)
 
 
 def export_answer(
@@ -412,7 +419,7 @@ def export_answer(
     ...     export_answer(answer, demo_database, f"{folder}/regions.gpkg").to_dict()["cells"]
     5
     """
-    suffix = _suffix(path, {**_ONE_LAYER, **_ANSWER, **dict.fromkeys(sorted(_RASTER))})
+    suffix = _suffix(path, [*dict.fromkeys((*_ANSWER, *_ONE_LAYER)), *sorted(_RASTER)])
     if suffix in _RASTER and answer.chances is None:
         msg = (
             f"{path} is to hold the chance of every cell, which the method does not tell; use the "

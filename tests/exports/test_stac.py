@@ -20,7 +20,7 @@ from pystac.validation.stac_validator import JsonSchemaSTACValidator
 from sentences import refused
 from small_city import small_city
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.database.file import save_database
 from semsig_gis.exports import export_item
 from semsig_gis.objects.table import save_objects
@@ -143,6 +143,8 @@ def test_what_cannot_be_an_item_is_refused(tmp_path: Path, monkeypatch: pytest.M
     save_database(CITY, tmp_path / "a.parquet")
     with refused(InputError, "a.yaml does not end in .json"):
         export_item(tmp_path / "a.parquet", tmp_path / "a.yaml")
+    with refused(DatabaseError, "nowhere.parquet"):
+        export_item(tmp_path / "a.parquet", tmp_path / "a.json", objects="nowhere.parquet")
     monkeypatch.delitem(sys.modules, "semsig_gis.exports.stac", raising=False)
     monkeypatch.setitem(sys.modules, "pystac", None)
     with refused(InputError, "pystac", "semsig_gis[stac]"):
