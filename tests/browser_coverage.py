@@ -20,6 +20,7 @@ SCRIPTS = {
 }
 # The name that `maps.parts.page_element` and `serve.page` give the script in a page.
 FOLDER = "semsig/"
+MOST_LISTED = 20  # lines that no test ran
 
 
 class BrowserCoverage:
@@ -63,8 +64,12 @@ class BrowserCoverage:
             return
         terminalreporter.section("browser code that the tests ran")
         for file, text in sorted(SCRIPTS.items()):
-            ran, code = len(self.lines[file]), len(_code(text))
-            terminalreporter.write_line(f"{file:20}{ran:4} of {code:4} lines{ran / code:5.0%}")
+            code = [start for start, _ in _code(text)]
+            ran = len(self.lines[file])
+            left = [text.count("\n", 0, at) + 1 for at in code if at not in self.lines[file]]
+            missing = f"  not {', '.join(map(str, left))}" if 0 < len(left) <= MOST_LISTED else ""
+            line = f"{file:20}{ran:4} of {len(code):4} lines{ran / len(code):5.0%}{missing}"
+            terminalreporter.write_line(line)
 
 
 def _code(text: str) -> list[tuple[int, int]]:

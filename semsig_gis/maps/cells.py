@@ -7,6 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+import pandas as pd
 from folium.template import Template
 
 from semsig_gis.core.errors import InputError
@@ -19,7 +20,15 @@ from semsig_gis.core.signs import (
     SAME_TYPES,
     group_labels,
 )
-from semsig_gis.maps.image import QUANTUM_M, level_image, packed, place_lattices, script_json, steps
+from semsig_gis.maps.image import (
+    QUANTUM_M,
+    CellPixels,
+    level_image,
+    packed,
+    place_lattices,
+    script_json,
+    steps,
+)
 from semsig_gis.maps.parts import (
     LIFTING,
     NAMED_CLASSES,
@@ -164,7 +173,10 @@ def _objects_seen(database: SignatureDatabase) -> tuple[NDArray[np.int32], NDArr
     # Seen from near they are known best, and come first.
     low = xy.min(axis=0, initial=np.inf)
     columns, rows = (np.rint(part).astype(np.int64) for part in (xy - low).T)
-    _, first = np.unique((columns << 32 | rows) << 8 | codes, return_index=True)
+    keys = (columns << 32 | rows) << 8 | codes
+    # Half as long as with a sort of all of them.
+    first = np.flatnonzero(~pd.Series(keys).duplicated())
+    first = first[np.argsort(keys[first])]
     return np.rint(xy[first] / QUANTUM_M).astype(np.int32), codes[first]
 
 
@@ -243,9 +255,10 @@ def ambiguity_map(
     pairs = types.inverse * len(angles) + angles.inverse
     _, pair, counts = np.unique(pairs, return_inverse=True, return_counts=True)
     sizes = {"Same types": database.type_group_sizes, "Same types and angle levels": counts[pair]}
+    pixels = CellPixels.of(database)
     for name, size in sizes.items():
-        levels = np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8)
-        image = level_image(database, levels, list(GROUP_COLOURS.values()))
+        levels = pixels.levels(np.digitize(size, list(GROUP_COLOURS)).astype(np.uint8))
+        image = pixels.image(levels, list(GROUP_COLOURS.values()))
         show = name == "Same types"
         colour_cells(page, name, cell_image(page, *image, dark="lift"), show=show)
     more = [] if identifiability is None else [_lookalike_facts(identifiability)]

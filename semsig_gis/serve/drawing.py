@@ -10,7 +10,7 @@ import numpy as np
 from semsig_gis.core.signs import CHANCES
 from semsig_gis.likelihood.explain import UNKNOWN_NAME
 from semsig_gis.maps.location import REGION_COLOURS, region_levels
-from semsig_gis.maps.parts import cell_signature, data_url, exact_latlon, to_metres
+from semsig_gis.maps.parts import data_url, exact_latlon, to_metres
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -121,15 +121,13 @@ class _Drawer:
 
     def candidates(self) -> list[dict[str, Any]]:
         """Return the candidates, likeliest first."""
-        location, database = self.location, self.database
+        location = self.location
         columns = location.columns
         places = self.latlon(np.stack([columns["x"], columns["y"]], axis=1))
-        rows = zip(*(columns[name].tolist() for name in ("cell", "cell_id", "chance")), strict=True)
+        rows = zip(*(columns[name].tolist() for name in ("cell_id", "chance")), strict=True)
         found = []
-        for number, ((cell, cell_id, chance), place) in enumerate(zip(rows, places, strict=True)):
+        for number, ((cell_id, chance), place) in enumerate(zip(rows, places, strict=True)):
             heading = float(columns["heading"][number]) if "heading" in columns else None
-            seen = database.select(slice(cell, cell + 1))
-            types, bearings, *_ = cell_signature(database, cell)
             found.append(
                 {
                     "rank": number + 1,
@@ -137,7 +135,6 @@ class _Drawer:
                     "place": place,
                     "chance": chance,
                     "heading": heading,
-                    "signature": [types, bearings, np.round(seen.distances, 1).tolist()],
                     "rays": [],
                     "for_against": [],
                 }
@@ -158,6 +155,8 @@ class _Drawer:
                 "title": self._title(row["object_class"] or row["query_class"]),
                 "seen_class": row["query_class"],
                 "seen_title": self._title(row["query_class"]),
+                "seen_bearing": row["query_bearing"],
+                "seen_range": row["query_range"],
                 "bearing": row["object_bearing"],
                 "distance": row["distance"],
                 "from": here,

@@ -4,9 +4,7 @@ import io
 import json
 import math
 import shlex
-import struct
 import sys
-import zlib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +15,7 @@ from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from pyproj import Transformer
 from sentences import refused
+from workbench import bomb
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.view import View
@@ -136,18 +135,6 @@ def test_a_panorama_is_known_by_its_form(page: Page) -> None:
     told = json.loads(page.send("/api/photo?name=p.png", content.getvalue())[2])
     assert (told["projection"], told["fov"], told["heading"]) == ("equirectangular", 360.0, None)
     assert len(told["notes"]) == 1
-
-
-def bomb() -> bytes:
-    """Return a PNG that says to be 30,000 pixels wide and high."""
-
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        check = struct.pack(">I", zlib.crc32(kind + body))
-        return struct.pack(">I", len(body)) + kind + body + check
-
-    header = struct.pack(">IIBBBBB", 30_000, 30_000, 8, 0, 0, 0, 0)
-    data = zlib.compress(bytes(1_000_000))
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
 
 
 @pytest.mark.parametrize(
@@ -372,6 +359,19 @@ def test_boxes_of_a_detector_become_marks(page: Page) -> None:
     ):
         code, text = page.refused("/api/boxes", asked | change)
         assert (code, word in text, "/tmp" in text) == (422, True, False), text  # noqa: S108
+
+
+def test_boxes_of_yolo_take_their_labels_from_a_list(page: Page) -> None:
+    asked = {
+        "text": "1 0.5 0.5 0.1 0.1 0.8\n0 0.2 0.5 0.1 0.1 0.9\n",
+        "name": "a.txt",
+        "classes": "dog\nbench\n",
+        "photos": [{**SIDE, "fov": FOV, "heading": 90.0}],
+    }
+    (mark,) = page.ask("/api/boxes", asked)["photos"]["a.jpg"]
+    assert (mark["class"], mark["score"]) == ("bench", 0.8)
+    told = page.ask("/api/boxes", {**asked, "classes": "dog\n"})
+    assert (told["photos"]["a.jpg"], len(told["notes"])) == ([], 2)
 
 
 def test_what_to_look_for_next_is_a_question(page: Page) -> None:

@@ -14,6 +14,7 @@ from map_pages import HOSTILE
 from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from selenium.webdriver.common.keys import Keys
+from workbench import bomb
 from workbench_pages import STAGE, WorkbenchPage
 
 from benchmarks.street_photos import street_photo
@@ -96,6 +97,14 @@ def test_a_place_is_found_by_the_objects_of_two_photos(
     ]
     assert shown.all("#map path[stroke-width]")
     assert "Speaks for candidate 1" in shown.text("#speaks")
+    # The verdicts of the wheels are those of the answer.
+    wheels = "return [...document.querySelectorAll('#wheels figure')].map((figure) => "
+    wheels += "[...figure.querySelectorAll('.object')].map((one) => one.classList[1]))"
+    marked, there = shown.ask(wheels)
+    rays = shown.ask("return semsig.session.answer.candidates[0].rays")
+    own = [ray["verdict"] for ray in rays if ray["mark"] and ray["mark"][1] == 1]
+    assert sorted(marked) == sorted(own)
+    assert len(there) == sum(ray["distance"] is not None for ray in rays)
     shown.ask("document.querySelector('#wheels .object').focus()")
     assert len(shown.all("#wheels .lit")) == 2
     shown.press("#candidates button:nth-child(2)")
@@ -244,7 +253,10 @@ def test_a_view_is_composed_on_a_compass(shown: WorkbenchPage) -> None:
     assert east["range"] is None
     shown.drag(f"{STAGE} .mark[aria-pressed=true]", (0.5, 0.5), (-60, 60), (-20, 20))
     assert 100 < shown.ask(entries)[1]["bearing"] < 180
+    turned = shown.ask(entries)[1]
     shown.type(Keys.ARROW_RIGHT, Keys.ARROW_DOWN)
+    assert shown.ask(entries)[1]["bearing"] == turned["bearing"] + 5
+    assert shown.ask(entries)[1]["range"] < turned["range"]
     shown.choose("#turn-seen", "part")
     shown.one("#sector-0").clear()
     shown.one("#sector-0").send_keys("300", Keys.TAB)
@@ -319,6 +331,7 @@ def test_what_is_no_photo_is_refused_in_one_sentence(shown: WorkbenchPage, tmp_p
         "drawing.svg": b'<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>',
         "phone.heic": b"\0\0\0\x18ftypheic\0\0\0\0heicmif1" + bytes(100),
         "large.jpg": bytes(26 * 2**20),
+        "bomb.png": bomb(),
     }
     for name, content in files.items():
         file = tmp_path / name
@@ -356,6 +369,12 @@ def test_boxes_of_a_detector_become_marks(
     (mark,) = shown.until("return semsig.session.entries.length && semsig.session.entries")
     assert mark["class"] == "bench"
     assert shown.settle().startswith(("Cannot tell", "Within"))
+    # Of YOLO, with the list of its labels.
+    yolo, labels = tmp_path / "ahead.txt", tmp_path / "classes.txt"
+    yolo.write_text("1 0.5 0.5 0.1 0.1 0.8\n", encoding="utf-8")
+    labels.write_text("dog\nbench\n", encoding="utf-8")
+    shown.give("#boxes", yolo, labels)
+    assert [one["class"] for one in shown.ask("return semsig.session.entries")] == 2 * ["bench"]
     file.write_text("[", encoding="utf-8")
     shown.give("#boxes", file)
     assert "boxes.json" in shown.until("return document.querySelector('#notice span')?.textContent")

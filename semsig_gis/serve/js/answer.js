@@ -180,41 +180,47 @@ semsig.Answer = class {
       }
     }
   }
-  // What was seen, turned as the candidate has it, beside what stands there.
+  // What was seen, turned as the candidate has it, beside what stands there: each ray of the answer
+  // is a mark, a street object, or both.
   showWheels() {
     const {session, candidate} = this;
+    const {scene, city} = session;
     const box = document.getElementById("wheels");
     box.replaceChildren();
-    const at = session.views.indexOf(session.scene && session.viewOf(session.scene));
+    const at = session.views.indexOf(scene && session.viewOf(scene));
     const view = session.answer?.views?.[at];
     if (!view || !candidate) return;
-    const {reach} = session.city;
-    const [types, bearings, metres] = candidate.signature;
-    const whole = (metres) => (metres === null ? null : Math.round(metres));
-    const photos = view.photos || [view];
+    const photo = Math.max(session.views[at].photos?.indexOf(scene) ?? 0, 0);
+    const seen = candidate.rays.filter(({mark}) => mark?.[0] === at && mark[1] === photo);
+    const there = candidate.rays.filter(({distance}) => distance !== null);
     const marked = session.views[at].photos?.filter((one) => one.marks.length);
-    const own = marked ? marked.indexOf(session.scene) : 0;
-    if (photos[own]) {
-      const turn = candidate.headings?.[own] ?? 0;
-      const rows = view.bearings.map((_, row) => row).filter(
-        (row) => (view.photo?.[row] ?? 0) === own);
-      const turned = (degrees) => (degrees + turn + 720) % 360;
-      const sectors = (photos[own].sectors || []).map(([from, to]) => [
-        turned(from), turned(from) + ((to - from + 360) % 360 || 360)]);
-      const outside = bearings.map((_, one) => one).filter((one) => sectors.length
-        && !sectors.some(([from, to]) => (bearings[one] - from + 720) % 360 <= to - from));
-      const seen = [rows.map((row) => view.types[row]).join(""),
-        rows.map((row) => Math.round(turned(view.bearings[row])) % 360),
-        {reach, sectors, metres: rows.map((row) => whole(view.ranges?.[row] ?? null))}];
-      const there = [types, bearings.map((degrees) => Math.round(degrees) % 360),
-        {reach, sectors, outside, metres: metres.map(whole)}];
-      const told = semsig.compare(seen, there, ["false", "missed"]);
-      const {signs} = session.city;
-      const wheels = [semsig.wheel("Marked", seen, signs, told[0]),
-        semsig.wheel(`At candidate ${candidate.rank}`, there, signs, told[1])];
-      box.append(...wheels);
-      this.light(wheels, told);
-    }
+    const own = marked ? marked.indexOf(scene) : 0;
+    const look = (view.photos || [view])[own];
+    if (!seen.length || !look) return;  // marks have changed since the answer
+    const turn = candidate.headings[own] ?? 0;
+    const turned = (degrees) => (degrees + turn + 720) % 360;
+    const sectors = (look.sectors || []).map(([from, to]) => [
+      turned(from), turned(from) + ((to - from + 360) % 360 || 360)]);
+    const hidden = ({bearing}) => sectors.length
+      && !sectors.some(([from, to]) => (bearing - from + 720) % 360 <= to - from);
+    const outside = [...there.keys()].filter(
+      (one) => !seen.includes(there[one]) && hidden(there[one]));
+    const signature = (rays, [kind, degrees, metres], more = {}) => [
+      rays.map((ray) => semsig.classNamed(session, ray[kind]).symbol).join(""),
+      rays.map((ray) => Math.round(ray[degrees] + 360) % 360),
+      {reach: city.reach, sectors, ...more,
+        metres: rays.map((ray) => (ray[metres] === null ? null : Math.round(ray[metres])))}];
+    const told = [
+      seen.map((ray) => ({partner: there.indexOf(ray), verdict: ray.verdict})),
+      there.map((ray, one) => ({
+        partner: seen.indexOf(ray), verdict: outside.includes(one) ? "outside" : ray.verdict}))];
+    const wheels = [
+      semsig.wheel("Marked", signature(seen, ["seen_class", "seen_bearing", "seen_range"]),
+        city.signs, told[0]),
+      semsig.wheel(`At candidate ${candidate.rank}`,
+        signature(there, ["class", "bearing", "distance"], {outside}), city.signs, told[1])];
+    box.append(...wheels);
+    this.light(wheels, told);
   }
   // What is pointed at in a wheel stands out in both.
   light(wheels, told) {

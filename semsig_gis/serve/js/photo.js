@@ -24,6 +24,7 @@ semsig.mark = (session, entry, {drag, nudge}) => {
   button.addEventListener("pointerdown", (event) => {
     event.stopPropagation();
     event.preventDefault();
+    document.activeElement.blur();  // so that keys move the mark
     if (session.mark !== entry) session.show(session.scene, entry);
     let moved = false;
     const start = {...entry};
@@ -151,6 +152,7 @@ semsig.photo = (session, photo) => {
 semsig.addMark = (session, where) => {
   const entry = {range: null, ...where, class: session.brush};
   session.entries.push(entry);
+  document.activeElement.blur();
   session.show(session.scene, entry);
   session.changed();
 };

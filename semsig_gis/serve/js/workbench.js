@@ -105,8 +105,10 @@ semsig.readBoxes = async (session, files) => {
   const photos = session.scenes.filter((scene) => scene.marks);
   const told = ({name, width, height, fov, heading, projection}) => (
     {name, width, height, fov, heading, projection});
-  for (const file of files) {
-    const body = {text: await file.text(), name: file.name, photos: photos.map(told)};
+  const labels = files.find(({name}) => name === "classes.txt");  // of YOLO, beside its boxes
+  const classes = await labels?.text();
+  for (const file of files.filter((one) => one !== labels)) {
+    const body = {text: await file.text(), name: file.name, photos: photos.map(told), classes};
     const read = await (await semsig.api("boxes", body)).json();
     for (const photo of photos) {
       for (const {box, class: name} of read.photos[photo.name] || []) {
