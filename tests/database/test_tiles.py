@@ -167,8 +167,8 @@ def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
 def test_tables_of_buildings_and_streets_are_as_good_as_files(
     objects_file: Path, tmp_path: Path
 ) -> None:
-    tables = houses_and_streets()
-    files = {role: tmp_path / f"{role}.parquet" for role in tables}
+    tables: dict[str, Any] = houses_and_streets()
+    files: dict[str, Any] = {role: tmp_path / f"{role}.parquet" for role in tables}
     for role, table in tables.items():
         save_surroundings(table, files[role])
     spec: dict[str, Any] = {"tile": TileSpec(100.0), "viewpoints": ViewpointSpec(mode="streets")}
