@@ -17,7 +17,7 @@ from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
 from semsig_gis.sources.catalog import LayerSpec, load_catalog
 from semsig_gis.sources.osm.features import frame_fields, frame_layers, tells_elements
-from semsig_gis.sources.parquet import read_parquet
+from semsig_gis.sources.parquet import SUFFIXES, read_parquet
 from semsig_gis.sources.raw_layer import WGS84
 from semsig_gis.storage.geoparquet import (
     CHECKED_PAGES,
@@ -216,7 +216,7 @@ def _read_file(
     if told is not None:
         (layer,) = reader(told)(path, [load_catalog("openstreetmap").layer(role)])
         return _with_licences(layer), layer.notes
-    if path.suffix.lower() == ".parquet":
+    if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()
     layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
     if layer.errors:

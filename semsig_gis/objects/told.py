@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import file_reader, files_in, require_file
-from semsig_gis.sources.parquet import column_names
+from semsig_gis.sources.parquet import SUFFIXES, column_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,6 +51,6 @@ def told_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[s
 def _reader(path: Path) -> str | None:
     """Return the reader that a file tells by its name or by what is in it."""
     reader = file_reader(path, sure=True)
-    if reader is None and path.suffix.lower().endswith("parquet"):
+    if reader is None and path.suffix.lower() in SUFFIXES:
         return "overture" if OVERTURE.issubset(column_names(path)) else None
     return reader

@@ -50,7 +50,7 @@ NAMES_TOLD = 4
 
 # Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
 FILE_SUFFIXES = frozenset(
-    {".bz2", ".csv", ".fgb", ".geojson", ".gml", ".gpkg", ".gz", ".json",
+    {".bz2", ".csv", ".fgb", ".geojson", ".geoparquet", ".gml", ".gpkg", ".gz", ".json",
      ".osm", ".parquet", ".pbf", ".shp", ".zip"}
 )  # fmt: skip
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
     from pathlib import Path
 
+SUFFIXES = frozenset({".geoparquet", ".parquet"})
+
 
 def column_names(path: Path) -> list[str]:
     """Return the names of the columns of a Parquet file; SourceError if it is none."""

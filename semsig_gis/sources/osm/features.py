@@ -20,11 +20,12 @@ import pandas as pd
 import shapely
 
 from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.sources import parquet
 from semsig_gis.sources.catalog import data_folder, load_catalog
 from semsig_gis.sources.conditions import as_text
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, feature_shape
 from semsig_gis.sources.parquet import column_names, read_parquet
-from semsig_gis.sources.raw_layer import WGS84, BadFeatureError, built_geometries
+from semsig_gis.sources.raw_layer import WGS84, BadFeatureError, built_geometries, parse_crs
 from semsig_gis.sources.vector import DRIVERS, layer_fields, read_tables
 from semsig_gis.storage.toml import parse_toml
 
@@ -35,8 +36,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.catalog import ElementKind, LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
-PARQUET = ".parquet"
-SUFFIXES = frozenset({*DRIVERS, PARQUET, ".zip"} - {".csv"})
+SUFFIXES = frozenset({*DRIVERS, *parquet.SUFFIXES, ".zip"} - {".csv"})
 # Columns of all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
 MAPS = ("tags", "other_tags", "@other_tags")
 PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"\s*=>\s*(?:"((?:[^"\\]|\\.)*)"|NULL)')
@@ -162,7 +162,7 @@ def file_reader(path: Path, *, sure: bool = False) -> str | None:
             start = stream.read(OVERPASS_START)
         if b'"elements"' in start and b'"Feature' not in start:
             return "overpass"
-    names = [column_names(path)] if suffix == PARQUET else layer_fields(path)
+    names = [column_names(path)] if suffix in parquet.SUFFIXES else layer_fields(path)
     tells = tells_elements if sure else holds_tags
     return "osm_features" if any(map(tells, names)) else None
 
@@ -200,10 +200,10 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
     """Yield the tables of a file, with the columns that matter."""
     wanted = {*_keys(specs), *MAPS, *NAMES, WAY_NUMBER, CLASS, CODE}
     wanted.update(name for pair in KINDS_AND_NUMBERS for name in pair)
-    if path.suffix.lower() == PARQUET:
+    if path.suffix.lower() in parquet.SUFFIXES:
         frame = read_parquet(path, kind="features", columns=wanted)
         if frame.crs is None and crs is not None:
-            frame = frame.set_crs(crs)
+            frame = frame.set_crs(parse_crs(crs))
         yield frame_table(frame)
         return
     for table in read_tables(path, lambda fields: wanted if holds_tags(fields) else (), crs=crs):
