@@ -54,8 +54,10 @@ def main() -> None:
     finally:
         sys.unraisablehook = passing
     if said:
+        from semsig_gis.cli.console import complain
+
         with contextlib.suppress(OSError):
-            _remark(said)
+            complain(said)
     for stream in _streams():
         _settle(stream)
     if threading.current_thread() is threading.main_thread():

@@ -48,8 +48,10 @@ def run() -> int:
         fault = error.format_message().rstrip(".?").replace(". ", "; ")
         msg = _out_of_range(error) or f"{fault}; see {command} --help."
         raise InputError(msg) from error
-    except SystemExit as end:  # so typer ends where nobody reads the output any more
-        raise BrokenPipeError from end
+    except SystemExit as end:
+        if end.code:  # so typer ends where nobody reads the output any more
+            raise BrokenPipeError from end
+        return 0  # a script of completion, or what completes a line
     if code == INTERRUPTED:  # which typer makes of the interrupt key
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0

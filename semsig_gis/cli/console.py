@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import json
 import os
+import re
 import shlex
 import signal
 import sys
 import threading
+import time
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import typer
 
@@ -65,6 +69,10 @@ def _interrupt_at_end_of(watched: int) -> None:
 # A bar appears for work that takes longer than this.
 PATIENCE_S = 2.0
 
+_AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|km|km²|m²|MB|s|ms))?"
+NUMBER = re.compile(rf"{_AMOUNT}(?:(?:-| to ){_AMOUNT})?")
+"""A number as tables have it, with its unit, or two that are the ends of an interval."""
+
 # Whole numbers from here on are identifiers, which read better without separators.
 LARGEST_COUNT = 10**9
 
@@ -78,8 +86,19 @@ def say(text: object, *, err: bool = False, end: str = "\n") -> None:
     typer.echo(shown + end, err=err, nl=False)  # noqa: TID251 - the one place
 
 
+Talk = Literal["quiet", "plain", "verbose"]
+talk: ContextVar[Talk] = ContextVar("talk", default="plain")
+"""How much is told beside the results, by `--quiet` and `--verbose` of the command that runs."""
+
+
 def remark(text: str) -> None:
-    """Say one sentence on standard error, after the name of the command."""
+    """Say one sentence on standard error, after the name of the command, unless it is quiet."""
+    if talk.get() != "quiet":
+        complain(text)
+
+
+def complain(text: str) -> None:
+    """Say one sentence on standard error in any case: why the command ends."""
     say(f"semsig: {visible(text)}", err=True)
 
 
@@ -100,17 +119,20 @@ def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 -
 def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     """Print a table on standard output; text from data is neither markup nor moves the cursor.
 
-    Whole numbers get thousands separators.
+    Whole numbers get thousands separators. Columns of nothing but numbers stand to the right.
     """
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     table = Table(title=Text(visible(title)), title_justify="left")
-    for name in header:
-        table.add_column(Text(visible(name)), overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(_cell_text(cell)) for cell in row))
+    texts = [[_cell_text(cell) for cell in row] for row in rows]
+    for number, name in enumerate(header):
+        column = [one[number] for one in texts if number < len(one) and one[number]]
+        right = bool(column) and all(map(NUMBER.fullmatch, column))
+        table.add_column(Text(visible(name)), overflow="fold", justify="right" if right else "left")
+    for row in texts:
+        table.add_row(*map(Text, row))
     console = Console(file=sys.stdout)
     if not console.is_terminal:
         # A file or a pipe has no width to fold to.
@@ -133,11 +155,19 @@ def progress(
     """Show a bar on standard error once the work in the block takes a while.
 
     The block gets a function, to be called with how much is done and how much there is in all. A
-    program that supervises this one gets lines instead (see `cli.console`).
+    program that supervises this one gets lines instead (see `cli.console`), and who wants to know
+    every step gets a line when it begins and one when it is done.
     """
     if supervised():
         yield _progress_lines(label)
         return
+    if talk.get() == "quiet":
+        yield lambda _done, _total: None
+        return
+    told = talk.get() == "verbose"
+    if told:
+        remark(f"{label} ...")
+    start = time.perf_counter()
     from rich import progress as parts
     from rich.console import Console
 
@@ -149,23 +179,30 @@ def progress(
         *(
             (parts.DownloadColumn(), parts.TransferSpeedColumn())
             if unit == "bytes"
-            else (parts.MofNCompleteColumn(), parts.TimeRemainingColumn())
+            else (parts.TextColumn("{task.fields[count]}"), parts.TimeRemainingColumn())
         ),
         console=screen,
         transient=True,
         disable=not screen.is_terminal,
     )
-    task = bar.add_task(label, total=None)
+    task = bar.add_task(label, total=None, count="")
+
+    def advance(done: int, total: int) -> None:
+        count = f"{done:,} of {total:,}" if total else f"{done:,}"
+        bar.update(task, completed=done, total=total or None, count=count)
+
     patience = threading.Timer(PATIENCE_S, bar.start)
     patience.daemon = True
     patience.start()
     try:
-        yield lambda done, total: bar.update(task, completed=done, total=total or None)
+        yield advance
     finally:
         patience.cancel()
         # Stopping a bar that never showed, or shows nowhere, would print an empty line.
         if bar.live.is_started:
             bar.stop()
+    if told:
+        remark(f"{label}: {time.perf_counter() - start:.1f} s")
 
 
 def _progress_lines(label: str) -> Callable[[int, int], None]:
@@ -183,10 +220,63 @@ def _progress_lines(label: str) -> Callable[[int, int], None]:
     return advance
 
 
-app = typer.Typer(
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print results alone: no progress, no remarks.")
+]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Tell each step, and how long it took.")
+]
+
+
+class Commands(typer.Typer):
+    """The commands, each of which can be told to be quiet or verbose."""
+
+    def command(  # type: ignore[override]
+        self,
+        name: str | None = None,
+        *,
+        help: str | None = None,  # noqa: A002 - as typer's
+    ) -> Callable[[Callable[..., None]], Callable[..., None]]:
+        """Register a function as a command with the two options more."""
+        register = super().command(name, help=help)
+
+        def wrap(function: Callable[..., None]) -> Callable[..., None]:
+            @functools.wraps(function)
+            def run(*, quiet: bool, verbose: bool, **values: Any) -> None:  # noqa: ANN401 - any options
+                if quiet and verbose:
+                    msg = "--quiet and --verbose were given; give one of them."
+                    raise InputError(msg)
+                before = talk.set("quiet" if quiet else "verbose" if verbose else "plain")
+                try:
+                    function(**values)
+                finally:
+                    talk.reset(before)
+
+            hints = get_type_hints(function, include_extras=True)
+            told = inspect.signature(function)
+            own = [
+                one.replace(
+                    annotation=hints.get(one.name, one.annotation),
+                    kind=inspect.Parameter.KEYWORD_ONLY,
+                )
+                for one in told.parameters.values()
+            ]
+            more = [
+                inspect.Parameter(
+                    name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option
+                )
+                for name, option in (("quiet", Quiet), ("verbose", Verbose))
+            ]
+            run.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
+            register(run)
+            return function
+
+        return wrap
+
+
+app = Commands(
     name="semsig",
     help="Tell where in a city a view was taken from the street objects in it.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )

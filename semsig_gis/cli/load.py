@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
+from urllib.parse import urlsplit
 
 import typer
 
@@ -27,6 +28,13 @@ if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
     from semsig_gis.sources.catalog import Catalog, LayerSpec
     from semsig_gis.sources.conditions import Rules
+
+
+def _catalogs(incomplete: str) -> list[str]:
+    """Return the catalogues whose names begin so, for a shell that completes a line."""
+    from semsig_gis.sources.catalog import catalog_names
+
+    return [name for name in catalog_names() if name.startswith(incomplete)]
 
 
 Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
@@ -79,6 +87,7 @@ def load(
         list[str] | None,
         typer.Option(
             "--catalog",
+            autocompletion=_catalogs,
             help="Catalogue, by name or .toml file, where the files do not tell it (those of "
             "OpenStreetMap and Overture do); repeat to merge, best first.",
         ),
@@ -164,7 +173,11 @@ def load(
 def fetch(
     name: Annotated[
         str,
-        typer.Argument(metavar="catalog", help="Catalogue with a service, by name or .toml."),
+        typer.Argument(
+            metavar="catalog",
+            autocompletion=_catalogs,
+            help="Catalogue with a service, by name or .toml.",
+        ),
     ],
     *,
     area: Annotated[
@@ -210,7 +223,11 @@ def fetch(
     )
     kept, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
     unit: Literal["steps", "bytes"] = "bytes" if catalog.reader == "opendatasoft" else "steps"
-    with progress("fetching", unit=unit) as advance:
+    hosts = ", ".join(dict.fromkeys(urlsplit(url).netloc for url in catalog.endpoints))
+    if not offline:
+        layers_ = f"{len(specs)} layer{'' if len(specs) == 1 else 's'}"
+        remark(f"asking {hosts} for {layers_} of {area}, attempt 1 of {http.attempts}")
+    with progress(f"fetching from {hosts}", unit=unit) as advance:
         place = find_area(area, catalog, cache=kept, http=http)
         layers = fetch_layers(
             specs,
@@ -287,7 +304,10 @@ def draft(
 @app.command()
 def sources(
     name: Annotated[
-        str | None, typer.Argument(help="Catalogue, by name or .toml file; default: list all.")
+        str | None,
+        typer.Argument(
+            autocompletion=_catalogs, help="Catalogue, by name or .toml file; default: list all."
+        ),
     ] = None,
     *,
     as_json: AsJson = False,

@@ -12,12 +12,15 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from sentences import sentence
 
 from semsig_gis.cli import console
 from semsig_gis.cli.console import VARIABLE, progress_line
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from conftest import Run
 
 
 # --- What is printed ---------------------------------------------------------------------------
@@ -33,6 +36,64 @@ def test_rows_are_shown_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 HOSTILE = "a\x1b[2J\x1b]0;title\x07\u009b31m\u202eb\r\ud83d"
+
+
+def test_numbers_stand_to_the_right(capsys: pytest.CaptureFixture[str]) -> None:
+    header = ("name", "count", "share", "range", "mixed", "none")
+    rows = [
+        ("a", 7, "0.5 %", "1-20", "3", ""),
+        ("b", 12345, "12.5 %", "0.0979 to 0.1558", "three", ""),
+        ("c", -1, "100 %", "infinite", "", ""),
+    ]
+    console.print_rows("title", header, rows)
+    first = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("│ a"))
+    cells = [cell[1:-1] for cell in first.split("│")[1:-1]]
+    assert cells == ["a   ", "     7", " 0.5 %", f"{'1-20':>16}", "3    ", "    "]
+
+
+@pytest.mark.parametrize(("option", "told"), [("", "a\n"), ("--quiet", ""), ("-v", "steps")])
+def test_how_much_is_told_is_said_in_one_way(
+    option: str, told: str, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def draft(_: Path, *, crs: str | None) -> str:  # noqa: ARG001
+        console.remark("a")
+        with console.progress("digging") as advance:
+            advance(1, 2)
+        return "draft\n"
+
+    monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", draft)
+    code, out, err = run(f"draft x.gpkg {option}")
+    assert (code, out) == (0, "draft\n")
+    if told == "steps":
+        assert re.fullmatch(r"semsig: a\nsemsig: digging \.\.\.\nsemsig: digging: 0\.\d s\n", err)
+    else:
+        assert err == (told and f"semsig: {told}")
+    assert console.talk.get() == "plain"
+    sentence(run("draft x.gpkg --quiet --verbose"), "--quiet and --verbose", "give one")
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("semsig lo", {"load", "localize"}),
+        ("semsig load --catalog open", {"opendata_paris", "openstreetmap"}),
+        ("semsig fetch overt", {"overture"}),
+        ("semsig localize --paper --exp", {"--explain"}),
+        ("semsig info ci", set()),  # files are for the shell
+    ],
+)
+def test_a_shell_completes_lines(
+    line: str, offered: set[str], run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("_SEMSIG_COMPLETE", "source_bash")
+    code, script, _ = run("")
+    assert code == 0
+    assert "complete -o default -F _semsig_completion semsig" in script
+    monkeypatch.setenv("_SEMSIG_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(line.split()) - 1))
+    code, out, _ = run("")
+    assert (code, set(out.split())) == (0, offered)
 
 
 def test_nothing_from_elsewhere_moves_the_cursor(capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,7 +159,7 @@ def test_progress_shows_on_a_terminal_when_work_takes_a_while(work_s: float, sho
     os.close(ours)
     assert done.stdout == "result\n"
     assert (b"digging" in seen) is shown
-    assert (b"3/7" in seen) is shown
+    assert (b"3 of 7" in seen) is shown
 
 
 # --- In another program -----------------------------------------------------------------------

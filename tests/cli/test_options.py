@@ -51,6 +51,19 @@ def test_every_number_has_a_range(command: str, option: Any, run: Run) -> None: 
         sentence(run(f"{command} {name}={value}"), *told)
 
 
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_every_line_of_the_help_fits_a_terminal(command: str, run: Run) -> None:
+    code, out, _ = run(f"{command} --help")
+    assert code == 0
+    assert [line for line in out.splitlines() if len(line) > 80] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_can_be_quiet_or_verbose(command: str) -> None:
+    options = {name for one in COMMANDS[command].params for name in one.opts}
+    assert options >= {"--quiet", "--verbose"}
+
+
 TAKEN: dict[str, Callable[[Any], object]] = {
     "build-step": GridSpec,
     "build-radius": SignatureSpec,
