@@ -22,6 +22,7 @@ __all__ = [
 
 CATALOGS = (
     "barcelona",
+    "hamburg",
     "mapillary",
     "melbourne",
     "montpellier",

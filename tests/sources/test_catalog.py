@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 NAMES = (
     "barcelona",
+    "hamburg",
     "mapillary",
     "melbourne",
     "montpellier",
