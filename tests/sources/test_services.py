@@ -283,7 +283,7 @@ def test_a_wfs_without_pages_sends_all_at_once(server: Server, fetched: Fetch) -
     service = WfsOfGml(server)
     service.limit = 5
     service.constraints = (("ImplementsResultPaging", "FALSE"), ("ImplementsSorting", "FALSE"))
-    layer = fetched(service, replace(LAMPS, id_field="gml_id")).read()
+    layer = fetched(service, replace(LAMPS, id_field="id")).read()
     assert ids(layer) == [f"lamps.{number}" for number in range(11, 16)]
 
 
@@ -298,7 +298,8 @@ def test_axes_that_a_wfs_exchanges_are_exchanged_back(server: Server, fetched: F
 def test_what_is_no_wfs_is_told(server: Server, fetched: Fetch) -> None:
     service = Wfs(server)
     for answer, words in [
-        (Answer(b"<WMS_Capabilities/>"), ["no Web Feature Service", "WMS_Capabilities"]),
+        (Answer(b"<WMS_Capabilities/>"), ["no Web Feature Service", "(it sent WMS_Capabilities)"]),
+        (Answer(b"<WFS_Capabilities version='1.1.0'/>"), ["(it sent WFS_Capabilities 1.1.0)"]),
         (Answer(b"<!DOCTYPE html><html></html>"), ["a web page", "XML"]),
         (Answer(b"<r version='2'><ServiceException>No.</ServiceException></r>"), ["error No to"]),
     ]:
@@ -315,6 +316,7 @@ def test_ogc_features_filters_where_it_says_so(server: Server, fetched: Fetch) -
     lamps = replace(LAMPS, server_where="KIND = 'lamp'")
     layer = fetched(service, lamps, area=NEAR).read()
     assert (ids(layer), layer.spec.license) == (["13"], "https://licence.example/by")
+    assert ids(fetched(service, replace(lamps, id_field="id")).read()) == ["11", "13", "15"]
 
 
 @pytest.mark.parametrize(

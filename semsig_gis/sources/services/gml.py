@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SRS_NAME = re.compile(r"\bsrsName=[\"']([^\"']+)[\"']")
 # By these names the axes are in the order of the authority; by others, x goes first.
 AUTHORITY_ORDER = re.compile(r"(?:urn:|https?://www\.opengis\.net/def/)", re.IGNORECASE)
-GML_ID = "gml_id"  # the field that the identifier of a feature becomes
+ID = "id"  # the field that the identifier of a feature becomes, if it has none of that name
 MEMBERS = frozenset({"member", "featureMember", "featureMembers"})
 BESIDE = frozenset({"boundedBy", "location"})  # of a feature, and none of its fields
 POINTS, LINES = frozenset({"Point"}), frozenset({"LineString", "LinearRing", "LineStringSegment"})
@@ -80,9 +80,6 @@ def read_feature(
 ) -> tuple[dict[str, Any], shapely.Geometry | BadFeatureError | None]:
     """Return the fields of a feature, and its geometry or what is wrong with it."""
     values: dict[str, Any] = {}
-    identifier = next((v for k, v in feature.attrib.items() if k.rpartition("}")[2] == "id"), None)
-    if identifier is not None:
-        values[GML_ID] = identifier
     geometry: shapely.Geometry | BadFeatureError | None = None
     for item in feature:
         name = local_name(item)
@@ -94,6 +91,9 @@ def read_feature(
                 geometry = _shape(inner, swap=swap)
         elif name not in BESIDE:
             values[name] = " ".join(" ".join(item.itertext()).split()) or None
+    identifier = next((v for k, v in feature.attrib.items() if k.rpartition("}")[2] == ID), None)
+    if identifier is not None:
+        values.setdefault(ID, identifier)
     return values, geometry
 
 

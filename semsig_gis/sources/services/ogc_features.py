@@ -7,6 +7,7 @@ from urllib.parse import quote, urljoin
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
+from semsig_gis.sources.services.gml import ID
 from semsig_gis.sources.services.layers import Download
 from semsig_gis.sources.services.pages import NOT_FOUND, Query, geojson_page
 
@@ -48,11 +49,12 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     items = _link(collection, "items", GEOJSON[0]) or f"{address}/items"
     items = urljoin(f"{address}/", items)
     fields = dict.fromkeys(_queryables(client, collection, address))
+    fields.update({ID: None} if fields else {})
 
     def read(content: bytes) -> Page:
         page = geojson_page(content, client)
         for row in page.rows:
-            fields.update(dict.fromkeys(row.get("properties") or {}))
+            fields.update(dict.fromkeys([*(row.get("properties") or {}), ID]))
         return page
 
     def then(page: Page, _: int) -> Query | None:

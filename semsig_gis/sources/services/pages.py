@@ -143,8 +143,22 @@ class Client:
         self, query: Query, parse: Callable[[bytes], T], *, accept: tuple[str, ...] = ()
     ) -> T:
         """Fetch a document and return what `parse` makes of it."""
-        file = self.file(query, lambda path: parse(path.read_bytes()), accept=accept)
-        return parse(file.path.read_bytes())
+        return self._parsed(query, parse, accept=accept)[1]
+
+    def _parsed(
+        self,
+        query: Query,
+        parse: Callable[[bytes], T],
+        *,
+        accept: tuple[str, ...],
+        suffix: str = ".json",
+    ) -> tuple[Fetched, T]:
+        """Fetch a file and return what `parse` makes of it, which is done once."""
+        came: list[T] = []
+        file = self.file(
+            query, lambda path: came.append(parse(path.read_bytes())), accept=accept, suffix=suffix
+        )
+        return file, came[-1] if came else parse(file.path.read_bytes())
 
     def json(self, query: Query, *, accept: tuple[str, ...] = ()) -> dict[str, Any]:
         """Fetch a JSON object; HttpError if the service sends an error instead."""
@@ -171,10 +185,7 @@ class Client:
         rows = 0
         following: Query | None = query
         while following is not None:
-            file = self.file(
-                following, lambda path: read(path.read_bytes()), accept=accept, suffix=suffix
-            )
-            page = read(file.path.read_bytes())
+            file, page = self._parsed(following, read, accept=accept, suffix=suffix)
             files.append(file)
             rows += len(page.rows)
             told = page.told if told is None else told

@@ -18,6 +18,7 @@ from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.http.errors import error_text
 from semsig_gis.sources.raw_layer import WGS84
 from semsig_gis.sources.services.gml import (
+    ID,
     features,
     local_name,
     parse_xml,
@@ -133,8 +134,12 @@ def _record(item: object) -> Record | str:
         return Record(item["attributes"], item.get("geometry"))
     if item.get("type") == "Feature":
         fields = item.get("properties") or {}
-        good = isinstance(fields, dict)
-        return Record(fields, item.get("geometry")) if good else "has properties without names"
+        if not isinstance(fields, dict):
+            return "has properties without names"
+        own = item.get(ID)
+        if own is not None and ID not in fields:
+            fields = {**fields, ID: own}
+        return Record(fields, item.get("geometry"))
     inner = item.get("record", item)
     if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
         return Record(inner["fields"], inner.get("geometry"))

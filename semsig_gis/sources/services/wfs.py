@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 from semsig_gis.core.errors import SourceError
 from semsig_gis.sources.http.fetch import host_of
-from semsig_gis.sources.services.gml import GML_ID, features, local_name
+from semsig_gis.sources.services.gml import ID, features, local_name
 from semsig_gis.sources.services.layers import Download, find_field
 from semsig_gis.sources.services.pages import Page, Query, geojson_page, xml_root
 
@@ -65,18 +65,18 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
         _query(client, "DescribeFeatureType").also(typeName=name),
         lambda content: _field_types(xml_root(content, client.endpoint)),
     )
-    fields = (*types, GML_ID) if types else ()
+    fields = tuple(dict.fromkeys([*types, ID])) if types else ()
     names = {text.partition(";")[0].strip().lower(): text for text in reversed(said.formats)}
     json_format = next((text for kind, text in names.items() if kind in JSON_FORMATS), None)
     query = _query(client, "GetFeature").also(typeNames=name, srsName=SHORT if json_format else URN)
     wanted = client.fields(fields)
     if wanted:
         places = (field for field, kind in types.items() if kind.startswith("gml:"))
-        listed = dict.fromkeys([*(field for field in wanted if field != GML_ID), *places])
+        listed = dict.fromkeys([*(field for field in wanted if field in types), *places])
         query = query.also(propertyName=",".join(listed))
     order: dict[str, str | float] = {"outputFormat": json_format} if json_format else {}
     key = client.layer.id_field and find_field(client.layer.id_field, client.layer, fields)
-    if key and key != GML_ID and not said.denies("ImplementsSorting"):
+    if key and key in types and not said.denies("ImplementsSorting"):
         order["sortBy"] = key
     files: tuple[Fetched, ...] = ()
     for box in area.boxes if area is not None else (None,):
@@ -90,10 +90,12 @@ def _query(client: Client, request: str) -> Query:
 
 def _capabilities(content: bytes, client: Client) -> _Capabilities:
     root = xml_root(content, client.endpoint)
-    if local_name(root) != "WFS_Capabilities":
+    version = root.get("version", "")
+    if local_name(root) != "WFS_Capabilities" or not version.startswith("2."):
         msg = (
             f"{host_of(client.endpoint)} is no Web Feature Service of version 2.0 (it sent "
-            f"{local_name(root)}); check the address {client.endpoint}."
+            f"{local_name(root)} {version}".rstrip()
+            + f"); check the address {client.endpoint}."
         )
         raise SourceError(msg)
     formats = [
