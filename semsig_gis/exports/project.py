@@ -168,6 +168,8 @@ def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
     place = file if file.isprintable() else one_line(file)  # what is not is no XML
     names = {layer.name for layer in layers}
     known = sorted(layers, key=lambda one: order.index(one.name) if one.name in order else -1)
+    covers = [told for name, told in _shown().items() if name in names and "covers" in told]
+    covered = {told["covers"]: told["farther"] for told in covers}
     relations = {of: name for name, (of, _) in RELATIONS.items() if name in names}
     return [
         ShownLayer(
@@ -184,7 +186,7 @@ def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
             group=told.get("group", "Layers"),
             expression=told.get("name", ""),
             label=told.get("label", ""),
-            nearer=told.get("nearer", 0),
+            nearer=told.get("nearer", covered.get(layer.name, 0)),
             farther=told.get("farther", 0),
             hidden=told.get("hidden", False),
             relation=relations.get(layer.name, ""),

@@ -106,8 +106,9 @@ def test_a_city_opens_as_a_project(opened: dict[str, Any]) -> None:
     assert {"Old Town & é", f"1:{said['scale']:,}"} < {*said["texts"]}
     assert any(CITY.licenses[0] in text for text in said["texts"])
     cells, objects, asked = (layers[n] for n in ("Signature cells", "Street objects", "Queries"))
-    assert (len(cells["seen"]), objects["seen"]) == (4, [5_000, 1_000])
+    assert (cells["seen"], objects["seen"]) == ([10_000, 5_000, 1_000], [5_000, 1_000])
     assert layers["Hexagons"]["seen"] == [50_000]
+    assert opened["hostile"]["layers"]["Signature cells"]["seen"] == [50_000, 10_000, 5_000, 1_000]
     assert cells["styles"] == ["Ambiguity", "Identifiability"]
     assert cells["aliases"]["gain_street_light"] == "Gain by: Street light"
     assert cells["form"]["What it is taken for"][:2] == ["lookalike_1", "lookalike_2"]
