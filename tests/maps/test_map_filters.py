@@ -178,11 +178,16 @@ def test_filters_are_in_the_address(strong: MapPage) -> None:
     strong.browser.get("about:blank")
     for log in ("browser", "performance"):
         strong.browser.get_log(log)
-    strong.visit(address)
+    strong.visit(f"{address}&told=query:1")
+    assert strong.told()["title"].startswith("Query 1")
     assert strong.ask(SELECTION) == selection
     assert strong.one(".semsig-filters select").get_attribute("value") == "D"
     strong.ask("map.semsigParts.get('queries').write('class:%23,seen:x~,error:3~4')")
     assert len(strong.ask(SELECTION)) == len(QUERIES)
+    assert strong.all("canvas.semsig-board")
+    for box in strong.all("[data-group=queries] input:checked"):
+        box.click()
+    assert not strong.all(".leaflet-marker-pane canvas.semsig-board")
 
 
 def test_chances_that_a_method_gave_and_two_evaluations(page: MapPage) -> None:

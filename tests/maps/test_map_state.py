@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_location
 
@@ -82,17 +83,25 @@ def test_what_a_link_colours_lies_on_the_cells(page: MapPage) -> None:
     follow(page, f"{address}#layers=~Chance-of-a-cell,Regions-of-50-90-and-99")
     assert page.ask(above) == [["", "1"], ["0.85", "1"]]
     assert page.ask(SEEN)[4].startswith("Regions")
+    # A sign is told of by its number, and its edge follows the colours while it is on the map.
+    page.switch("Candidates (10)")
+    page.one(".semsig-colours").click()
+    opened = "return semsig.openers.rank(map, arguments[0])"
+    assert [page.ask(opened, number) for number in ("99", "2")] == [False, True]
+    assert page.told()["title"].startswith("Rank 2")
+    page.search("rank 3 of", Keys.ENTER)
+    assert page.told()["title"].startswith("Rank 3")
 
 
-@pytest.mark.parametrize(
-    "fragment", ["place=north,3,x&layers=~~,No-such&told=nobody:1", "colours=x&&=&told=", "what"]
-)
-def test_a_link_that_tells_nothing_of_the_map_shows_it_as_it_is(
-    alike: MapPage, fragment: str
-) -> None:
-    seen = alike.ask(SEEN)
-    follow(alike, f"{alike.browser.current_url}#{fragment}")
-    assert alike.ask(SEEN) == seen
+def test_a_link_that_tells_nothing_of_the_map_shows_it_as_it_is(alike: MapPage) -> None:
+    seen, address = alike.ask(SEEN), alike.browser.current_url
+    for fragment in (
+        "place=north,3,x&layers=~~,No-such&told=nobody:1",
+        "colours=x&&=&told=",
+        "what",
+    ):
+        follow(alike, f"{address}#{fragment}")
+        assert alike.ask(SEEN) == seen
 
 
 def test_another_part_of_the_same_page_is_shown_by_its_address(alike: MapPage) -> None:
