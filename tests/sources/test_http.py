@@ -28,10 +28,11 @@ from semsig_gis.sources.http.fetch import (
     NotCachedError,
     TooLargeError,
     _failure,
-    _require_same_host,
+    _require_named_host,
     fetch,
     read_text,
 )
+from semsig_gis.sources.http.secret import Secret
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -300,7 +301,24 @@ def test_the_only_way_to_another_scheme_is_the_safer_one(
     source: str, target: str, *, allowed: bool
 ) -> None:
     with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
-        _require_same_host(source, target)
+        _require_named_host(source, target, HttpSpec())
+
+
+@pytest.mark.parametrize(
+    ("target", "secret", "allowed"),
+    [
+        ("https://b.example/y", None, True),
+        ("http://b.example/y", None, False),
+        ("https://b.example/y", Secret("word"), False),
+        ("https://c.example/y", None, False),
+    ],
+)
+def test_a_redirect_leads_to_a_named_host_and_never_with_a_secret(
+    target: str, secret: Secret | None, *, allowed: bool
+) -> None:
+    spec = HttpSpec(hosts=frozenset({"b.example"}), secret=secret)
+    with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
+        _require_named_host("https://a.example/x", target, spec)
 
 
 @pytest.mark.parametrize(

@@ -387,6 +387,23 @@ def test_ckan_sends_the_file_of_the_best_format(
     assert server.paths()[-1] == f"/files/{expected}"
 
 
+def test_a_file_may_lie_with_another_host_that_the_catalogue_names(
+    server: Server, fetched: Fetch
+) -> None:
+    service = Ckan(server)
+    service.resources = [{"format": "GeoJSON", "url": "/files/lamps.geojson"}]
+    there = {"Location": f"{server.other_host}/store/lamps.geojson"}
+    server.on("/files/lamps.geojson", Answer(status=302, headers=there))
+    server.on("/store/lamps.geojson", sent(FILE))
+    with refused(SourceError, "redirects to localhost", "the catalogue"):
+        fetched(service)
+    both = [service.endpoint, server.other_host]
+    assert ids(fetched(service, endpoints=both).read()) == ["11", "12", "13", "14", "15"]
+    service.resources = [{"format": "GeoJSON", "url": there["Location"]}]
+    direct = replace(LAMPS, name="others")
+    assert len(fetched(service, direct, endpoints=both).read().table) == 5
+
+
 PDF = {"format": "PDF", "url": "/files/map.pdf"}
 
 

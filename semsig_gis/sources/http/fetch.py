@@ -61,7 +61,8 @@ class HttpSpec:
     failure, `backoff_s`, doubles each time; a server that asks for more than `longest_wait_s` is
     not waited for. `max_bytes` holds as sent and as unpacked. `fresh_s` is how long a copy is used
     that the server cannot confirm. `tell` takes a line about what is waited for.
-    `secret` authorizes every request; it is not told, and not in the cache.
+    `hosts` are those to which a server may redirect, beside itself. `secret` authorizes every
+    request; it is not told, and not in the cache.
     """
 
     deadline_s: float = 600.0
@@ -76,6 +77,7 @@ class HttpSpec:
     offline: bool = False
     sleep: Callable[[float], None] = time.sleep
     tell: Callable[[str], None] = lambda _: None
+    hosts: frozenset[str] = frozenset()
     secret: Secret | None = None
 
     def __post_init__(self) -> None:
@@ -169,13 +171,14 @@ def answer_to(
                 yield response
                 return
             target = urljoin(response.url, response.headers.get("Location", ""))
-            _require_same_host(response.url, target)
+            _require_named_host(response.url, target, spec)
             url, params = target, None
     msg = f"{host_of(request.url)} redirects too often from {request.url}; check the address."
     raise HttpError(msg)
 
 
-def _require_same_host(source: str, target: str) -> None:
+def _require_named_host(source: str, target: str, spec: HttpSpec) -> None:
+    """Refuse a redirect to another host, but for those of the specification without a secret."""
     old, new = urlsplit(source), urlsplit(target)
     try:
         same = (old.scheme, old.hostname, old.port) == (new.scheme, new.hostname, new.port)
@@ -184,6 +187,8 @@ def _require_same_host(source: str, target: str) -> None:
         safer = safer and old.port in {None, 80} and new.port in {None, 443}
     except ValueError:  # a port that is no number
         same = safer = False
+    named = new.hostname in spec.hosts and new.scheme in {old.scheme, "https"}
+    safer = safer or (named and spec.secret is None)
     if not (same or safer):
         msg = (
             f"{old.netloc} redirects to {new.netloc or target}, which neither you nor the "

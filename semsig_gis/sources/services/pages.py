@@ -119,18 +119,22 @@ class Client:
         progress: Progress | None = None,
     ) -> Fetched:
         """Fetch a file; SourceError if it lies with a host that the catalogue does not name."""
-        host = urlsplit(query.url).hostname
-        if host not in {urlsplit(endpoint).hostname for endpoint in self.endpoints}:
+        hosts = frozenset(urlsplit(endpoint).hostname or "" for endpoint in self.endpoints)
+        if urlsplit(query.url).hostname not in hosts:
             msg = (
                 f"{host_of(self.endpoint)} sends on to {query.url.partition('?')[0]}, whose host "
                 "the catalogue does not name; if you trust it, add its address to `endpoints`."
             )
             raise SourceError(msg)
+        at_home = urlsplit(query.url)[:2] == urlsplit(self.endpoint)[:2]
+        spec = dataclasses.replace(
+            self.spec, hosts=hosts, secret=self.spec.secret if at_home else None
+        )
         file = fetch(
             query.url,
             params=query.params,
             cache=self.cache,
-            spec=self.spec,
+            spec=spec,
             accept=accept,
             suffix=suffix,
             check=check,

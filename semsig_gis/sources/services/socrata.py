@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 PAGE_ROWS = 10_000
 LOCATION = "location"  # coordinates and an address, of which there is no GeoJSON
+TEXT = "text"
 POINTS = frozenset({"location", "multipoint", "point"})
 SHAPES = frozenset({"line", "multiline", "multipolygon", "polygon"})
 
@@ -128,7 +129,7 @@ def _inside(client: Client, types: Mapping[str, str], place: str | None, box: Bo
         return [f"intersects({place}, 'POLYGON (({ring}))')"]
     names = _coordinates(client, list(types))
     return [
-        f"{name}::number between {least} and {most}"
+        f"{name}{'::number' * (types[name] == TEXT)} between {least} and {most}"
         for name, least, most in zip(names, (west, south), (east, north), strict=True)
         if name is not None
     ]
