@@ -86,12 +86,14 @@ def export(
         from semsig_gis.evaluation.file import open_evaluation
 
         queries = open_evaluation(evaluation)
+    # Hexagons count the objects that the database was built from, where they lie beside it.
+    seen = city.objects if h3 is not None and objects is None else None
     with progress(f"writing {out.name}") as advance:
         export_database(
             city.database,
             out,
             layers=layer or (),
-            objects=None if objects is None else open_objects(objects),
+            objects=seen if objects is None else open_objects(objects),
             evaluation=queries,
             identifiability=known_identifiability(city),
             geometry=geometry,

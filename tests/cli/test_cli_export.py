@@ -17,6 +17,7 @@ from sentences import sentence
 from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
+from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.evaluation.file import save_evaluation
 from semsig_gis.evaluation.identify.result import save_identifiability
@@ -122,6 +123,9 @@ def test_formats_for_other_programs(run: Run, done: Done) -> None:
     table = gpd.read_file("hexagons.geojson")
     assert table["cells"].sum() == len(small_city()[0])
     assert {"chance_found", "objects", "queries", "found"} <= set(table.columns)
+    save_with_store(small_city()[0], ObjectStore.of(small_city()[1]), "stored.parquet")
+    done("export stored.parquet --h3 10 --out stored.fgb")
+    assert gpd.read_file("stored.fgb")["objects"].sum() == len(small_city()[1])
     done("export city.parquet --out cells.pmtiles")
     assert Path("cells.pmtiles").read_bytes()[:8] == b"PMTiles\x03"
     done("export city.parquet --objects objects.parquet --out city.json")
