@@ -9,20 +9,34 @@ import argparse
 import configparser
 import io
 import re
+import struct
 import subprocess
 import sys
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+from xml.etree import ElementTree as ET
 
 import tomllib
 
-__all__ = ["build_wheel", "faults", "files", "metadata", "write_zip"]
+__all__ = [
+    "build_wheel",
+    "compiled",
+    "faults",
+    "files",
+    "metadata",
+    "read_words",
+    "write_zip",
+]
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-KINDS = {".html", ".py", ".qm", ".qml", ".svg", ".txt"}
+KINDS = {".py", ".qml", ".svg", ".txt"}
 # The first moment that a zip file can tell, so that the same files make the same bytes.
 MOMENT = (1980, 1, 1, 0, 0, 0)
 # What the official repository of plugins asks of metadata.txt, and how large a zip file it takes.
@@ -31,6 +45,8 @@ REQUIRED = (
     *("tracker", "repository", "homepage"),
 )
 MOST_BYTES = 25_000_000
+# How files of compiled translations begin.
+QM = bytes.fromhex("3cb86418caef9c95cd211cbf60a1bddd")
 # What metadata.txt calls the addresses of the project, by their names in pyproject.toml.
 ADDRESSES = {"Homepage": "homepage", "Issues": "tracker", "Repository": "repository"}
 
@@ -42,9 +58,74 @@ def files() -> dict[str, bytes]:
     found = {name: path for name, path in found.items() if path.suffix in KINDS}
     found["semsig/LICENSE"] = ROOT / "LICENSE"
     found["semsig/constraints.txt"] = ROOT / "constraints.txt"
+    found["semsig/help.md"] = ROOT / "docs" / "qgis.md"
     told = {name: path.read_bytes() for name, path in found.items()}
+    for path in (HERE / "i18n").glob("*.ts"):
+        told[f"semsig/i18n/{path.stem}.qm"] = compiled(read_words(path))
     told["semsig/metadata.txt"] = metadata().encode()
     return dict(sorted(told.items()))
+
+
+def read_words(path: Path) -> dict[str, str]:
+    """Return the translations that a file of Qt Linguist has, by their sources.
+
+    Parameters
+    ----------
+    path : Path
+        The file, which ends in ``.ts``.
+
+    Returns
+    -------
+    dict
+        Those that are finished.
+    """
+    messages = ET.parse(path).iterfind("context/message")  # noqa: S314 - our own file
+    told = {
+        str(one.findtext("source")): str(one.findtext("translation") or "")
+        for one in messages
+        if one.find("translation[@type]") is None
+    }
+    return {source: text for source, text in told.items() if text}
+
+
+def compiled(words: Mapping[str, str], context: str = "Semsig") -> bytes:
+    """Return translations as Qt reads them, as `lrelease` does, the same on every machine.
+
+    Parameters
+    ----------
+    words : mapping of str to str
+        The translations by their sources.
+    context : str, default "Semsig"
+        Whose they are.
+
+    Returns
+    -------
+    bytes
+        The contents of a file that ends in ``.qm``.
+    """
+    messages, places = b"", []
+    for source, text in words.items():
+        places.append((_elf(source.encode()), len(messages)))
+        for tag, value in (
+            (3, text.encode("utf-16-be")),
+            (6, source.encode()),
+            (7, context.encode()),
+        ):
+            messages += struct.pack(">BI", tag, len(value)) + value
+        messages += b"\x01"  # the end of a message
+    hashes = b"".join(struct.pack(">II", *place) for place in sorted(places))
+    sections = ((0x42, hashes), (0x69, messages))
+    return QM + b"".join(struct.pack(">BI", tag, len(part)) + part for tag, part in sections)
+
+
+def _elf(text: bytes) -> int:
+    """Return the hash by which Qt looks a text up: that of ELF files, never 0."""
+    value = 0
+    for byte in text:
+        value = (value << 4) + byte
+        high = value & 0xF0000000
+        value = (value ^ (high >> 24)) & ~high
+    return value or 1
 
 
 def metadata() -> str:

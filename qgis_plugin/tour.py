@@ -33,7 +33,6 @@ __all__ = ["overpass", "play", "town"]
 HERE = Path(__file__).parent
 SESSION = HERE / "tour_session.py"
 SCREEN = "1440x900x24"
-MINUTES = 20
 # The south-west corner of the town that the server knows, and a degree's length there.
 SOUTH, WEST = 43.6, 3.87
 METRES_NORTH, METRES_EAST = 111_100.0, 80_600.0
@@ -122,19 +121,23 @@ def screen() -> Iterator[str]:
             server.terminate()
 
 
-def play(out: Path, wheels: Path, *, language: str = "en", program: str = "qgis") -> int:
+def play(
+    out: Path, wheels: Path | None, *, command: str = "", language: str = "en", minutes: float = 20
+) -> int:
     """Play the tour.
 
     Parameters
     ----------
     out : Path
         Where the pictures go.
-    wheels : Path
+    wheels : Path or None
         Folder of the wheels of the engine.
+    command : str, optional
+        A `semsig` to take instead of an engine.
     language : str, default "en"
         Language of QGIS.
-    program : str, default "qgis"
-        QGIS.
+    minutes : float, default 20
+        How long it may take.
 
     Returns
     -------
@@ -148,11 +151,12 @@ def play(out: Path, wheels: Path, *, language: str = "en", program: str = "qgis"
         overpass(town()) as server,
     ):
         place = Path(home)
-        wheel = package.build_wheel(place)
+        wheel = None if command else package.build_wheel(place)
         plugin = package.write_zip(place, wheel)
         story = {
             "plugin": str(plugin),
-            "wheels": str(wheels.absolute()),
+            "command": command,
+            "wheels": "" if wheels is None else str(wheels.absolute()),
             "overpass": server,
             "extent": [WEST, SOUTH, WEST + 640 / METRES_EAST, SOUTH + 640 / METRES_NORTH],
             "out": str(out.absolute()),
@@ -167,7 +171,7 @@ def play(out: Path, wheels: Path, *, language: str = "en", program: str = "qgis"
             "SEMSIG_TOUR": json.dumps(story),
             "XDG_RUNTIME_DIR": home,
         }
-        line = [program, "--nologo", "--noversioncheck", "--lang", language]
+        line = ["qgis", "--nologo", "--noversioncheck", "--lang", language]
         line += ["--profiles-path", str(place / "profile"), "--code", str(SESSION)]
         with (out / "qgis.log").open("wb") as log:
             done = subprocess.run(  # noqa: S603
@@ -177,7 +181,7 @@ def play(out: Path, wheels: Path, *, language: str = "en", program: str = "qgis"
                 check=False,
                 stdout=log,
                 stderr=log,
-                timeout=MINUTES * 60,
+                timeout=minutes * 60,
             )
     failed = out / "failed.txt"
     if failed.exists():
@@ -187,11 +191,14 @@ def play(out: Path, wheels: Path, *, language: str = "en", program: str = "qgis"
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--wheels", type=Path, required=True, help="folder of the wheels")
+    parser.add_argument("--wheels", type=Path, help="folder of the wheels")
+    parser.add_argument("--command", default="", help="a semsig to take instead of an engine")
     parser.add_argument("--out", type=Path, default=Path("pictures"), help="where to put pictures")
     parser.add_argument("--lang", default="en", help="language of QGIS: en, de or fr")
     given = parser.parse_args()
     for name in ("Xvfb", "qgis"):
         if shutil.which(name) is None:
             sys.exit(f"The tour needs {name}, which is not on this computer; install it.")
-    sys.exit(play(given.out, given.wheels, language=given.lang))
+    if not (given.wheels or given.command):
+        sys.exit("Give --wheels, or --command to take a semsig that is there.")
+    sys.exit(play(given.out, given.wheels, command=given.command, language=given.lang))

@@ -9,11 +9,22 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from processing.core.ProcessingConfig import ProcessingConfig
+from processing.gui.Postprocessing import handleAlgorithmResults
 from qgis.core import (
+    QgsApplication,
+    QgsCoordinateReferenceSystem,
+    QgsCoordinateTransform,
+    QgsProcessingAlgRunnerTask,
+    QgsProcessingContext,
+    QgsProcessingFeedback,
+    QgsProcessingOutputLayerDefinition,
     QgsProject,
+    QgsRectangle,
 )
-from qgis.PyQt.QtCore import QCoreApplication, QTimer
-from qgis.PyQt.QtWidgets import QApplication
+from qgis.PyQt.QtCore import QCoreApplication, QPoint, Qt, QTimer
+from qgis.PyQt.QtTest import QTest
+from qgis.PyQt.QtWidgets import QApplication, QDockWidget
 from qgis.utils import iface, plugins
 
 if TYPE_CHECKING:
@@ -68,17 +79,129 @@ def install_engine() -> None:
     dialog.hide()
 
 
+def run(name: str, **parameters: object) -> dict[str, object]:
+    """Run a tool as its dialog does, in the background, and load what it gives."""
+    context = QgsProcessingContext()
+    context.setProject(QgsProject.instance())
+    feedback = QgsProcessingFeedback()
+    algorithm = QgsApplication.processingRegistry().createAlgorithmById(f"semsig:{name}")
+    ended: list[tuple[bool, dict[str, object]]] = []
+    task = QgsProcessingAlgRunnerTask(algorithm, parameters, context, feedback)
+    task.executed.connect(lambda well, results: ended.append((well, results)))
+    QgsApplication.taskManager().addTask(task)
+    wait(lambda: ended)
+    well, results = ended[0]
+    if not well:
+        raise RuntimeError(feedback.textLog())
+    handleAlgorithmResults(algorithm, context, feedback)
+    rest()
+    return results
+
+
+def shown(place: str) -> QgsProcessingOutputLayerDefinition:
+    """Return an output that is loaded."""
+    return QgsProcessingOutputLayerDefinition(place, QgsProject.instance())
+
+
+def fetch_and_build() -> str:
+    """Download OpenStreetMap for the canvas, and build a database of it."""
+    from processing.gui.AlgorithmDialog import AlgorithmDialog
+
+    ProcessingConfig.setSettingValue("SEMSIG_OVERPASS", STORY["overpass"])
+    canvas = iface.mapCanvas()
+    QgsProject.instance().setCrs(QgsCoordinateReferenceSystem("EPSG:3857"))
+    degrees = QgsCoordinateReferenceSystem("EPSG:4326")
+    there = QgsCoordinateTransform(
+        degrees, canvas.mapSettings().destinationCrs(), QgsProject.instance()
+    )
+    canvas.setExtent(there.transformBoundingBox(QgsRectangle(*STORY["extent"])))
+    algorithm = QgsApplication.processingRegistry().createAlgorithmById("semsig:fetchcanvas")
+    dialog = AlgorithmDialog(algorithm, parent=iface.mainWindow())
+    dialog.show()
+    picture("4_fetch_dialog")
+    parameters = dialog.createProcessingParameters()
+    dialog.close()
+    objects, city = str(WORK / "objects.parquet"), str(WORK / "city.parquet")
+    run("fetchcanvas", EXTENT=parameters["EXTENT"], OUTPUT=objects)
+    run("build", OBJECTS=objects, OUTPUT=city, CELLS=shown(str(WORK / "cells.gpkg")))
+    picture("5_cells")
+    return city
+
+
+def ask(city: str) -> None:
+    """Click a cell, compose what is seen from elsewhere, and find its place."""
+    plugin = plugins["semsig"]
+    plugin.show_dock()
+    dock, canvas = plugin.dock, iface.mapCanvas()
+    dock.database.setFilePath(city)
+    dock.open.click()
+    wait(dock.find.isEnabled)
+    dock.click.click()
+    press(0.42, 0.55)
+    wait(lambda: dock.table.rowCount() > 0 and dock.bands)
+    picture("6_cell_and_lookalikes")
+    dock.start_anew()
+    dock.stand.click()
+    press(0.56, 0.47)
+    wait(lambda: dock.wheel.marks)
+    picture("7_view_composed")
+    marks = list(dock.wheel.marks)
+    dock.wheel.pressed.emit(33.0)  # a click adds what is chosen in the palette
+    if len(dock.wheel.marks) != len(marks) + 1:
+        raise RuntimeError(dock.wheel.marks)
+    dock.wheel.taken.emit(len(marks))  # and another takes it away
+    dock.find.click()
+    wait(lambda: dock.table.rowCount() > 0)
+    picture("8_places")
+    dock.table.selectRow(0)
+    picture("9_rank_1")
+    canvas.unsetMapTool(canvas.mapTool())
+
+
+def press(across: float, down: float) -> None:
+    """Click the canvas at shares of its width and height."""
+    canvas = iface.mapCanvas()
+    spot = QPoint(int(canvas.width() * across), int(canvas.height() * down))
+    QTest.mouseClick(
+        canvas.viewport(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, spot
+    )
+
+
+def localize(city: str) -> None:
+    """Ask with the tool, whose layers get a group."""
+    run(
+        "localize",
+        DATABASE=city,
+        TYPES="DDBDL",
+        CANDIDATES=shown("TEMPORARY_OUTPUT"),
+        PLACE=shown("TEMPORARY_OUTPUT"),
+        REGIONS=shown(str(WORK / "regions.gpkg")),
+    )
+    picture("10_localize")
+    groups = [one.name() for one in QgsProject.instance().layerTreeRoot().findGroups()]
+    (OUT / "groups.txt").write_text("\n".join(groups), "utf-8")
+
+
 def play() -> None:
     """Play all scenes, and end QGIS."""
     try:
-        iface.mainWindow().showMaximized()
+        iface.mainWindow().resize(1440, 900)
+        iface.mainWindow().move(0, 0)
+        for dock in iface.mainWindow().findChildren(QDockWidget):
+            dock.setVisible(dock.objectName() == "Layers")
         install_plugin()
-        install_engine()
+        if STORY["command"]:
+            ProcessingConfig.setSettingValue("SEMSIG_COMMAND", STORY["command"])
+        else:
+            install_engine()
+        city = fetch_and_build()
+        ask(city)
+        localize(city)
         (OUT / "done.txt").write_text("all scenes were played", "utf-8")
     except BaseException:
         (OUT / "failed.txt").write_text(traceback.format_exc(), "utf-8")
         picture("failed")
-    QgsProject.instance().setDirty(False)
+    QgsProject.instance().clear()  # or QGIS asks whether to save it
     iface.actionExit().trigger()
 
 

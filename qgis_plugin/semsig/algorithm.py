@@ -25,18 +25,22 @@ from qgis.core import (
     QgsProcessingParameterVectorLayer,
     QgsVectorLayer,
 )
-from qgis.PyQt.QtGui import QIcon
+from qgis.PyQt.QtGui import QIcon, QPainter
 
 from . import settings
 from .answers import log_text
 from .arguments import check_output
 from .command import Cancelled, CommandError, Watcher, run_command
+from .results import gather
+from .words import tr
 
 if TYPE_CHECKING:
-    from qgis.core import QgsProcessingFeedback
+    from qgis.core import QgsProcessingFeedback, QgsProject
 
 __all__ = [
+    "REGIONS",
     "SemsigAlgorithm",
+    "add_layers",
     "advanced",
     "area",
     "choice",
@@ -46,6 +50,7 @@ __all__ = [
     "file_to_write",
     "keep_style",
     "layers_to_write",
+    "load_style",
     "map_to_write",
     "number",
     "show_layers",
@@ -55,6 +60,8 @@ __all__ = [
 
 HERE = Path(__file__).parent
 PARQUET = "GeoParquet (*.parquet)"
+REGIONS = "Regions to search"
+"""What the layer of regions is called."""
 # How QGIS names what is no file, such as memory: or postgres: (a disk of Windows has one letter).
 NO_FILE = re.compile(r"\w\w+:")
 
@@ -79,7 +86,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
 
     def displayName(self) -> str:  # noqa: N802
         """Return the name in the toolbox."""
-        return self.TITLE
+        return tr(self.TITLE)
 
     def tags(self) -> list[str]:
         """Return further words by which it is found."""
@@ -96,7 +103,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     def shortHelpString(self) -> str:  # noqa: N802
         """Return what it does, and what each parameter means."""
         parts = [
-            *(" ".join(part.split()) for part in self.HELP.split("\n\n")),  # breaks would show
+            *(tr(" ".join(part.split())) for part in self.HELP.split("\n\n")),  # breaks would show
             *(
                 f"<b>{one.description()}</b><br>{html.escape(one.help())}"
                 for one in self.parameterDefinitions()
@@ -215,7 +222,9 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         )
 
 
-def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]) -> str:
+def show_layers(
+    context: QgsProcessingContext, path: str, titles: dict[str, str], *, group: str
+) -> str:
     """Let layers of a GeoPackage be shown, where the user wishes to see the file.
 
     Parameters
@@ -226,22 +235,52 @@ def show_layers(context: QgsProcessingContext, path: str, titles: dict[str, str]
         The file.
     titles : dict of str to str
         What its layers are called.
+    group : str
+        The group of layers that they are put into.
 
     Returns
     -------
     str
         The first of the layers, as QGIS names it.
     """
-    sources = {_source(path, layer): title for layer, title in titles.items()}
     listed = context.layersToLoadOnCompletion()
     wished = listed.pop(path, None)
     if wished is not None:
-        for source, title in sources.items():
-            details = QgsProcessingContext.LayerDetails(title, wished.project, wished.outputName)
-            details.setPostProcessor(_styler())
-            listed[source] = details
         context.setLayersToLoadOnCompletion(listed)
-    return next(iter(sources))
+        add_layers(context, path, titles, group=group, project=wished.project)
+    return _source(path, next(iter(titles)))
+
+
+def add_layers(
+    context: QgsProcessingContext,
+    path: str,
+    titles: dict[str, str],
+    *,
+    group: str,
+    project: QgsProject | None = None,
+) -> None:
+    """Let layers of a GeoPackage be shown.
+
+    Parameters
+    ----------
+    context : QgsProcessingContext
+        Where they are listed.
+    path : str
+        The file.
+    titles : dict of str to str
+        What its layers are called, the lowest first.
+    group : str
+        The group of layers that they are put into.
+    project : QgsProject, optional
+        Where they are shown; in that of the context by default.
+    """
+    project = project or context.project()
+    if project is None:  # nobody looks
+        return
+    for layer, title in titles.items():
+        details = QgsProcessingContext.LayerDetails(tr(title), project, title)
+        details.setPostProcessor(_styler(group=group))
+        context.addLayerToLoadOnCompletion(_source(path, layer), details)
 
 
 def _source(path: str, layer: str) -> str:
@@ -255,9 +294,9 @@ def _source(path: str, layer: str) -> str:
 class _Styler(QgsProcessingLayerPostProcessorInterface):
     """Gives a layer its style once it is loaded: one of ours, or that of its GeoPackage."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, group: str) -> None:
         super().__init__()
-        self.name = name
+        self.name, self.group = name, group
 
     def postProcessLayer(  # noqa: N802
         self,
@@ -269,15 +308,18 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         # It may be in the project already, with the file open that was there before.
         layer.dataProvider().reloadData()
         if self.name:
-            _load_style(layer, self.name)
+            load_style(layer, self.name)
         else:
             layer.loadDefaultStyle()
+        if layer.name() == tr(REGIONS):  # what is below shines through
+            layer.setBlendMode(QPainter.CompositionMode.CompositionMode_Multiply)
         layer.triggerRepaint()
+        gather(layer.id(), self.group)
 
 
-def _styler(name: str = "") -> _Styler:
+def _styler(name: str = "", *, group: str) -> _Styler:
     """Return a styler for one layer; QGIS deletes it after use, but does not keep it until then."""
-    made = _Styler(name)
+    made = _Styler(name, tr(group).lstrip("0123456789. "))
     _STYLERS.append(made)
     return made
 
@@ -286,7 +328,7 @@ def _styler(name: str = "") -> _Styler:
 _STYLERS: deque[_Styler] = deque(maxlen=1000)
 
 
-def style_layer(context: QgsProcessingContext, source: str, style: str) -> None:
+def style_layer(context: QgsProcessingContext, source: str, style: str, *, group: str) -> None:
     """Let a layer have a style of ours, where the user wishes to see it.
 
     Parameters
@@ -297,9 +339,11 @@ def style_layer(context: QgsProcessingContext, source: str, style: str) -> None:
         The layer.
     style : str
         Name of the style's file, without its ending.
+    group : str
+        The group of layers that it is put into.
     """
     if context.willLoadLayerOnCompletion(source):
-        context.layerToLoadOnCompletionDetails(source).setPostProcessor(_styler(style))
+        context.layerToLoadOnCompletionDetails(source).setPostProcessor(_styler(style, group=group))
 
 
 def keep_style(source: str, style: str) -> None:
@@ -314,11 +358,20 @@ def keep_style(source: str, style: str) -> None:
     """
     layer = QgsVectorLayer(source, style, "ogr")
     if layer.storageType() == "GPKG":  # a temporary layer is in no file
-        _load_style(layer, style)
+        load_style(layer, style)
         layer.saveStyleToDatabase(style, "", True, "")  # noqa: FBT003 - as QGIS calls it
 
 
-def _load_style(layer: QgsVectorLayer, style: str) -> None:
+def load_style(layer: QgsVectorLayer, style: str) -> None:
+    """Give a layer a style of ours.
+
+    Parameters
+    ----------
+    layer : QgsVectorLayer
+        The layer.
+    style : str
+        Name of the style's file, without its ending.
+    """
     layer.loadNamedStyle(str(HERE / "styles" / f"{style}.qml"))
 
 
@@ -326,7 +379,8 @@ def described(
     parameter: QgsProcessingParameterDefinition, text: str
 ) -> QgsProcessingParameterDefinition:
     """Return a parameter with its help."""
-    parameter.setHelp(text)
+    parameter.setHelp(tr(text))
+    parameter.setDescription(tr(parameter.description()))
     return parameter
 
 

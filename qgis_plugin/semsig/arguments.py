@@ -15,6 +15,7 @@ __all__ = [
     "METHODS",
     "METHOD_HELP",
     "NOISES",
+    "SERVICES",
     "check_output",
     "command_line",
     "require_likelihood",
@@ -33,6 +34,9 @@ CATALOGS = (
     "vienna",
     "washington",
 )
+FILES_ONLY = ("montpellier",)
+SERVICES = tuple(name for name in CATALOGS if name not in FILES_ONLY)
+"""Catalogues that are downloaded from."""
 LIKELIHOOD = "likelihood"
 METHODS = (
     LIKELIHOOD,

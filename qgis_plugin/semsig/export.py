@@ -110,4 +110,4 @@ def export_layers(
     algorithm.tell(
         command_line("export", database, out=path, layer=list(titles), **options), feedback, path
     )
-    return {name: show_layers(context, path, titles)}
+    return {name: show_layers(context, path, titles, group=algorithm.TITLE)}

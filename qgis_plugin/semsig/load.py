@@ -38,7 +38,7 @@ Reads files of open data (trees, street lights, benches, bus stops...) into one 
 objects, which “Build signature database” takes.
 
 A catalogue says which file holds what: the open data of Montpellier and of Paris, and
-OpenStreetMap, are built in; for other data, write one (semsig draft drafts it).
+OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).
 
 The log tells what became of every row: how many are objects, how many were left out, and why.
 """

@@ -20,6 +20,7 @@ from qgis.core import (
 )
 
 from .algorithm import (
+    REGIONS,
     SemsigAlgorithm,
     advanced,
     area,
@@ -195,8 +196,8 @@ they rank cells by a distance, and cells that look the same share a rank.
         crs.createFromUserInput(answer["crs"])
         found: dict[str, Any] = {"MAP": page} if page else {}
         if regions:
-            titles = {"regions": "Regions to search"}
-            found["REGIONS"] = show_layers(context, regions, titles)
+            titles = {"regions": REGIONS}
+            found["REGIONS"] = show_layers(context, regions, titles, group=self.TITLE)
         place = place_row(answer)
         if place is not None:
             outline, values = place
@@ -241,7 +242,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 raise QgsProcessingException(self.writeFeatureError(sink, parameters, name))
         del sink  # closes the file
         keep_style(source, name.lower())
-        style_layer(context, source, name.lower())
+        style_layer(context, source, name.lower(), group=self.TITLE)
         return {name: source}
 
 

@@ -9,6 +9,8 @@ from . import settings
 from .build import Build
 from .evaluate import Evaluate
 from .export import Export
+from .extras import Ambiguity, Demo, Draft, Update
+from .fetch import FetchCanvas, FetchCity
 from .identify import Identify
 from .load import Load
 from .localize import Localize
@@ -51,7 +53,10 @@ class SemsigProvider(QgsProcessingProvider):
 
     def loadAlgorithms(self) -> None:  # noqa: N802
         """Add the algorithms, in the order in which they are used."""
-        for algorithm in (Load, Build, Localize, Evaluate, Identify, Export):
+        for algorithm in (
+            *(Load, Build, Localize, Evaluate, Identify, Export),
+            *(FetchCanvas, FetchCity, Update, Draft, Ambiguity, Demo),
+        ):
             self.addAlgorithm(algorithm())
 
     def defaultVectorFileExtension(self, _hasGeometry: bool = True) -> str:  # noqa: N802, N803, FBT001, FBT002

@@ -2,9 +2,31 @@
 
 from __future__ import annotations
 
-from qgis.PyQt.QtCore import QCoreApplication
+from pathlib import Path
 
-__all__ = ["tr"]
+from qgis.core import QgsApplication
+from qgis.PyQt.QtCore import QCoreApplication, QTranslator
+
+__all__ = ["speak", "tr"]
+
+HERE = Path(__file__).parent
+
+
+def speak() -> QTranslator | None:
+    """Let `tr` speak the language of QGIS from now on, if it has it.
+
+    Returns
+    -------
+    QTranslator or None
+        What translates, to be kept, and removed in the end; None where there is nothing to do.
+    """
+    language = str(QgsApplication.locale()).split("_")[0].split("-")[0]
+    file = HERE / "i18n" / f"semsig_{language}.qm"
+    translator = QTranslator()
+    if not file.is_file() or not translator.load(str(file)):
+        return None
+    QCoreApplication.installTranslator(translator)
+    return translator
 
 
 def tr(text: str) -> str:

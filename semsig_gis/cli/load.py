@@ -198,6 +198,9 @@ def fetch(
             min=1.0, max=86_400.0, help="Give up a file after so many seconds, all attempts in all."
         ),
     ] = 600.0,
+    server: Annotated[
+        str | None, typer.Option(help="Address to ask instead of the catalogue's servers.")
+    ] = None,
     metric_crs: MetricCrs = None,
     max_distortion: MaxDistortion = 6.0,
     filters: Filters = True,
@@ -215,6 +218,11 @@ def fetch(
     keep_inputs(out, buildings, streets, read=(name, area))
     require_suffix(".parquet", out, buildings, streets)
     catalog = load_catalog(name)
+    if server is not None:
+        if not server.startswith(("http://", "https://")):
+            msg = f"--server is {server!r}; give an address that begins with https://."
+            raise InputError(msg)
+        catalog = replace(catalog, endpoints=(server,))
     specs = choose_layers(
         catalog,
         layer or (),

@@ -286,6 +286,13 @@ def test_fetch_from_a_portal_and_again_without_it(city: Path, run: Run) -> None:
         assert code == 0, err
         assert json.loads(out)["objects"] == 1
         assert "benches: 1 rows, 0.00 MB, from the portal, fetched 20" in err
+        portal = (city / "portal.toml").read_text(encoding="utf-8")
+        elsewhere = portal.replace(server.url, "http://nowhere.example")
+        (city / "elsewhere.toml").write_text(elsewhere, encoding="utf-8")
+        fetch_there = fetch.replace("portal.toml", "elsewhere.toml")
+        code, out, err = run(fetch_there, "2,48,3,49", "--server", server.url)
+        assert (code, json.loads(out)["objects"]) == (0, 1), err
+        sentence(run(fetch, "2,48,3,49", "--server", "portal"), "'portal'", "https://")
         sentence(run(fetch, "Paris"), "'Paris'", "polygon file")
         sentence(run(fetch, "2,48,3"), "2,48,3")
     code, out, err = run(fetch, "2,48,3,49", "--offline")

@@ -20,6 +20,7 @@ from qgis.core import (
     QgsProject,
     QgsRenderContext,
 )
+from qgis.PyQt.QtCore import QCoreApplication, QTranslator
 
 PLACE = Path(sys.argv[1])
 DATABASE = str(PLACE / "session.parquet")
@@ -143,6 +144,41 @@ def show() -> dict[str, Any]:
     }
 
 
+def groups() -> dict[str, list[str]]:
+    """Return the layers of each group, from above."""
+    for _ in range(10):
+        application.processEvents()
+    root = QgsProject.instance().layerTreeRoot()
+    return {group.name(): [one.name() for one in group.findLayers()] for group in root.findGroups()}
+
+
+def others() -> dict[str, Any]:
+    """Run the tools that are not of the six, but for those that download."""
+    tiff, toml = str(PLACE / "ambiguity.tif"), str(PLACE / "draft.toml")
+    updated, objects = str(PLACE / "updated.parquet"), str(PLACE / "objects.parquet")
+    run_well("ambiguity", OUTPUT=tiff, MAP=str(PLACE / "ambiguity.html"))
+    run("update", DATABASE=str(PLACE / "city.parquet"), OBJECTS=objects, OUTPUT=updated)
+    run_well("draft", FILE=str(PLACE / "lamps.geojson"), OUTPUT=toml)
+    run_well("demo", OUTPUT=str(PLACE / "demo"), QUERIES=5)
+    nowhere = run("fetch", OUTPUT=str(PLACE / "nowhere.parquet")).errors
+    there = {path.name for path in PLACE.iterdir()}
+    written = {"ambiguity.tif", "ambiguity.html", "updated.parquet", "draft.toml", "demo"}
+    return {"missing": sorted(written - there), "nowhere": nowhere, "groups": groups()}
+
+
+def speak() -> dict[str, list[str]]:
+    """Return all that is translated, in each language."""
+    told = {}
+    sources = json.loads((PLACE / "sources.json").read_text("utf-8"))
+    for language in ("de", "fr"):
+        translator = QTranslator()
+        translator.load(str(Path(semsig.__file__).with_name("i18n") / f"semsig_{language}.qm"))
+        QCoreApplication.installTranslator(translator)
+        told[language] = [QCoreApplication.translate("Semsig", source) for source in sources]
+        QCoreApplication.removeTranslator(translator)
+    return told
+
+
 def refuse() -> list[list[str]]:
     """Return the errors of what cannot be."""
     objects, later = str(PLACE / "objects.parquet"), str(PLACE / "later.parquet")
@@ -191,12 +227,16 @@ def play() -> dict[str, Any]:
         "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUTPUT=loaded).ended[0],
         **show_twice(),
         "shown": show(),
+        "groups": groups(),
         "order": [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()],
         "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),
         "cancelled": stop(
             "build", cancelling=True, OBJECTS=objects, STEP=1.0, RADIUS=100.0, **cancelled
         ),
     }
+    happened["spoken"] = speak()
+    QgsProject.instance().clear()
+    happened["others"] = others()
     happened["refused"] = refuse()
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "")
     _, happened["lost"] = algorithm("build").canExecute()

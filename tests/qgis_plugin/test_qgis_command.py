@@ -32,7 +32,7 @@ from semsig_gis.cli.console import VARIABLE
 from semsig_gis.likelihood.noise.model import NOISES
 from semsig_gis.matching.method import Method
 from semsig_gis.queries.chain import parse_chain
-from semsig_gis.sources.catalog import catalog_names
+from semsig_gis.sources.catalog import catalog_names, load_catalog
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
 
@@ -254,6 +254,8 @@ def test_the_command_understands_any_value() -> None:
 
 def test_methods_and_other_names_are_those_of_the_command() -> None:
     assert set(arguments.CATALOGS) == set(catalog_names())
+    asked = {name for name in catalog_names() if load_catalog(name).endpoints}
+    assert set(arguments.SERVICES) == asked
     assert set(arguments.NOISES) == set(NOISES)
     for method in arguments.METHODS:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))

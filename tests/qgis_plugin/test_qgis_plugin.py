@@ -63,7 +63,15 @@ def test_the_zip_file_is_always_the_same_and_holds_what_a_plugin_needs(
         assert names == sorted(names)
         assert {name.partition("/")[0] for name in names} == {"semsig"}
         assert {"semsig/__init__.py", "semsig/metadata.txt", "semsig/LICENSE"} <= set(names)
-        assert {Path(name).suffix for name in names} == {".py", ".txt", ".svg", ".qml", ""}
+        assert {Path(name).suffix for name in names} == {
+            ".py",
+            ".txt",
+            ".svg",
+            ".qml",
+            ".qm",
+            ".md",
+            "",
+        }
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         code = {name for name in names if name.endswith(".py")}
     assert code == {f"semsig/{path.name}" for path in PLUGIN.glob("*.py")}
@@ -81,10 +89,40 @@ def test_the_official_repository_would_take_it(
         'Repository = "https://a.org/git"\n[project.scripts]',
     ).replace('name = "semsig_gis authors" }', 'name = "semsig_gis authors", email = "a@a.org" }')
     (tmp_path / "pyproject.toml").write_text(named)
-    for name in ("LICENSE", "constraints.txt"):
-        shutil.copy(ROOT / name, tmp_path)
+    (tmp_path / "docs").mkdir()
+    for name in ("LICENSE", "constraints.txt", "docs/qgis.md"):
+        shutil.copy(ROOT / name, tmp_path / name)
     monkeypatch.setitem(package.metadata.__globals__, "ROOT", tmp_path)
     assert package.faults(package.write_zip(tmp_path)) == []
+
+
+def shown_texts() -> set[str]:
+    """Return what the windows and the toolbox show, but for the help of the tools."""
+    found = set()
+    kinds = {"choice", "number", "whole_number", "layers_to_write", "file_to_read", "file_to_write"}
+    for path in PLUGIN.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            values: list[ast.expr] = []
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                name = node.func.id
+                values += node.args[:1] if name == "tr" else []
+                if name in kinds or name.startswith("QgsProcessingParameter"):
+                    values += node.args[1:2]
+            elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "TITLE":
+                values.append(node.value)
+            texts = [one.value for one in values if isinstance(one, ast.Constant)]
+            found |= {str(one) for one in texts if one}
+    return found
+
+
+@pytest.mark.parametrize("language", ["de", "fr"])
+def test_what_is_shown_is_translated(package: SimpleNamespace, language: str) -> None:
+    words = package.read_words(ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts")
+    assert shown_texts() - set(words) == set()
+    for source, text in words.items():
+        assert set(re.findall(r"{\w*}", source)) == set(re.findall(r"{\w*}", text)), text
+    # Any file that Qt reads begins so; what it reads from it is tested in QGIS.
+    assert package.compiled(words)[:4] == bytes.fromhex("3cb86418")
 
 
 QT = re.compile(r"^(Q[A-Z]\w*|Qt)$")
@@ -255,10 +293,12 @@ def test_evaluate(qgis: Qgis) -> None:
 
 
 @pytest.fixture(scope="module")
-def session(qgis: Qgis) -> dict[str, Any]:
+def session(qgis: Qgis, package: SimpleNamespace) -> dict[str, Any]:
     """Play `qgis_session.py` in QGIS's own Python, and return what it tells."""
     python = shutil.which("python3", path=os.defpath) or "python3"
     shutil.copy(qgis.place / "city.parquet", qgis.place / "session.parquet")
+    words = package.read_words(ROOT / "qgis_plugin" / "i18n" / "semsig_de.ts")
+    (qgis.place / "sources.json").write_text(json.dumps(sorted(words)), "utf-8")
     done = qgis.process(python, SCRIPT, qgis.place, qgis.place / "town.toml")
     if "No module named 'qgis'" in done.stderr:
         unavailable("qgis", f"{python} does not have QGIS's modules")
@@ -268,7 +308,9 @@ def session(qgis: Qgis) -> dict[str, Any]:
 
 
 def test_qgis_lists_the_algorithms_and_loads_a_file(session: dict[str, Any], qgis: Qgis) -> None:
-    assert session["listed"] == ["load", "build", "localize", "evaluate", "identify", "export"]
+    six = ["load", "build", "localize", "evaluate", "identify", "export"]
+    others = ["ambiguity", "demo", "fetchcanvas", "fetch", "draft", "update"]
+    assert session["listed"] == [*six, *others]
     assert session["loaded"] is True
     assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
     text = session["help"]
@@ -288,6 +330,26 @@ def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
     }
     order = session["order"]
     assert order.index("Queries") < order.index("From the true to the best place")
+
+
+def test_qgis_reads_the_translations(session: dict[str, Any], package: SimpleNamespace) -> None:
+    for language, told in session["spoken"].items():
+        words = package.read_words(ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts")
+        assert told == [words[source] for source in sorted(words)]
+
+
+def test_layers_come_in_groups_points_above_areas(session: dict[str, Any]) -> None:
+    assert session["groups"]["Localize a query"] == ["Candidates", "Place", "Regions to search"]
+    assert session["groups"]["Export cells"] == ["Street objects", "Cells"]
+
+
+def test_the_other_tools_do_their_work(session: dict[str, Any]) -> None:
+    told = session["others"]
+    assert told["missing"] == []
+    assert told["nowhere"] == ["No place was given; type a name, or choose a layer of polygons."]
+    assert set(told["groups"]["Demo city"]) == {
+        *("Queries", "From the true to the best place", "Street objects", "Cells")
+    }
 
 
 def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> None:
@@ -310,7 +372,7 @@ def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> N
 
 def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> None:
     expected = (
-        ("--heading and --area are for --method likelihood",),
+        ("--heading and --area are for the method likelihood",),
         ("Place was given with the method types:edit",),
         ("Detector was given with the method edit+edit",),
         ("b.shp does not end in .gpkg",),
