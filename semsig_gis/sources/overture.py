@@ -366,7 +366,7 @@ def _listing(
         files = [
             info.path
             for kind in kinds
-            for info in system.get_file_info(fs.FileSelector(_folder_of(release, kind)))
+            for info in system.get_file_info(_files_of(release, kind))
             if info.path.endswith(".parquet")
         ]
     except OSError as error:
@@ -394,9 +394,10 @@ def _latest(system: fs.FileSystem, folder: str) -> str:
     return folder if any(PARTITION.search(Path(name).name) for name in names) else names[-1]
 
 
-def _folder_of(release: str, kind: str) -> str:
+def _files_of(release: str, kind: str) -> fs.FileSelector:
+    """Return what selects the files of a kind; part of a release may be all that is there."""
     theme, _, name = kind.partition("/")
-    return f"{release}/theme={theme}/type={name}"
+    return fs.FileSelector(f"{release}/theme={theme}/type={name}", allow_not_found=True)
 
 
 def _key(what: Sequence[object]) -> str:
