@@ -135,7 +135,7 @@ def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(
 @pytest.mark.parametrize(
     ("page", "error", "words"),
     [
-        (Answer(b"<!DOCTYPE html><html></html>", type="text/html"), SourceError, ["address"]),
+        (Answer(b"<!DOCTYPE html><html></html>", type="text/html"), SourceError, ["layer 'lamps'"]),
         (Answer(b"{}"), SourceError, ["address"]),
         (Answer(b'"what?"'), SourceError, ["address"]),
         (Answer(b'{"message": "Log in."}', status=403), HttpError, ["403", "(Log in)"]),

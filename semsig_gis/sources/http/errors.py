@@ -41,4 +41,5 @@ def _said(reply: Any) -> str:  # noqa: ANN401 - any JSON
     said = next(filter(None, (_said(reply.get(name)) for name in MESSAGES)), "")
     details = reply.get("details")
     texts = details if isinstance(details, list) else []
-    return ", ".join(dict.fromkeys(filter(None, [said, *map(_said, texts)])))
+    parts = (text.strip().rstrip(".") for text in [said, *map(_said, texts)])
+    return ", ".join(dict.fromkeys(filter(None, parts)))

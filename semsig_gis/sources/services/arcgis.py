@@ -121,8 +121,8 @@ def _fetch_pages(
     if not (info.get("advancedQueryCapabilities") or {}).get("supportsPagination", False):
         if told is None or told > most:
             msg = (
-                f"layer {client.layer.name!r}: {host_of(query.url)} sends {most:,} rows at most "
-                f"and cannot send the rest of {told or 'more'}; ask for a smaller area."
+                f"{host_of(query.url)} sends {most:,} rows at most and cannot send the rest of "
+                f"{told or 'more'}; ask for a smaller area."
             )
             raise SourceError(msg)
         return client.pages(query, read, lambda *_: None, told=told)

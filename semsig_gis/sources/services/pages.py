@@ -207,8 +207,8 @@ class Client:
 
     def _refuse(self, what: str) -> None:
         msg = (
-            f"layer {self.layer.name!r}: {host_of(self.endpoint)} {what}; its data may have "
-            "changed meanwhile, so run it again, or tell its publisher."
+            f"{host_of(self.endpoint)} {what}; its data may have changed meanwhile, so run it "
+            "again, or tell its publisher."
         )
         raise PagingError(msg)
 
@@ -356,11 +356,15 @@ def fetch_layers(
         try:
             download = adapter.fetch_layer(client, area)
             downloads.append(dataclasses.replace(download, area=area))
-        except PagingError:
-            for file in client.asked:
-                cache.forget(file)
-            raise
-        except HttpError as error:
-            msg = f"layer {layer.name!r}: {error}"
-            raise HttpError(msg, error.status) from error
+        except SourceError as error:
+            if isinstance(error, PagingError):
+                for file in client.asked:
+                    cache.forget(file)
+            raise _of_layer(error, layer) from error
     return downloads
+
+
+def _of_layer(error: SourceError, layer: LayerSpec) -> SourceError:
+    """Return an error that says which layer it is about."""
+    msg = f"layer {layer.name!r}: {error}"
+    return HttpError(msg, error.status) if isinstance(error, HttpError) else type(error)(msg)
