@@ -30,6 +30,7 @@ from semsig_gis.cli.options import (
     object_store,
     read_drift,
 )
+from semsig_gis.core.terminal import percent
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -222,13 +223,13 @@ def calibrate(
     if rule.answered:
         say(
             f"Answers from a chance of {rule.threshold:.4f} that the place is within {radius:g} m: "
-            f"{rule.answered:,} of {rule.queries:,} samples ({rule.coverage:.1%}), of which "
-            f"{rule.wrong:,} wrong; {precision:.0%} right with a confidence of "
-            f"{rule.confidence:.0%}."
+            f"{rule.answered:,} of {rule.queries:,} samples ({percent(rule.coverage)}), of which "
+            f"{rule.wrong:,} wrong; {percent(precision, 0)} right with a confidence of "
+            f"{percent(rule.confidence, 0)}."
         )
     else:
         say(
-            f"No chance is proven to be right {precision:.0%} of the time by these "
+            f"No chance is proven to be right {percent(precision, 0)} of the time by these "
             f"{rule.queries:,} samples, so nothing is answered; give more samples, or a lower "
             "--precision."
         )

@@ -36,6 +36,7 @@ from semsig_gis.cli.options import (
 )
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 from semsig_gis.core.method import LIKELIHOOD
+from semsig_gis.core.terminal import percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -360,7 +361,7 @@ def print_query(result: dict[str, Any]) -> None:
 
 
 def _object_text(query: dict[str, Any], row: int) -> str:
-    """Return an object of a query: ``D 80°, 7.3 m ± 56%``."""
+    """Return an object of a query: ``D 80°, 7.3 m ± 56 %``."""
     parts = []
     if scores := query.get("scores"):
         parts.append(" or ".join(f"{name} {chance:.2g}" for name, chance in scores[row].items()))
@@ -370,7 +371,7 @@ def _object_text(query: dict[str, Any], row: int) -> str:
         parts.append(f"{query['bearings'][row]:.4g}°")
     metres, error = ((query.get(name) or {row: None})[row] for name in ("ranges", "range_errors"))
     if metres is not None:
-        parts.append(f"{metres:.3g} m" + (f" ± {error:.0%}" if error is not None else ""))
+        parts.append(f"{metres:.3g} m" + (f" ± {percent(error, 0)}" if error is not None else ""))
     return " ".join(parts)
 
 
@@ -393,7 +394,7 @@ def print_place(result: dict[str, Any]) -> None:
     """Print the place of an answer by likelihood, or that it cannot be told."""
     place, region = result["place"], result["region"]
     where = f"{place['lat']:.6f}, {place['lon']:.6f} (lat, lon)"
-    chance = f"within {place['within_m']:g} m of it with a chance of {place['chance']:.1%}"
+    chance = f"within {place['within_m']:g} m of it with a chance of {percent(place['chance'])}"
     if result["answered"]:
         say(f"{where}, {chance}.")
     else:
@@ -401,7 +402,7 @@ def print_place(result: dict[str, Any]) -> None:
     ellipse = place["ellipse_90"]
     say(
         f"Estimated position: x {place['x']:.1f}, y {place['y']:.1f} ± {place['sigma']:.1f} m "
-        f"(90%: {ellipse['longer']:.1f} m along {ellipse['bearing']:.0f}°, "
+        f"(90 %: {ellipse['longer']:.1f} m along {ellipse['bearing']:.0f}°, "
         f"{ellipse['shorter']:.1f} m across)."
     )
     if place["heading"] is not None:
@@ -410,7 +411,7 @@ def print_place(result: dict[str, Any]) -> None:
             f"from {result['north']['name']} north."
         )
     say(
-        f"{region['share']:.0%} of the chance is in {region['cells']:,} "
+        f"{percent(region['share'], 0)} of the chance is in {region['cells']:,} "
         f"cell{'' if region['cells'] == 1 else 's'} "
         f"({_area_text(region['km2'])})."
     )

@@ -20,6 +20,7 @@ from semsig_gis.cli.options import (
     command,
     seen_north,
 )
+from semsig_gis.core.terminal import percent
 
 if TYPE_CHECKING:
     from semsig_gis.database.city import City
@@ -102,7 +103,7 @@ def route(options: RouteOptions) -> None:
                 *(f"{answer['place'][axis]:.1f}" for axis in ("x", "y")),
                 *(f"{answer['place'][axis]:.6f}" for axis in ("lon", "lat")),
                 f"{answer['place']['sigma']:.1f}",
-                f"{answer['place']['chance']:.1%}",
+                percent(answer["place"]["chance"]),
                 "yes" if answer["answered"] else "cannot tell",
             ]
             for answer in answers

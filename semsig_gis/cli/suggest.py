@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from semsig_gis.cli.console import AsJson, print_json, print_rows, say
 from semsig_gis.cli.localize import print_place, print_query
 from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north, with_unplaced
+from semsig_gis.core.terminal import percent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,7 @@ def suggest(options: SuggestOptions) -> None:
         "What to look for next",
         ("question", "symbol", "yes", "bits"),
         [
-            [one["question"], one["symbol"], f"{one['chance']:.1%}", f"{one['gain']:.3f}"]
+            [one["question"], one["symbol"], percent(one["chance"]), f"{one['gain']:.3f}"]
             for one in questions
         ],
     )

@@ -27,3 +27,12 @@ def _shown(character: str) -> str:
         return character
     units = array.array("H", character.encode(UTF16, "surrogatepass"))
     return "".join(f"\\u{unit:04x}" for unit in units)
+
+
+def percent(share: float, digits: int = 1) -> str:
+    """Return a share from 0 to 1 as percent: ``41.8 %``.
+
+    >>> percent(0.418), percent(1.0, 0)
+    ('41.8 %', '100 %')
+    """
+    return f"{100 * share:.{digits}f} %"

@@ -12,6 +12,7 @@ from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import SOURCE, cell_ids, cells_near
 from semsig_gis.core.rtree import PackedIndex
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city, save_with_store
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
@@ -61,7 +62,7 @@ class UpdateReport(Displayed):
             "changed": self.changed,
             "appeared": self.appeared,
             "vanished": self.vanished,
-            "share": f"{self.share:.2%}",
+            "share": percent(self.share, 2),
         }
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.terminal import percent
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,7 +64,7 @@ class ErrorField(Displayed):
         return {
             "radius": f"{self.radius:g} m",
             "pixels": f"{columns:,} x {rows:,} of {self.grid.step:g} m",
-            "with queries near": f"{np.isfinite(self.failed).mean():.0%}",
+            "with queries near": percent(np.isfinite(self.failed).mean(), 0),
         }
 
     def at(self, xy: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -14,6 +14,7 @@ import numpy as np
 import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
@@ -149,15 +150,16 @@ class Evaluation(Displayed):
 
     def _facts(self) -> dict[str, object]:
         means = self.means()
-        near, low, high = means.loc[f"p{self.success_metres}", ["value", "low", "high"]]
+        near = means.loc[[f"p{self.success_metres}"], ["value", "low", "high"]].to_numpy()[0]
+        share, low, high = map(percent, near.tolist())
         return {
             "queries": len(self.queries),
             "cells": self.database["cells"],
             "method": self.method,
             "distortion": chain_text(self.asked.distortions) or "none",
             "best of": self.top,
-            f"within {self.success_metres} m": f"{near:.1%} ({low:.1%} to {high:.1%})",
-            "recall@10 %": f"{means['value']['recall10']:.1%}",
+            f"within {self.success_metres} m": f"{share} ({low} to {high})",
+            "recall@10 %": percent(means["value"]["recall10"]),
             "CRS": self.database["crs"],
         }
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import CELL_CHANCES, ERROR_BREAKS, FAILURES
+from semsig_gis.core.terminal import percent
 from semsig_gis.exports.styles import AMBIGUITY, IDENTIFIABILITY
 from semsig_gis.storage.raster import write_cells
 from semsig_gis.storage.whole import write_whole
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 
 FAILED: Classes = {
-    (low, high): (f"failed: {low:.0%} to {high:.0%}", colour)
+    (low, high): (f"failed: {percent(low, 0)} to {percent(high, 0)}", colour)
     for (low, high), colour in zip(pairwise([*FAILURES, 1.0]), FAILURES.values(), strict=True)
 }
 """What is said of a place, and its colour, by the share of the queries around it that failed."""
@@ -45,7 +46,7 @@ ERRORS: Classes = {
 
 CLEAR = "#ffffff00"
 CHANCES: Classes = {
-    (0.0, min(CELL_CHANCES)): (f"less than {min(CELL_CHANCES):.3%}", CLEAR),
+    (0.0, min(CELL_CHANCES)): (f"less than {percent(min(CELL_CHANCES), 3)}", CLEAR),
     **{
         (low, high): (f"{100 * low:g} % or more", colour)
         for (low, high), colour in zip(

@@ -12,6 +12,7 @@ import shapely
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.likelihood.posterior import Posterior
 
@@ -50,7 +51,7 @@ class SearchRegions(Displayed):
 
     def _facts(self) -> dict[str, object]:
         told = self.to_dict()
-        chance = {"chance": f"{told['chance']:.1%}"} if "chance" in told else {}
+        chance = {"chance": percent(told["chance"])} if "chance" in told else {}
         area = f"{told['km2']:.3f} km² ({told['percent']:.2g} %)"
         return {"regions": told["regions"], "cells": told["cells"], "area": area, **chance}
 

@@ -17,6 +17,7 @@ import numpy as np
 import semsig_gis
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, crs_label
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.answer import (
     REGION_SHARE,
     Answer,
@@ -127,7 +128,7 @@ class Location(Answer):
             "answer": "yes" if self.answer.given else "cannot tell",
             "place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
             "give or take": f"{self.estimate.sigma:.1f} m",
-            f"within {self.rule.radius:g} m": f"{self.answer.mass:.1%}",
+            f"within {self.rule.radius:g} m": percent(self.answer.mass),
             "region": f"{len(self.region):,} of {self.cells:,} cells",
             "candidates": len(self.columns["cell"]),
             "noise": self.noise,

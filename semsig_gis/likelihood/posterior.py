@@ -17,6 +17,7 @@ import numpy as np
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
+from semsig_gis.core.terminal import percent
 from semsig_gis.core.view import View, check_north
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.association import turn_logs
@@ -70,7 +71,7 @@ class Posterior(Displayed):
             "cells": len(self.chances),
             "entropy": f"{self.entropy:.1f} bits",
             "likeliest cell": self.database.cell_ids[best],
-            "its chance": f"{self.chances[best]:.1%}",
+            "its chance": percent(self.chances[best]),
         }
 
     @cached_property

@@ -17,6 +17,7 @@ import shapely
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
+from semsig_gis.core.terminal import percent
 from semsig_gis.reports.tables import Table, brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
@@ -386,6 +387,6 @@ def update_tables(report: UpdateReport) -> tuple[Table, Table]:
             "Cells",
             ("what", "cells"),
             tuple((name, f"{number:,}") for name, number in cells.items()),
-            note=f"The city has drifted by {report.share:.2%} of its cells.",
+            note=f"The city has drifted by {percent(report.share, 2)} of its cells.",
         ),
     )

@@ -140,11 +140,6 @@ def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def percent(share: float) -> str:
-    """Return a share from 0 to 1 as percent with one decimal: ``41.8 %``."""
-    return f"{100 * share:.1f} %"
-
-
 KILOMETRE = 1000.0
 
 

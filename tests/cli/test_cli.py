@@ -438,7 +438,7 @@ def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: st
     for note, words in zip(answer["notes"], notes, strict=True):
         assert words in note
     out = done(*query)
-    assert "Seen: D 80° 7.28 m ± 56%, X 120° 25.2 m ± 28%, D 200°; looked at 55-125°." in out
+    assert "Seen: D 80° 7.28 m ± 56 %, X 120° 25.2 m ± 28 %, D 200°; looked at 55-125°." in out
     line = json.dumps(seen | {"id": "again"})
     Path("queries.jsonl").write_text(line)
     again = json.loads(

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from semsig_gis.core.terminal import percent
 from semsig_gis.reports.parts import Number
 from semsig_gis.reports.tables import (
     WIDEST,
@@ -17,7 +18,6 @@ from semsig_gis.reports.tables import (
     interval,
     note_tables,
     number_table,
-    percent,
 )
 
 FIGURES = st.none() | st.floats(-1e6, 1e6)

@@ -14,6 +14,7 @@ from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.ranges import MOST_SEED, MOST_WORKERS, require_number
+from semsig_gis.core.terminal import percent
 from semsig_gis.core.view import Photo
 from semsig_gis.evaluation.figures import calibration_bins, finite_or_none
 from semsig_gis.evaluation.identify.trials import (
@@ -88,7 +89,7 @@ class IdentifiabilityCheck(Displayed):
     def _facts(self) -> dict[str, object]:
         return {
             "queries": self.queries,
-            "found": f"{self.found:.1%}",
+            "found": percent(self.found),
             "correlation": f"{self.correlations['found']:.2f}",
             "attainable": f"{self.attainable:.2f}",
             "seed": self.seed,

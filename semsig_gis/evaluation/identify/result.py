@@ -14,6 +14,7 @@ import pyarrow as pa
 import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.city import City
 from semsig_gis.likelihood.index import index_fingerprint
 from semsig_gis.likelihood.noise.model import noise_from_dict
@@ -108,7 +109,7 @@ class Identifiability(Displayed):
         return {
             "cells": len(self.database),
             "noise": self.noise.name,
-            f"found within {self.radius:g} m": f"{self.found.mean():.1%} for the mean cell",
+            f"found within {self.radius:g} m": f"{percent(self.found.mean())} for the mean cell",
             "bits left": f"{self.bits.mean():.1f} of {np.log2(len(self.database)):.1f}",
             "view": f"{self.view:g}°",
             "trials": self.trials,
