@@ -35,6 +35,7 @@ from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.file import database_of
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.exports.project import layer_style, project_archive, shown_layers
+from semsig_gis.exports.styles import Style
 from semsig_gis.objects.table import objects_of
 from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import whole_file
@@ -74,8 +75,8 @@ VALUES ('layer_styles', 'attributes', 'layer_styles', 'How QGIS draws the layers
 STYLE = """
 INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column,
   styleName, styleQML, styleSLD, useAsDefault, description, owner)
-SELECT '', '', table_name, column_name, ?, ?, '', ?, ?, '' FROM gpkg_geometry_columns
-WHERE table_name = ?
+SELECT '', '', table_name, coalesce(column_name, ''), ?, ?, '', ?, ?, ''
+FROM gpkg_contents LEFT JOIN gpkg_geometry_columns USING (table_name) WHERE table_name = ?
 """
 # What fields are called, as the schema extension of GeoPackages has it.
 FIELDS = """
@@ -357,7 +358,8 @@ def _add_looks(layers: Sequence[Layer], path: Path, file: str) -> None:
         connection.executescript(STYLES + FIELDS + PROJECTS)
         by_name = {layer.key: layer for layer in shown}
         for layer in (by_name[name] for name in titles):
-            for number, style in enumerate(layer.styles):
+            # A table without geometry has names of its fields alone.
+            for number, style in enumerate(layer.styles or (Style("Fields", ""),)):
                 qml = layer_style(layer, style)
                 values = (style.name, qml, number == 0, layer.title, layer.key)
                 connection.execute(STYLE, values)

@@ -254,14 +254,17 @@ def test_every_layer_has_a_style_of_its_own(file: Path, tmp_path: Path) -> None:
         ("objects", "geom", "Classes", 1),
         ("evaluation", "geom", "Outcome", 1),
         ("evaluation_lines", "geom", "Outcome", 1),
+        ("evaluation_figures", "", "Fields", 1),
         ("regions", "geom", "Rank", 1),
         ("candidates", "geom", "Rank", 1),
         ("place", "geom", "Answer", 1),
     ]
     for source, layer, _, _, _, qml, updated in styles:
         root = ET.fromstring(qml)  # noqa: S314 - our own
-        column = root.find("renderer-v2").attrib["attr"]  # type: ignore[union-attr]
-        assert column in pyogrio.read_info(source, layer=layer)["fields"]
+        fields = {*pyogrio.read_info(source, layer=layer)["fields"]}
+        assert {item.attrib["field"] for item in root.findall("aliases/alias")} == fields
+        assert {item.attrib["attr"] for item in root.findall("renderer-v2")} <= fields
+        assert (root.find("renderer-v2") is None) == (layer == "evaluation_figures")
         used = {item.attrib["symbol"] for item in root.iter() if "symbol" in item.attrib}
         drawn = {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}
         assert used == drawn

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import re
 import sqlite3
 import subprocess
+import zipfile
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -156,8 +158,11 @@ def test_every_field_has_a_name_that_people_read(tmp_path: Path) -> None:
         fields = layer_fields(layer)
         assert all(field.about and field.alias != field.name for field in fields), layer.name
         assert len({field.alias for field in fields}) == len(fields)
-    again = [project_archive(layers, shown_layers(layers, "a.gpkg"), "a") for _ in "ab"]
+    name = "a\udcff\x01 b"
+    again = [project_archive(layers, shown_layers(layers, name), name) for _ in "ab"]
     assert again[0] == again[1]
+    with zipfile.ZipFile(io.BytesIO(again[0])) as archive:
+        assert ET.fromstring(archive.read("project.qgs")).get("projectname") == "a\ufffd b"  # noqa: S314 - our own
     export_database(CITY, file, objects=OBJECTS)
     with closing(sqlite3.connect(file)) as connection:
         said = "SELECT title, description FROM gpkg_data_columns WHERE column_name = 'bearings'"
