@@ -231,7 +231,7 @@ semsig.suggest = (session) => {
           semsig.showScene(session);
         });
         if (others.length) semsig.button(line, "No, ask another", () => ask(others));
-        semsig.text(line, "small", "What could be seen and is not marked counts as not there.");
+        semsig.text(line, "small", "What could be seen and is not marked already counts as less likely there.");
       };
       ask(offers);
     }, 400);
