@@ -418,11 +418,12 @@ def _class_text(spec: LayerSpec) -> str:
 def _origin_text(spec: LayerSpec) -> str:
     """Say what a layer is made from: tags, a dataset of a portal, or files."""
     if spec.tags:
-        return " or ".join(
+        tags = " or ".join(
             " and ".join(f"{key}={'/'.join(values)}" for key, values in tags) for tags in spec.tags
         )
-    files = ", ".join(spec.files)
-    return files if spec.dataset is None else f"{spec.dataset} ({files})"
+        return tags if spec.dataset is None else f"{spec.dataset}: {tags}"
+    files, asked = ", ".join(spec.files), spec.dataset or spec.server_where
+    return files if asked is None else f"{asked} ({files})"
 
 
 def _filter_text(spec: LayerSpec, common: Rules) -> str:

@@ -180,6 +180,8 @@ def test_sources(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
             "of objects: level = <0",
         ),
         "sources opendata_paris": ("les-arbres",),
+        "sources overture": ("base/land: subtype=tree and class=tree",),
+        "sources mapillary": ("object--bench (",),
         "sources montpellier": ("ETAT = en fonction", "taxi_station"),
         "sources tiny.toml --json": ('"title": "A tiny city"',),
         "draft lights.gpkg": ("[[layers]]", 'files = ["lights.gpkg"]'),

@@ -83,7 +83,7 @@ def test_the_patterns_find_what_they_look_for() -> None:
 
 def test_data_sources_hold_data_only() -> None:
     suffixes = {path.suffix for path in (ROOT / "data_sources").rglob("*") if path.is_file()}
-    assert suffixes <= {".toml", ".md"}
+    assert suffixes <= {".json", ".md", ".toml"}
     assert ".toml" in suffixes
 
 

@@ -158,7 +158,9 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
     options: Any = {"endpoints": [address], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
     files = fetch_layers(SPECS, spec=spec, progress=lambda *s: steps.append(s), **options)
-    assert kept(read_layers(files, SPECS)) == EXPECTED
+    layers = read_layers(files, SPECS)
+    assert kept(layers) == EXPECTED
+    assert layers[-1].table["name"].item() == "Rue"
     assert steps == [(n, 4) for n in (1, 2, 3, 4)]
     assert told == ["s3://maps: release 2026-08-19.0, 4 files"]
     size = land.stat().st_size
