@@ -25,6 +25,7 @@ from stand_ins import (
 )
 
 from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.sources import reader
 from semsig_gis.sources.area import Area
 from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.http.fetch import HttpError
@@ -353,7 +354,7 @@ def test_the_datastore_of_ckan_filters(server: Server, fetched: Fetch) -> None:
 
 
 FILE = {"type": "FeatureCollection", "features": features(ROWS)}
-CSV = {"format": "csv", "url": "files/lamps_2023.csv", "last_modified": "2023-05-01T00:00:00"}
+CSV = {"format": "csv", "url": "files/lamps_2023.csv", "created": "2023-05-01T00:00:00"}
 NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T00:00:00"}
 
 
@@ -446,3 +447,24 @@ def test_places_of_socrata(server: Server, fetched: Fetch, place: str) -> None:
     assert layer.spec.terms == "City of Somewhere (PDDL)"
     chosen = replace(LAMPS, select=("KIND",), x_field="LON", y_field="LAT")
     assert xy(fetched(service, chosen).read()) == PLACES
+    named = replace(LAMPS, aliases=(("geo_shape", ("the_place",)),))
+    assert xy(fetched(service, named).read()) == PLACES
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'OBJECTID,the_geom\n7,"POINT (2.35 48.85)"\n',
+        'OBJECTID,Location\n7,"(48.85, 2.35)"\n',
+        "OBJECTID,Longitude,Latitude\n7,2.35,48.85\n",
+        '[{"OBJECTID": "7", "location": {"latitude": "48.85", "longitude": "2.35"}}]',
+        '{"result": {"total": 1, "records": [{"OBJECTID": 7, "lon": "2.35", "lat": "48.85"}]}}',
+        '{"features": [{"attributes": {"OBJECTID": 7}, "geometry": {"x": 2.35, "y": 48.85}}]}',
+    ],
+)
+def test_what_was_downloaded_by_hand_is_read_as_well(tmp_path: Path, text: str) -> None:
+    path = tmp_path / ("a.csv" if text[0] == "O" else "a.json")
+    path.write_text(text)
+    spec = replace(LAMPS, aliases=(("geo_point_2d", ("location",)),))
+    (layer,) = reader("socrata")(path, [spec])
+    assert (ids(layer), xy(layer), layer.notes) == (["7"], [(2.35, 48.85)], ())

@@ -135,7 +135,7 @@ def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]
             f"{_file_name(chosen[0][0])!r}."
         )
         raise CatalogError(msg)
-    return max(chosen, key=lambda pair: _changed(pair[0]))
+    return max(chosen, key=lambda pair: _edition(pair[0]))
 
 
 def _shown(resource: Resource) -> str:
@@ -147,8 +147,9 @@ def _is_named(resource: Resource, patterns: tuple[str, ...]) -> bool:
     return any(fnmatchcase(name, pattern.casefold()) for name in names for pattern in patterns)
 
 
-def _changed(resource: Resource) -> str:
-    return str(resource.get("last_modified") or resource.get("created") or "")
+def _edition(resource: Resource) -> tuple[str, str]:
+    """Return what is greater for the newer of two editions, whose names often have their dates."""
+    return str(resource.get("created") or resource.get("last_modified") or ""), _shown(resource)
 
 
 def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:

@@ -161,7 +161,7 @@ def _built(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
         return shapely.from_wkt(value)
     geometry = parse_json(value) if isinstance(value, str) else value
     if "type" not in geometry:
-        return esri_shape(geometry)
+        return _point(geometry) if "latitude" in geometry else esri_shape(geometry)
     if geometry["type"] == "Feature":
         geometry = geometry["geometry"]
     if geometry is None:
@@ -198,7 +198,7 @@ def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
             if value["lon"] is None and value["lat"] is None:
                 return None
             return float(value["lon"]), float(value["lat"])
-        lat, lon = value.split(",") if isinstance(value, str) else value
+        lat, lon = value.strip().strip("()").split(",") if isinstance(value, str) else value
         return float(lon), float(lat)
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         msg = f"its point {_shown(value)} is not a latitude and a longitude"

@@ -69,11 +69,10 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     names = {text.partition(";")[0].strip().lower(): text for text in reversed(said.formats)}
     json_format = next((text for kind, text in names.items() if kind in JSON_FORMATS), None)
     query = _query(client, "GetFeature").also(typeNames=name, srsName=SHORT if json_format else URN)
-    wanted = client.fields(fields)
-    if wanted:
-        places = (field for field, kind in types.items() if kind.startswith("gml:"))
-        listed = dict.fromkeys([*(field for field in wanted if field in types), *places])
-        query = query.also(propertyName=",".join(listed))
+    wanted = [field for field in client.fields(fields) if field in types]
+    places = [field for field, kind in types.items() if kind.startswith("gml:")]
+    if wanted and places:
+        query = query.also(propertyName=",".join(dict.fromkeys([*wanted, *places])))
     order: dict[str, str | float] = {"outputFormat": json_format} if json_format else {}
     key = client.layer.id_field and find_field(client.layer.id_field, client.layer, fields)
     if key and key in types and not said.denies("ImplementsSorting"):
