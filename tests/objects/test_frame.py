@@ -72,6 +72,7 @@ def quack(extract: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             extract.with_suffix(".osm.pbf"),
             working_directory=folder,
             result_file_path=folder / "town.parquet",
+            sort_result=False,
             verbosity_mode="silent",
         )
     return written
@@ -123,7 +124,11 @@ def test_files_of_osmnx_are_read_like_the_extract(
 ) -> None:
     path = tmp_path / f"town{suffix}"
     frame.to_parquet(path) if suffix == ".parquet" else frame.to_file(path)
-    assert_same(build_database(loaded(path)), build_database(expected))
+    found, wanted = (
+        objects.table.sort_values(["source", "source_id"]) for objects in (loaded(path), expected)
+    )
+    assert found["source_id"].tolist() == wanted["source_id"].tolist()
+    assert shapely.distance(found.geometry.array, wanted.geometry.array).max() < 1e-6
 
 
 def test_a_file_of_quackosm_is_read_like_the_extract(
