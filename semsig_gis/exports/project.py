@@ -217,7 +217,7 @@ def _signs(layer: Layer) -> tuple[Sign, ...]:
 def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title: str) -> bytes:
     """Return a project of QGIS (``.qgz``) with layers of one GeoPackage."""
     drawn = [layer for layer in layers if layer.geometry != "none"]
-    licences = dict.fromkeys(line for layer in shown for line in layer.licences)
+    licences = [*dict.fromkeys(line for layer in shown for line in layer.licences)]
     bounds = _joined([layer.bounds for layer in drawn])
     page = _page(bounds)
     text = (
@@ -239,7 +239,7 @@ def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title:
                 for having in shown
                 if having.key == of.relation
             ],
-            credits=[*list(licences)[:CREDITS], f"Made with semsig_gis {__version__}"],
+            credits=[*_credits(licences), f"Made with semsig_gis {__version__}"],
         )
     )
     packed = io.BytesIO()
@@ -249,6 +249,14 @@ def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title:
         entry.compress_type = zipfile.ZIP_DEFLATED
         archive.writestr(entry, text)
     return packed.getvalue()
+
+
+def _credits(licences: list[str]) -> list[str]:
+    """Return whom to name on the page, on which there is room for a few."""
+    if len(licences) <= CREDITS:
+        return licences
+    rest = f"and {len(licences) - CREDITS + 1} more, which the properties of the layers name"
+    return [*licences[: CREDITS - 1], rest]
 
 
 def _grouped(layers: Sequence[ShownLayer]) -> list[tuple[str, list[ShownLayer]]]:

@@ -52,7 +52,9 @@ def hostile(path: Path) -> None:
     classes = [dataclasses.replace(one, title=NASTY) for one in OBJECTS.taxonomy.classes]
     same: dict[str, Any] = {"taxonomy": Taxonomy(tuple(classes))}
     table = OBJECTS.table.assign(source_id=NASTY)
-    objects = dataclasses.replace(OBJECTS, table=table, licenses=(Licence(NASTY),), **same)
+    licenses = (NASTY, *(f"Town {number} (CC0)" for number in range(8)))
+    things = {"table": table, "licenses": tuple(map(Licence, licenses))}
+    objects = dataclasses.replace(OBJECTS, **things, **same)
     database = dataclasses.replace(CITY, licenses=(NASTY,), **same)
     export_database(database, path, objects=objects, identifiability=chances_of(database))
 
@@ -140,6 +142,7 @@ def test_texts_from_data_are_shown_as_they_are(opened: dict[str, Any]) -> None:
     tips = [layer["tip"] for layer in said["layers"].values()]
     for text in (*tips, *said["texts"][:1]):
         assert "env('HOME')" in text
+    assert "Town 4 (CC0)\nand 3 more, which" in said["texts"][0]
     assert not any("<script" in tip or "<img src=x" in tip for tip in tips)
 
 
