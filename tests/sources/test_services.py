@@ -26,7 +26,7 @@ from stand_ins import (
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import reader
-from semsig_gis.sources.area import Area
+from semsig_gis.sources.area import Area, parse_area
 from semsig_gis.sources.catalog import LayerSpec
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import read_layers
@@ -101,6 +101,13 @@ def test_the_service_cuts_out_the_area(service: StandIn, fetched: Fetch) -> None
     nowhere = Area(shapely.box(7.0, 48.0, 7.1, 48.1), "elsewhere")
     layer = fetched(service, area=nowhere).read()  # which is no fault, and has all fields
     assert (layer.counts.read, layer.notes) == (0, ("the layer has no rows",))
+
+
+def test_an_area_across_180_degrees_is_two_boxes(server: Server, fetched: Fetch) -> None:
+    service = ArcGIS(server)
+    service.rows = [{**ROWS[0], "xy": (179.95, 1.0)}, {**ROWS[1], "xy": (-179.95, 1.0)}]
+    layer = fetched(service, area=parse_area("179.9,0,-179.9,2")).read()
+    assert (ids(layer), len(service.pages_asked())) == (["11", "12"], 2)
 
 
 def test_an_interrupted_run_goes_on_where_it_ended(service: StandIn, fetched: Fetch) -> None:
