@@ -34,7 +34,7 @@ STORY = json.loads(os.environ["SEMSIG_TOUR"])
 OUT, WORK = Path(STORY["out"]), Path(STORY["work"])
 
 
-def wait(ready: Callable[[], object], seconds: float = 600.0) -> None:
+def wait(ready: Callable[[], object], seconds: float = 300.0) -> None:
     """Let QGIS work until something is so."""
     end = time.monotonic() + seconds
     while not ready():

@@ -345,9 +345,7 @@ class SemsigDock(QgsDockWidget):
         self.table.blockSignals(True)  # noqa: FBT003 - as Qt calls it
         self.table.setRowCount(len(self.candidates))
         for row, one in enumerate(self.candidates):
-            for column, text in enumerate(
-                (str(one["rank"]), f"{one['chance']:.1%}", str(one["signature"][0]))
-            ):
+            for column, text in enumerate((str(one["rank"]), f"{one['chance']:.1%}", one["types"])):
                 item = QTableWidgetItem(text)
                 if column < 2:  # noqa: PLR2004 - the numbers
                     right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter

@@ -114,7 +114,7 @@ def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN40
         lat, lon = one["place"]
         point = QgsGeometry.fromPointXY(QgsPointXY(lon, lat))
         row = {"rank": one["rank"], "rank_high": one["rank"], "cell_id": one["cell"]}
-        types = str(one["signature"][0])
+        types = one["types"]
         rows.append((point, {**row, "types": types, "length": len(types), "chance": one["chance"]}))
     polygon = QgsGeometry.fromPolygonXY([ring])
     for name, title, kind, fields, contents in (

@@ -20,7 +20,10 @@ def speak() -> QTranslator | None:
     QTranslator or None
         What translates, to be kept, and removed in the end; None where there is nothing to do.
     """
-    language = str(QgsApplication.locale()).split("_")[0].split("-")[0]
+    # The language that QGIS was started with goes before the one of the settings.
+    running = QgsApplication.instance()
+    named = running.translation() if running is not None else ""
+    language = str(named or QgsApplication.locale()).split("_")[0].split("-")[0]
     file = HERE / "i18n" / f"semsig_{language}.qm"
     translator = QTranslator()
     if not file.is_file() or not translator.load(str(file)):

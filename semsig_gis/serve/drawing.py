@@ -124,14 +124,15 @@ class _Drawer:
         location = self.location
         columns = location.columns
         places = self.latlon(np.stack([columns["x"], columns["y"]], axis=1))
-        rows = zip(*(columns[name].tolist() for name in ("cell_id", "chance")), strict=True)
+        rows = zip(*(columns[name].tolist() for name in ("cell", "cell_id", "chance")), strict=True)
         found = []
-        for number, ((cell_id, chance), place) in enumerate(zip(rows, places, strict=True)):
+        for number, ((cell, cell_id, chance), place) in enumerate(zip(rows, places, strict=True)):
             heading = float(columns["heading"][number]) if "heading" in columns else None
             found.append(
                 {
                     "rank": number + 1,
                     "cell": cell_id,
+                    "types": self.database.types(cell),
                     "place": place,
                     "chance": chance,
                     "heading": heading,

@@ -399,6 +399,9 @@ def test_a_cell_tells_what_is_seen_from_its_middle(page: Page) -> None:
     assert told["distances"] == pytest.approx(seen.distances, abs=0.06)
     types = [database.types(one) for one in range(len(database))]
     assert told["alike"] == types.count(told["types"]) - 1
+    question = {"views": [told["view"]], "seen_from": "cells", "top": 3}
+    best = page.ask("/api/answer", question)["candidates"][0]
+    assert (best["cell"], best["types"]) == (told["cell"], told["types"])
     code, text = page.refused("/api/cell", {"place": [0.0, 0.0]})
     assert (code, "no cell" in text) == (422, True), text
 
