@@ -156,16 +156,17 @@ def load(
     if clip is not None:
         found = clip_layers(found, clip)
         notes.append(AT_THE_EDGE)
-    loaded = assemble(
-        [layer for layer in found if layer.spec in specs],
-        catalog,
-        metric_crs=metric_crs,
-        collapse=collapse,
-        merge=merge,
-        counted=[layer for layer in found if layer.spec not in specs],
-        max_distortion=max_distortion,
-        notes=notes,
-    )
+    with progress("joining the objects"):
+        loaded = assemble(
+            [layer for layer in found if layer.spec in specs],
+            catalog,
+            metric_crs=metric_crs,
+            collapse=collapse,
+            merge=merge,
+            counted=[layer for layer in found if layer.spec not in specs],
+            max_distortion=max_distortion,
+            notes=notes,
+        )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 
@@ -247,14 +248,15 @@ def fetch(
             progress=advance,
             tell=remark,
         )
-    loaded = assemble(
-        layers,
-        catalog,
-        metric_crs=metric_crs,
-        collapse=collapse,
-        merge=merge,
-        max_distortion=max_distortion,
-    )
+    with progress("joining the objects"):
+        loaded = assemble(
+            layers,
+            catalog,
+            metric_crs=metric_crs,
+            collapse=collapse,
+            merge=merge,
+            max_distortion=max_distortion,
+        )
     _save_loaded(loaded, out, buildings, streets, as_json=as_json)
 
 

@@ -246,7 +246,8 @@ def _answer_lines(queries: Iterable[QueryLine], locator: Locator[Any], source: s
 
 def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: View) -> None:
     """Answer a query, draw and write what is asked for, and print it."""
-    answer = locator.locate(query)
+    with progress("answering"):
+        answer = locator.locate(query)
     if options.map_ is not None:
         from semsig_gis.maps.location import localization_map, location_map
         from semsig_gis.maps.page import save_map

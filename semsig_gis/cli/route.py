@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from semsig_gis.cli.console import AsJson, Database, print_json, print_rows
+from semsig_gis.cli.console import AsJson, Database, print_json, print_rows, progress
 from semsig_gis.cli.localize import print_place
 from semsig_gis.cli.options import (
     Day,
@@ -85,7 +85,8 @@ def route(options: RouteOptions) -> None:
     north = seen_north(city, options.north, options.date)
     views, legs = options.read(city, north)
     locator = options.locator(city, north, top=options.top, explain=options.explain)
-    locations = locator.locate_route([query for _, query in views], legs)
+    with progress(f"answering {len(views):,} views"):
+        locations = locator.locate_route([query for _, query in views], legs)
     answers = [
         {"id": name, **location.to_dict()}
         for (name, _), location in zip(views, locations, strict=True)

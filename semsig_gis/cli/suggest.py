@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from semsig_gis.cli.console import AsJson, print_json, print_rows, say
+from semsig_gis.cli.console import AsJson, print_json, print_rows, progress, say
 from semsig_gis.cli.localize import print_place, print_query
 from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north, with_unplaced
 from semsig_gis.core.terminal import percent
@@ -28,7 +28,8 @@ def suggest(options: SuggestOptions) -> None:
     query = options.query(city.dataset)
     unplaced = options.unplaced(city.dataset)
     locator = with_unplaced(options.locator(city, north), query, unplaced)
-    location = locator.locate(query)
+    with progress("answering"):
+        location = locator.locate(query)
     answer = location.to_dict()
     questions = [
         one.to_dict() for one in next_questions(locator.index, location, unplaced=unplaced)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -150,7 +150,11 @@ def view(
         folders=beside if images is None else [images],
     )
     views, tally = detector.views(read_pictures(files), places=place)
-    lines = [json.dumps({"id": name, **one.to_dict(taxonomy)}) + "\n" for name, one in views]
+    rows: list[dict[str, Any]] = []
+    for name, one in views:
+        time = {"time": tally.times[name]} if name in tally.times else {}
+        rows.append({"id": name, **time, **one.to_dict(taxonomy)})
+    lines = [json.dumps(row) + "\n" for row in rows]
     write_whole(out, "".join(lines))
     if as_json:
         print_json({"views": len(views), **tally.to_dict()})

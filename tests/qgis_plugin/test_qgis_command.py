@@ -29,6 +29,7 @@ from sentences import refused
 
 from semsig_gis.cli.commands import app
 from semsig_gis.cli.console import VARIABLE
+from semsig_gis.core.method import DEFAULT_METHOD
 from semsig_gis.likelihood.noise.model import NOISES
 from semsig_gis.matching.method import Method
 from semsig_gis.queries.chain import parse_chain
@@ -257,6 +258,7 @@ def test_methods_and_other_names_are_those_of_the_command() -> None:
     asked = {name for name in catalog_names() if load_catalog(name).endpoints}
     assert set(arguments.SERVICES) == asked
     assert set(arguments.NOISES) == set(NOISES)
+    assert arguments.METHODS[0] == DEFAULT_METHOD  # what a dialog begins with
     for method in arguments.METHODS:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))
     for name in arguments.DISTORTIONS:

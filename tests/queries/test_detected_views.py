@@ -142,14 +142,21 @@ def test_what_is_said_of_a_picture_goes_before_what_is_said_of_all_and_its_file(
 def test_pictures_of_one_place_are_one_view() -> None:
     here, near, far = (43.0, 7.0), (43.00003, 7.0), (43.001, 7.0)
     pictures = [
-        picture(box(), name=f"{number}.jpg", position=position, heading=90.0 * number)
+        picture(
+            box(),
+            name=f"{number}.jpg",
+            position=position,
+            heading=90.0 * number,
+            time=f"2026-05-31T10:00:0{number}Z",
+        )
         for number, position in enumerate((here, near, far, None))
     ]
     detector = replace(DETECTOR, shot=Shot(fov=60.0))
     for places, counts in (("each", [1, 1, 1, 1]), ("gps", [2, 1, 1]), ("all", [4])):
-        views, _ = detector.views(pictures, places=places)  # type: ignore[arg-type]
+        views, tally = detector.views(pictures, places=places)  # type: ignore[arg-type]
         assert [len(view.photos) for _, view in views] == counts
     view = views[0][1]
+    assert tally.times == {"0.jpg": "2026-05-31T10:00:00Z"}
     assert view.photo_rows.tolist() == [0, 1, 2, 3]
     assert view.bearings is not None
     assert view.bearings.tolist() == [0.0, 90.0, 180.0, 270.0]

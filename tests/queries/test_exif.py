@@ -46,6 +46,25 @@ def test_a_phone_tells_how_it_was_held(tmp_path: Path) -> None:
     assert shot.position == pytest.approx((43.735, -7.5))
 
 
+UTC = {GPS.GPSDateStamp: "2026:05:31", GPS.GPSTimeStamp: (10.0, 5.0, 9.0)}
+LOCAL = {Base.DateTimeOriginal: "2026:05:31 12:05:09"}
+
+
+@pytest.mark.parametrize(
+    ("exif", "gps", "time"),
+    [
+        (LOCAL, UTC, "2026-05-31T10:05:09+00:00"),
+        (LOCAL | {Base.OffsetTimeOriginal: "+02:00"}, {}, "2026-05-31T12:05:09+02:00"),
+        (LOCAL, {}, None),  # nobody knows of which zone
+        ({}, UTC | {GPS.GPSDateStamp: "never"}, None),
+    ],
+)
+def test_when_a_picture_was_taken(
+    exif: Mapping[Any, Any], gps: Mapping[Any, Any], time: str | None, tmp_path: Path
+) -> None:
+    assert read_exif(save(tmp_path / "a.jpg", exif=exif, gps=gps)).time == time
+
+
 @pytest.mark.parametrize(
     ("unit", "resolution", "taken"), [(3, 2000.0, 4000), (2, 5080.0, 4000), (3, 200.0, 400)]
 )

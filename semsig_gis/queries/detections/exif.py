@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import io
 import math
 import struct
@@ -28,6 +29,7 @@ SHOWN = ("JPEG", "PNG", "WEBP", "GIF")
 HEIC_BRANDS = frozenset({b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"})
 THUMBNAIL = (256, 256)
 UNREADABLE = (OSError, ValueError, SyntaxError, struct.error, Image.DecompressionBombError)
+CLOCK = 3  # hours, minutes and seconds
 SIDEWAYS = frozenset({5, 6, 7, 8})  # orientations that change width and height
 
 
@@ -84,6 +86,7 @@ def _shot_of(image: Image.Image) -> Shot:
         heading_error=COMPASS_ERROR,
         north="magnetic" if _text(gps.get(GPS.GPSImgDirectionRef)) == "M" else "true",
         position=_position(gps),
+        time=_time(tags, gps),
     )
 
 
@@ -123,6 +126,23 @@ def _position(gps: Any) -> tuple[float, float] | None:  # noqa: ANN401 - of any 
         degrees = sum((part or 0.0) / 60**place for place, part in enumerate(numbers))
         found.append(-degrees if _text(gps.get(side)) == below else degrees)
     return found[0], found[1]
+
+
+def _time(tags: Any, gps: Any) -> str | None:  # noqa: ANN401 - of any tags
+    """Return when a picture was taken: by GPS, or else by a clock that tells its zone."""
+    parts = gps.get(GPS.GPSTimeStamp)
+    numbers = [_number(part) for part in parts] if isinstance(parts, tuple) else []
+    day, zone = _text(gps.get(GPS.GPSDateStamp)), "+00:00"
+    clock = ":".join(f"{int(part or 0):02}" for part in numbers)
+    if len(numbers) != CLOCK or None in numbers or not day:
+        day, _, clock = _text(tags.get(Base.DateTimeOriginal)).partition(" ")
+        zone = _text(tags.get(Base.OffsetTimeOriginal))
+    text = f"{day.replace(':', '-')}T{clock}{zone}"
+    try:
+        time = dt.datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return time.isoformat() if time.tzinfo else None
 
 
 def _number(value: Any) -> float | None:  # noqa: ANN401 - of any tag

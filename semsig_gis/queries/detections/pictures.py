@@ -36,7 +36,8 @@ class Shot:
     """What is known of how and where a picture was taken; None where it is not.
 
     `focal` is the focal length in lengths of the picture's longer side, `position` are latitude and
-    longitude, `north` says what the heading counts from, and pictures of one `place` are one view.
+    longitude, `time` is when it was, with its zone (ISO 8601), `north` says what the heading counts
+    from, and pictures of one `place` are one view.
     """
 
     camera: Projection | None = None
@@ -49,6 +50,7 @@ class Shot:
     roll: float | None = None
     size: tuple[int, int] | None = None
     position: tuple[float, float] | None = None
+    time: str | None = None
     place: str | None = None
 
     def filled(self, other: Shot) -> Shot:

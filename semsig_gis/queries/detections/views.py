@@ -60,6 +60,8 @@ class Tally:
     not_in_city: Counter[str] = field(default_factory=Counter)
     unknown_heading: int = 0
     north: Counter[str] = field(default_factory=Counter)
+    times: dict[str, str] = field(default_factory=dict)
+    """When the first picture of a view was taken, by the name of the view, where that is known."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the counts for JSON."""
@@ -159,7 +161,9 @@ class Detector:
                 near = (one for at, one in placed if _metres(at, shot.position) <= SAME_PLACE_M)
                 key = next(near, key)
                 placed += [(shot.position, key)] if key not in groups else []
-            names.setdefault(key, picture.name if shot.place is None else shot.place)
+            if key not in names:
+                names[key] = picture.name if shot.place is None else shot.place
+                tally.times |= {} if shot.time is None else {names[key]: shot.time}
             groups.setdefault(key, []).append(view)
         views = [
             (names[key], parts[0] if len(parts) == 1 else View.joined(parts).turned(0.0))
