@@ -96,7 +96,7 @@ def test_the_chance_of_every_cell(done: Done) -> None:
 
 
 def test_what_is_required_may_be_drawn_and_searched(run: Run) -> None:
-    query = "localize city.parquet --types DD --require D --top 2"
+    query = "localize city.parquet --method edit+edit --types DD --require D --top 2"
     code, out, err = run(query, "--map", "m.html", "--out", "a.gpkg", "--json")
     assert (code, err) == (0, "")
     answer = json.loads(out)
