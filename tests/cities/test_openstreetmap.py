@@ -309,6 +309,6 @@ def test_a_database_is_built_and_evaluated(
     )
     assert (objects.xy.max(axis=0) - objects.xy.min(axis=0) < 1.3 * extent).all()
     database = build_database(objects)
-    evaluation = evaluate(database, queries=20, distortion="none", seed=1)
+    evaluation = evaluate(database, queries=20, distortion="none", method="edit+edit", seed=1)
     # Nothing is distorted, so that the true cell is among the best.
     assert (evaluation.queries.rank_low == 1).all()
