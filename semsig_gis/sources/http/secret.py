@@ -53,15 +53,19 @@ class Secret:
         return self._spellings.sub(HIDDEN, text)
 
     def strained(self, blocks: Iterable[bytes]) -> Iterator[bytes]:
-        """Yield a body without the token, which may begin in one block and end in another."""
-        longest = LONGEST_SPELLING * len(self.value)
-        kept = ""
-        for block in blocks:
-            text = self.hide(kept + block.decode("latin-1"))
-            ready = max(0, len(text) - longest)
-            kept = text[ready:]
-            yield text[:ready].encode("latin-1")
-        yield kept.encode("latin-1")
+        """Return a body without the token, which may begin in one block and end in another."""
+        return _strained(self, blocks)
+
+
+def _strained(secret: Secret, blocks: Iterable[bytes]) -> Iterator[bytes]:
+    longest = LONGEST_SPELLING * len(secret.value)
+    kept = ""
+    for block in blocks:
+        text = secret.hide(kept + block.decode("latin-1"))
+        ready = max(0, len(text) - longest)
+        kept = text[ready:]
+        yield text[:ready].encode("latin-1")
+    yield kept.encode("latin-1")
 
 
 def _spellings_of(letter: str) -> str:
