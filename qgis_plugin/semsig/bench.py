@@ -96,7 +96,7 @@ class Bench(QObject):
         if process is not self.process:
             return
         self.process, self.address = None, ""
-        reason = self.said[-1][len(SENTENCE) :] if self.said else tr("The engine ended.")
+        reason = self.said[-1].removeprefix(SENTENCE) if self.said else tr("The engine ended.")
         self.failed.emit(reason)
 
     def ask(

@@ -308,8 +308,8 @@ class SemsigDock(QgsDockWidget):
 
     def _take(self, number: int) -> None:
         """Take an object away."""
-        marks = [Mark(one.kind, one.bearing) for one in self.wheel.marks]
-        self.wheel.show_marks(marks[:number] + marks[number + 1 :])
+        kept = (one for place, one in enumerate(self.wheel.marks) if place != number)
+        self.wheel.show_marks([Mark(one.kind, one.bearing) for one in kept])
 
     def start_anew(self) -> None:
         """Compose another view."""

@@ -56,6 +56,14 @@ TOLD = re.compile(r"python (\d+) (\d+) (True|False)")
 TAG = re.compile(r"-cp3(\d+)-cp3\d+-")
 FOUND = re.compile(r"(?:Collecting|Processing) (\S+)")
 INSTALLING = "Installing collected packages: "
+UNREACHED = {
+    "ProxyError": "the proxy cannot be reached, or refuses",
+    "SSLError": "the package index has no certificate that is trusted",
+    "NewConnectionError": "the package index cannot be reached",
+    "ConnectTimeoutError": "the package index cannot be reached",
+    "NameResolutionError": "the package index cannot be reached",
+}
+"""What pip's warnings say of the network."""
 # Packages that pip looks for before it installs them, for the bar of progress.
 USUAL = 76
 # Percent of the work when the environment is there, when all is found, and when all is installed.
@@ -235,13 +243,21 @@ class _Step:
 
         code = run_program(command, self.environment, listen, cancelled)
         if code != 0:
-            errors = [line[7:] for line in said if line.startswith("ERROR: ")]
-            reason = (errors or said or [f"exit code {code}"])[0 if errors else -1].rstrip(".")
+            reason = _reason(said) or f"exit code {code}"
             message = (
                 f"{failure}: {reason}; see the log, check the network, the proxy or the folder of "
                 f"wheels in {SETTINGS}, and press Install again."
             )
             raise CommandError(message)
+
+
+def _reason(said: list[str]) -> str:
+    """Return why a program failed by what it said; pip tells of the network in warnings alone."""
+    for sign, reason in UNREACHED.items():
+        if any(sign in line for line in said):
+            return reason
+    errors = [line[7:] for line in said if line.startswith("ERROR: ")]
+    return (errors[:1] or said[-1:] or [""])[0].rstrip(".")
 
 
 class _Packages:

@@ -121,6 +121,9 @@ def test_what_fails_or_is_cancelled_leaves_what_was_there(engine: Engine, tmp_pa
             install(engine, slow, until="Processing")
         assert engine.command == before
         assert len([*engine.root.glob("?")]) == there
+    warned = "echo \"WARNING: Retrying after ProxyError('refused')\"; echo 'ERROR: None.'; exit 1"
+    with refused(CommandError, "the proxy cannot be reached, or refuses;"):
+        install(engine, Wishes(python(tmp_path / "proxy", pip=warned)))
     (engine.root / "engine.json").write_text("{}")
     assert engine.command == ""
 
