@@ -72,10 +72,12 @@ def install_engine() -> None:
     picture("1_engine_missing")
     dialog.wheels.setFilePath(STORY["wheels"])
     dialog.install.click()
-    wait(lambda: dialog.bar.value() > 20)
+    wait(lambda: dialog.bar.value() > 20 or dialog.task is None)
     picture("2_engine_under_way")
     wait(lambda: dialog.task is None)
     picture("3_engine_ready")
+    if not dialog.remove.isEnabled():
+        raise RuntimeError(dialog.stage.text())
     dialog.hide()
 
 
