@@ -30,7 +30,7 @@ from semsig_gis.sources.catalog import data_folder, load_catalog
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from conftest import Done
+    from conftest import Done, Run
 
 README = Path(__file__).parents[2] / "data_sources" / "README.md"
 TAGS: list[dict[str, str]] = [
@@ -228,6 +228,7 @@ def test_a_row_is_what_happens(
     command: str,
     make: Callable[[Path, Server], str | None],
     done: Done,
+    run: Run,
     server: Server,
     moved: Callable[[str, str], None],
     tmp_path: Path,
@@ -242,7 +243,12 @@ def test_a_row_is_what_happens(
         moved(name, address or server.url)
     if "draft.toml" in command:
         (tmp_path / "draft.toml").write_text(done("draft trees.gpkg"), "utf-8")
-    report = json.loads(done(f"{command} --out objects.parquet --json"))
+    code, out, told = run(f"{command} --out objects.parquet --json")
+    assert code == 0, told
+    if verb == "fetch" and not name.endswith(".toml"):
+        catalog = load_catalog(name)
+        assert any(spec.terms in told for spec in catalog.layers)  # the licence of what is sent
+    report = json.loads(out)
     cells = (source, f"`semsig {command}`", f"{report['objects']}", written(command, tmp_path))
     row = f"| {' | '.join(cells)} |"
     text = README.read_text("utf-8")
