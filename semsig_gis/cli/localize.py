@@ -32,14 +32,13 @@ from semsig_gis.cli.options import (
     Top,
     command,
     seen_north,
-    with_unplaced,
 )
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
 from semsig_gis.core.method import LIKELIHOOD
 from semsig_gis.core.terminal import percent
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from semsig_gis.core.view import View
     from semsig_gis.database.answer import Answer, Locator
@@ -176,15 +175,19 @@ def localize(options: LocalizeOptions) -> None:
 
     if options.queries is None:
         query = options.query(city.dataset, others=", or --queries")
-        unplaced = options.unplaced(city.dataset)
-        if unplaced and method is not None:
+        unplaced, absent = options.unplaced(city.dataset)
+        if (unplaced or absent) and method is not None:
+            what = "objects without a direction beside others" if unplaced else "what is not there"
             msg = (
-                f"{options.seen!r} has objects without a direction beside others, which the method "
-                f"{options.ranking!r} cannot take; give all of them one, or none, or leave out the "
-                "method."
+                f"{options.seen!r} has {what}, which the method {options.ranking!r} cannot take; "
+                "give directions to all objects or to none, or leave out the method."
             )
             raise InputError(msg)
-        locator = _locator(options, city, method, north, query=query, unplaced=unplaced)
+        locator: Any = _locator(options, city, method, north)
+        if method is None:
+            from semsig_gis.likelihood.questions import with_unplaced
+
+            locator = with_unplaced(locator, query, unplaced, absent=absent)
         _answer(options, city, locator, query)
         return
     queries = options.read_queries(city.dataset)
@@ -192,19 +195,12 @@ def localize(options: LocalizeOptions) -> None:
 
 
 def _locator(
-    options: LocalizeOptions,
-    city: City,
-    method: Method | None,
-    north: North,
-    *,
-    query: View | None = None,
-    unplaced: Sequence[int] = (),
+    options: LocalizeOptions, city: City, method: Method | None, north: North
 ) -> Locator[Any]:
-    """Return what answers the queries; `unplaced` was seen beside the one query."""
+    """Return what answers the queries."""
     if method is not None:
         return _distance_locator(options, city, method, north)
-    locator = options.locator(city, north, top=options.top, explain=options.explain)
-    return locator if query is None else with_unplaced(locator, query, unplaced)
+    return options.locator(city, north, top=options.top, explain=options.explain)
 
 
 def _distance_locator(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
@@ -14,7 +14,7 @@ from semsig_gis.cli.console import Database, app, numbers, remark
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -168,7 +168,7 @@ class QueryOptions:
         str | None,
         typer.Argument(
             help="What was seen, clockwise from north: symbols such as DDBL, or words, as 'bench "
-            "at 40, lamp at 80 within 12 m, bus stop 20 left far'."
+            "at 40, lamp at 80 within 12 m, bus stop 20 left far, no hydrant'."
         ),
     ] = None
     types: Annotated[
@@ -221,38 +221,30 @@ class QueryOptions:
             )
             raise InputError(msg)
         if self.seen is not None:
-            if self.types is not None:
+            words = unplaced_parts(self.seen)[0]
+            if self.types is not None and words:
                 msg = f"{self.seen!r} was given with --types; tell what was seen in one way."
                 raise InputError(msg)
-            told |= said_row(unplaced_parts(self.seen)[0], taxonomy)
+            told |= said_row(words, taxonomy) if words else {}
         return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
 
-    def unplaced(self, dataset: SignatureDatabase | PartitionedDatabase) -> list[int]:
-        """Return the class codes of what was seen in a direction that nobody tells."""
+    def unplaced(
+        self, dataset: SignatureDatabase | PartitionedDatabase
+    ) -> tuple[list[int], list[int]]:
+        """Return the class codes of what was seen in no known direction, and was not seen."""
         from semsig_gis.database.observation import unplaced_parts
 
-        if self.seen is None or not (words := unplaced_parts(self.seen)[1]):
-            return []
+        if self.seen is None:
+            return [], []
+        seen, absent = unplaced_parts(self.seen)[1:]
+        if not seen and not absent:
+            return [], []
         from semsig_gis.objects.keywords import class_code
 
-        return [class_code(word, dataset.taxonomy) for word in words]
-
-
-def with_unplaced(
-    locator: LikelihoodLocator, query: View, unplaced: Sequence[int]
-) -> LikelihoodLocator:
-    """Return what answers a query beside which objects were seen that nobody knows where."""
-    if not unplaced:
-        return locator
-    from semsig_gis.likelihood.questions import unplaced_prior
-
-    titles = [locator.index.database.taxonomy.by_code(code).title.lower() for code in unplaced]
-    prior = unplaced_prior(locator.index, query, unplaced)
-    return replace(
-        locator,
-        log_prior=prior if locator.log_prior is None else locator.log_prior + prior,
-        known={**locator.known, "seen": titles},
-    )
+        taxonomy = dataset.taxonomy
+        return [class_code(word, taxonomy) for word in seen], [
+            class_code(word, taxonomy) for word in absent
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from semsig_gis.cli.console import AsJson, print_json, print_rows, progress, say
 from semsig_gis.cli.localize import print_place, print_query
-from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north, with_unplaced
+from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north
 from semsig_gis.core.terminal import percent
 
 
@@ -21,18 +21,19 @@ class SuggestOptions(SearchOptions, QueryOptions):
 def suggest(options: SuggestOptions) -> None:
     """Suggest what to look for next, what tells most first."""
     from semsig_gis.database.city import open_city
-    from semsig_gis.likelihood.questions import next_questions
+    from semsig_gis.likelihood.questions import next_questions, with_unplaced
 
     city = open_city(options.database)
     north = seen_north(city, options.north, options.date)
     query = options.query(city.dataset)
-    unplaced = options.unplaced(city.dataset)
-    locator = with_unplaced(options.locator(city, north), query, unplaced)
+    unplaced, absent = options.unplaced(city.dataset)
+    locator = with_unplaced(options.locator(city, north), query, unplaced, absent=absent)
     with progress("answering"):
         location = locator.locate(query)
     answer = location.to_dict()
     questions = [
-        one.to_dict() for one in next_questions(locator.index, location, unplaced=unplaced)
+        one.to_dict()
+        for one in next_questions(locator.index, location, unplaced=unplaced, absent=absent)
     ]
     if options.as_json:
         shared = ("query", "prior", "answered", "place", "region", "notes")

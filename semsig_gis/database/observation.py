@@ -50,6 +50,7 @@ _PLACED = re.compile(
     )(?:\s+(?P<range>.*\S))?""",
     re.VERBOSE | re.IGNORECASE,
 )
+_ABSENT = re.compile(r"no\s+(?:other\s+)?(\S.*)", re.IGNORECASE)
 _METRES = re.compile(
     rf"(?P<within>within\s+)?(?:about\s+|~\s*)?(?P<metres>{_NUMBER})\s*(?:m|met(?:re|er)s?)?"
     r"(?:\s+away)?",
@@ -236,19 +237,23 @@ def _columns(items: Sequence[Row], told: Row, taxonomy: Taxonomy) -> Row:
     return columns
 
 
-def unplaced_parts(text: str) -> tuple[str, list[str]]:
-    """Return a sentence without the objects that have no direction while others do, and these.
+def unplaced_parts(text: str) -> tuple[str, list[str], list[str]]:
+    """Return a sentence of objects with directions, what else was seen, and what was not.
 
-    >>> unplaced_parts("bench at 40, bus stop, lamp at 80")
-    ('bench at 40, lamp at 80', ['bus stop'])
+    Where no object has a direction, all stay in the sentence.
+
+    >>> unplaced_parts("bench at 40, bus stop, lamp at 80, no hydrant")
+    ('bench at 40, lamp at 80', ['bus stop'], ['hydrant'])
     >>> unplaced_parts("bench, lamp")
-    ('bench, lamp', [])
+    ('bench, lamp', [], [])
     """
     parts = _parts(text)
-    placed = [part for part in parts if _PLACED.fullmatch(part)]
+    absent = [match[1] for part in parts if (match := _ABSENT.fullmatch(part))]
+    seen = [part for part in parts if not _ABSENT.fullmatch(part)]
+    placed = [part for part in seen if _PLACED.fullmatch(part)]
     if not placed:
-        return text, []
-    return ", ".join(placed), [part for part in parts if part not in placed]
+        return ", ".join(seen), [], absent
+    return ", ".join(placed), [part for part in seen if part not in placed], absent
 
 
 def _parts(text: str) -> list[str]:

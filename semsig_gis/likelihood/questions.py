@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,11 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import ObjectClass
     from semsig_gis.likelihood.index import LikelihoodIndex
-    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.likelihood.locate import LikelihoodLocator, Location
+
+
+LOOKED_FOR = 0.95
+"""Chance that an object is seen by someone who was asked for it, at the least."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +78,11 @@ class ClassQuestion:
 
 
 def next_questions(
-    index: LikelihoodIndex, location: Location, *, unplaced: Sequence[int] = ()
+    index: LikelihoodIndex,
+    location: Location,
+    *,
+    unplaced: Sequence[int] = (),
+    absent: Sequence[int] = (),
 ) -> tuple[ClassQuestion, ...]:
     """Return what to look for next, what is expected to tell most first.
 
@@ -86,11 +94,13 @@ def next_questions(
         The answer so far.
     unplaced : sequence of int, optional
         Class codes of objects that were seen beside the query (see `unplaced_prior`).
+    absent : sequence of int, optional
+        Class codes of what was looked for already, and is not there.
 
     Returns
     -------
     tuple of ClassQuestion
-        One for each class that some cell sees.
+        One for each class that some cell sees, and that was not looked for.
 
     Notes
     -----
@@ -113,7 +123,9 @@ def next_questions(
     seen = _counts(location.query, unplaced)
     found = []
     for code in table.codes.tolist():
-        yes = _yes(index, code, seen[code])
+        if code in absent:
+            continue
+        yes = _yes(index, code, seen[code], least=LOOKED_FOR)
         chance = float(weights @ yes)
         item = database.taxonomy.by_code(code)
         found.append(
@@ -129,9 +141,13 @@ def next_questions(
 
 
 def unplaced_prior(
-    index: LikelihoodIndex, query: Signature, unplaced: Sequence[int]
+    index: LikelihoodIndex,
+    query: Signature,
+    unplaced: Sequence[int] = (),
+    *,
+    absent: Sequence[int] = (),
 ) -> NDArray[np.float64]:
-    """Return what objects tell of the place that were seen in a direction that nobody knows.
+    """Return what objects tell of the place that were seen nobody knows where, or nowhere.
 
     Parameters
     ----------
@@ -141,11 +157,14 @@ def unplaced_prior(
         What was seen, and where.
     unplaced : sequence of int
         Class codes of what was seen beside it.
+    absent : sequence of int, optional
+        Class codes of which none was seen beside all these, though it was looked for.
 
     Returns
     -------
     ndarray of float64, shape (n,)
-        Log-prior by cell: each of them is a question of `next_questions` that was answered yes.
+        Log-prior by cell: each is a question of `next_questions` that was answered with yes, or
+        with no.
 
     Examples
     --------
@@ -162,7 +181,37 @@ def unplaced_prior(
         if code in index.table.codes:  # a class that no cell sees is false wherever it was seen
             weights *= _yes(index, code, seen[code])
         seen[code] += 1
+    for code in absent:
+        if code in index.table.codes:
+            weights *= 1.0 - _yes(index, code, seen[code], least=LOOKED_FOR)
     return weight_prior(database, weights[database.type_sequences.inverse])
+
+
+def with_unplaced(
+    locator: LikelihoodLocator,
+    query: Signature,
+    unplaced: Sequence[int] = (),
+    *,
+    absent: Sequence[int] = (),
+) -> LikelihoodLocator:
+    """Return what answers a query given what was seen beside it, as `unplaced_prior` has it."""
+    if not unplaced and not absent:
+        return locator
+    by_code = locator.index.database.taxonomy.by_code
+    told = {"seen": unplaced, "absent": absent}
+    prior = unplaced_prior(locator.index, query, unplaced, absent=absent)
+    return replace(
+        locator,
+        log_prior=prior if locator.log_prior is None else locator.log_prior + prior,
+        known={
+            **locator.known,
+            **{
+                name: [by_code(code).title.lower() for code in codes]
+                for name, codes in told.items()
+                if codes
+            },
+        },
+    )
 
 
 def _counts(query: Signature, unplaced: Sequence[int] = ()) -> Counter[int]:
@@ -170,12 +219,18 @@ def _counts(query: Signature, unplaced: Sequence[int] = ()) -> Counter[int]:
     return Counter([*([] if query.codes is None else query.codes.tolist()), *unplaced])
 
 
-def _yes(index: LikelihoodIndex, code: int, seen: int) -> NDArray[np.float64]:
-    """Return the chance by type sequence that one more than so many of a class are seen."""
+def _yes(
+    index: LikelihoodIndex, code: int, seen: int, *, least: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the chance by type sequence that one more than so many of a class are seen.
+
+    What is there is detected with a chance of at least so much.
+    """
     table, types = index.table, index.database.type_sequences
     row = int(np.flatnonzero(table.codes == code)[0])
     false = 1.0 - math.exp(-float(table.clutter[row]))
-    detected = 1.0 - (1.0 - table.detected[table.length_rows(types.lengths), row]) * (1.0 - false)
+    detected = np.maximum(table.detected[table.length_rows(types.lengths), row], least)
+    detected = 1.0 - (1.0 - detected) * (1.0 - false)
     return np.where(types.histogram[:, code] > seen, detected, false)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import wrap_degrees
 from semsig_gis.core.view import View
 from semsig_gis.database.observation import parse_view
@@ -45,8 +45,9 @@ class Question:
     """Views of one or several places, and how they are to be answered.
 
     `views` has one view for each place, `marks` which mark each of its objects is, and `legs` the
-    ways between the places. `shown` is the place that is asked for. A `quick` answer is by cells
-    alone.
+    ways between the places. `shown` is the place that is asked for. Of the classes that are
+    `absent`, by code, none was seen from the first place beside what is marked. A `quick` answer is
+    by cells alone.
     """
 
     views: tuple[View, ...]
@@ -57,6 +58,7 @@ class Question:
     seen_from: SeenFrom
     noise: object
     truth: tuple[float, float] | None
+    absent: tuple[int, ...] = ()
     quick: bool = False
 
     @classmethod
@@ -96,6 +98,7 @@ class Question:
             seen_from=seen_from,
             noise=body.get("noise"),
             truth=None if truth is None else degrees(truth),
+            absent=_codes(body.get("absent") or [], taxonomy),
             quick=body.get("quick") is True,
         )
 
@@ -112,12 +115,13 @@ class Question:
         words = ["semsig", "localize" if len(rows) == 1 else "route", *options]
         words += ["--on-grid"] if self.seen_from == "cells" else []
         words += ["--top", str(self.top)] if self.top != 10 else []  # noqa: PLR2004 - its default
+        absent = ", ".join(f"no {taxonomy.by_code(code).title.lower()}" for code in self.absent)
         plain = _options(rows[0]) if len(rows) == 1 else None
         if plain is not None:
-            return shlex.join([*words, *plain])
+            return shlex.join([*words, *([absent] if absent else []), *plain])
         lines = shlex.join(["printf", "%s\\n", *map(json.dumps, rows)])
         words += ["--queries", "-"] if len(rows) == 1 else ["-", "--json"]
-        return f"{lines} | {shlex.join(words)}"
+        return f"{lines} | {shlex.join(words)}" + (f"  # without: {absent}" if absent else "")
 
 
 def degrees(told: object) -> tuple[float, float]:
@@ -295,6 +299,19 @@ def _options(row: Mapping[str, Any]) -> list[str] | None:
     if "heading_error" in row:
         words += ["--heading", str(row["heading_error"] or "known")]
     return words
+
+
+def _codes(told: object, taxonomy: Taxonomy) -> tuple[int, ...]:
+    """Return the codes of some classes, by name."""
+    codes = {item.name: item.code for item in taxonomy.classes}
+    if not isinstance(told, list) or not all(isinstance(name, str) for name in told):
+        msg = f"absent was given as {str(told)[:60]!r}; give a list of names of classes."
+        raise InputError(msg)
+    for name in told:
+        if name not in codes:
+            msg = f"{name!r} is no class of this city{nearest_name(name, codes)}."
+            raise UnknownNameError(msg)
+    return tuple(dict.fromkeys(codes[name] for name in told))
 
 
 def _mapping(told: object, what: str) -> Mapping[str, Any]:

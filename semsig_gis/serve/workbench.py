@@ -24,7 +24,7 @@ from semsig_gis.exports import export_answer
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
-from semsig_gis.likelihood.questions import next_questions
+from semsig_gis.likelihood.questions import next_questions, with_unplaced
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
 from semsig_gis.maps.parts import (
@@ -321,7 +321,8 @@ class Workbench:
                 store=self.store,
                 refined=None if question.seen_from == "anywhere" else False,
             )
-        locator = replace(self._locators[key], top=question.top, explained=question.top)
+        locator = with_unplaced(self._locators[key], question.views[0], absent=question.absent)
+        locator = replace(locator, top=question.top, explained=question.top)
         if self._is_quick(question):
             return replace(locator, refined=False, explained=QUICKLY_EXPLAINED)
         return locator
@@ -335,16 +336,16 @@ class Workbench:
         question = Question.parse(told, taxonomy=self.taxonomy, radius=self.database.spec.radius)
         rows = question.rows(self.taxonomy)
         setting = self._noise(question), question.seen_from
-        key = rows, *setting, question.top, self._is_quick(question)
+        key = rows, *setting, question.absent, question.top, self._is_quick(question)
         if self._last is None or self._last[0] != key:
             locator = self._locator(question)
             # Views that did not change are not compared with the city again.
-            names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in question.views]
-            self._scores = {
-                name: self._scores.get(name) or locator.scores(view)
-                for name, view in zip(names, question.views, strict=True)
-            }
-            scores = [self._scores[name] for name in names]
+            before, self._scores, scores = self._scores, {}, []
+            for number, view in enumerate(question.views):
+                absent, prior = ((), None) if number else (question.absent, locator.log_prior)
+                name = json.dumps([*setting, absent, view.to_dict(self.taxonomy)])
+                self._scores[name] = before.get(name) or locator.scores(view, prior)
+                scores.append(self._scores[name])
             if question.legs:
                 locations = locator.locate_route(question.views, question.legs, scores=scores)
             else:
@@ -355,7 +356,8 @@ class Workbench:
     def suggest(self, told: object) -> list[dict[str, Any]]:
         """Return what to look for next, what is expected to tell most first."""
         question, location = self._located(told)
-        questions = next_questions(self._locator(question).index, location)
+        index = self._locator(question).index
+        questions = next_questions(index, location, absent=question.absent)
         return [one.to_dict() for one in questions]
 
     def cell(self, told: Mapping[str, Any]) -> dict[str, Any]:

@@ -26,7 +26,8 @@ semsig.Session = class extends EventTarget {
   // A view is of one place: of photos, or a compass. A scene is one of either.
   clear() {
     Object.assign(this, {
-      views: [], scene: null, mark: null, answer: null, truth: null, chosen: 0, changedAt: 0});
+      views: [], scene: null, mark: null, answer: null, truth: null, chosen: 0, changedAt: 0,
+      absent: []});
   }
   get scenes() {
     return this.views.flatMap((view) => view.photos || [view]);
@@ -81,7 +82,8 @@ semsig.Session = class extends EventTarget {
     const view = this.scene ? views.findIndex((_, at) => this.views[at] === this.viewOf(this.scene))
       : null;
     return {
-      views, view, top: 10, seen_from: this.seenFrom, noise: this.noise, truth: this.truth};
+      views, view, top: 10, seen_from: this.seenFrom, noise: this.noise, truth: this.truth,
+      absent: this.absent};
   }
   // One request at a time; what changes meanwhile is asked next, so that the last one wins.
   async ask() {
@@ -133,7 +135,8 @@ semsig.Session = class extends EventTarget {
     }
     this.clear();
     Object.assign(this, {
-      views: saved.views, truth: saved.truth, noise: saved.noise, seenFrom: saved.seen_from});
+      views: saved.views, truth: saved.truth, noise: saved.noise, seenFrom: saved.seen_from,
+      absent: saved.absent || []});
     this.show(this.scenes[0] ?? null);
     this.changed();
   }

@@ -212,7 +212,20 @@ semsig.suggest = (session) => {
     clearTimeout(waiting);
     const {answer} = session;
     line.replaceChildren();
-    if (!answer?.estimate) return;
+    // What was looked for counts where the first photo was taken.
+    const first = session.scene && session.viewOf(session.scene) === session.views[0];
+    const tell = (absent) => {
+      session.absent = absent;
+      session.changed();
+    };
+    const listed = L.DomUtil.create("span", "absent", line);
+    for (const name of session.absent) {
+      const {title} = session.city.classes.find((item) => item.name === name);
+      semsig.button(listed, `No ${title.toLowerCase()} \u00d7`,
+        () => tell(session.absent.filter((other) => other !== name)),
+        `Forget that no ${title.toLowerCase()} is there`);
+    }
+    if (!answer?.estimate || answer.quick) return;
     // After a pause, so that the next answer need not wait.
     waiting = setTimeout(async () => {
       let offers = [];
@@ -222,7 +235,7 @@ semsig.suggest = (session) => {
         return;  // the answer says what is wrong
       }
       const ask = ([one, ...others]) => {
-        line.replaceChildren();
+        line.replaceChildren(listed);
         if (!one || session.answer !== answer) return;
         semsig.text(line, "b", one.question);
         semsig.button(line, "Yes, I mark it", () => {
@@ -230,8 +243,8 @@ semsig.suggest = (session) => {
           semsig.rename(session, one.class);
           semsig.showScene(session);
         });
-        if (others.length) semsig.button(line, "No, ask another", () => ask(others));
-        semsig.text(line, "small", "What could be seen and is not marked already counts as less likely there.");
+        if (first) semsig.button(line, "No", () => tell([...session.absent, one.class]));
+        if (others.length) semsig.button(line, "Ask another", () => ask(others));
       };
       ask(offers);
     }, 400);
