@@ -60,8 +60,9 @@ class WorkbenchPage:
         """Return the text of the first such element, shown or not."""
         return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
 
-    def press(self, selector: str) -> str:
-        self.one(selector).click()
+    def press(self, selector: str, text: str = "") -> str:
+        """Click the first such element, or the first with a text."""
+        next(one for one in self.all(selector) if text in ("", one.text)).click()
         return self.settle()
 
     def choose(self, selector: str, value: str) -> str:

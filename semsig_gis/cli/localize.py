@@ -200,7 +200,9 @@ def _locator(
     """Return what answers the queries."""
     if method is not None:
         return _distance_locator(options, city, method, north)
-    return options.locator(city, north, top=options.top, explain=options.explain)
+    usual = options.usual_noise(city.dataset.taxonomy)
+    top, explain = options.top, options.explain
+    return options.locator(city, north, usual_noise=usual, top=top, explain=explain)
 
 
 def _distance_locator(
@@ -353,8 +355,10 @@ def print_query(result: dict[str, Any]) -> None:
         )
         of = f" of photo {number + 1}" if len(photos) > 1 else ""
         say(f"Seen{of}: {seen}{looked}{north}.")
-    if unplaced := (result.get("prior") or {}).get("seen"):
-        say(f"Seen somewhere: {', '.join(unplaced)}.")
+    known = result.get("prior") or {}
+    for name, said in (("seen", "Seen somewhere"), ("absent", "Not there")):
+        if titles := known.get(name):
+            say(f"{said}: {', '.join(titles)}.")
 
 
 def _object_text(query: dict[str, Any], row: int) -> str:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.core.view import View
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
@@ -228,6 +229,13 @@ class QueryOptions:
             told |= said_row(words, taxonomy) if words else {}
         return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
 
+    def usual_noise(self, taxonomy: Taxonomy) -> str:
+        """Return the noise of what was seen: a person who says it in words leaves much out."""
+        from semsig_gis.database.observation import said_row, unplaced_parts
+
+        words = "" if self.seen is None else unplaced_parts(self.seen)[0]
+        return "by-hand" if words and "see" in said_row(words, taxonomy) else "generic"
+
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase
     ) -> tuple[list[int], list[int]]:
@@ -255,7 +263,15 @@ class SearchOptions:
         str | None,
         typer.Option(help="What a cell must see: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
     ] = None
-    noise: NoiseName = "generic"
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="How the detector fails, or a person: light, medium, strong, generic (any of "
+            "them), by-hand, or a file written by `semsig learn`.  [default: by-hand for what is "
+            "said in words, else generic]",
+            show_default=False,
+        ),
+    ] = None
     map_age: MapAge = 0.0
     drift_report: DriftReport = None
     heading: Heading = "known"
@@ -285,9 +301,18 @@ class SearchOptions:
     objects: Objects = None
 
     def locator(
-        self, city: City, north: North | None = None, *, top: int = 1, explain: bool = False
+        self,
+        city: City,
+        north: North | None = None,
+        *,
+        usual_noise: str = "generic",
+        top: int = 1,
+        explain: bool = False,
     ) -> LikelihoodLocator:
-        """Return what answers queries by likelihood, whose bearings count from a north."""
+        """Return what answers queries by likelihood, whose bearings count from a north.
+
+        The noise is the `usual_noise` unless another one was asked for.
+        """
         from semsig_gis.database.north import GRID_NORTH
         from semsig_gis.likelihood.index import build_index
         from semsig_gis.likelihood.locate import LikelihoodLocator
@@ -311,7 +336,10 @@ class SearchOptions:
         sigma = _north_sigma(self.heading)
         rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
         noise = read_noise(
-            self.noise, city.database, map_age=self.map_age, drift_report=self.drift_report
+            self.noise or usual_noise,
+            city.database,
+            map_age=self.map_age,
+            drift_report=self.drift_report,
         )
         if not self.on_grid:
             noise = cell_noise(noise, city.database.grid.step)

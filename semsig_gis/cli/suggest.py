@@ -27,7 +27,12 @@ def suggest(options: SuggestOptions) -> None:
     north = seen_north(city, options.north, options.date)
     query = options.query(city.dataset)
     unplaced, absent = options.unplaced(city.dataset)
-    locator = with_unplaced(options.locator(city, north), query, unplaced, absent=absent)
+    locator = with_unplaced(
+        options.locator(city, north, usual_noise=options.usual_noise(city.dataset.taxonomy)),
+        query,
+        unplaced,
+        absent=absent,
+    )
     with progress("answering"):
         location = locator.locate(query)
     answer = location.to_dict()

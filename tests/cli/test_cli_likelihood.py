@@ -246,13 +246,19 @@ def test_what_was_seen_is_said_without_an_option(city: Path, run: Run) -> None:
     assert symbols == json.loads(run(*asked, *options(SEEN))[1])
     names = [CITY.taxonomy.by_symbol(symbol).name for symbol in SEEN["types"]]
     words = [f"{name} at {at}" for name, at in zip(names, SEEN["bearings"], strict=True)]
-    said = json.loads(run(*asked, ", ".join(words))[1])
+    said = json.loads(run(*asked, ", ".join(words), "--noise", "generic")[1])
     assert said["candidates"] == symbols["candidates"]
+    # Who says it in words leaves something out.
+    assert json.loads(run(*asked, ", ".join(words))[1])["noise"] == "by-hand"
     # The last one in a direction that nobody knows: cells that see it are likelier for it.
     code, out, _ = run("localize", city, ", ".join([*words[:-1], names[-1]]))
     assert code == 0
     title = CITY.taxonomy.by_symbol(SEEN["types"][-1]).title.lower()
     assert f"Seen somewhere: {title}." in out
+    # What is not there is told, too, beside symbols as well.
+    code, out, _ = run("localize", city, "no bench", *options(SEEN))
+    assert (code, "Not there: bench." in out) == (0, True)
+    sentence(run("localize", city, "no bench", *options(SEEN), "--paper"), "what is not there")
     mixed = run("localize", city, ", ".join([*words[:-1], names[-1]]), "--paper")
     sentence(mixed, "without a direction", "'edit+edit:5%'")
 

@@ -234,8 +234,18 @@ def test_what_would_tell_most_is_asked_next(
     shown.mark(photos[0], 0)
     first = shown.question()
     assert re.fullmatch(r"Is there an?(other)? .* within 30 m\?", first)
-    shown.press("#question button:nth-of-type(2)")
-    assert shown.question() != first
+    shown.press("#question button", "Ask another")
+    second = shown.question()
+    assert second != first
+    before = shown.ask("return semsig.session.answer.places_left")
+    shown.press("#question button", "No")
+    assert shown.question() != second
+    (told,) = shown.all("#question .absent button")
+    assert told.text.startswith("No ")
+    assert shown.ask("return semsig.session.answer.places_left") < before
+    told.click()
+    shown.settle()
+    assert shown.ask("return semsig.session.absent") == []
     # A question that cannot be had is not asked; the answer stands.
     shown.ask(
         "const own = window.fetch; window.fetch = (path, ...more) => { window.asked = path;"
@@ -248,7 +258,7 @@ def test_what_would_tell_most_is_asked_next(
     shown.ask("restored()")
     shown.mark(photos[0], 2)
     shown.question()
-    shown.press("#question button:nth-of-type(1)")
+    shown.press("#question button", "Yes, I mark it")
     assert shown.ask("return semsig.session.brush") in shown.ask(
         "return semsig.session.city.classes.map((one) => one.name)"
     )
