@@ -407,14 +407,13 @@ def test_a_file_that_is_no_session_of_this_city_is_refused(
     shown: WorkbenchPage, tmp_path: Path
 ) -> None:
     session = shown.ask("return semsig.session.saved()")
-    for number, (change, word) in enumerate(
-        (
-            (None, "no session"),
-            ({"version": 2}, "no session"),
-            ({"views": [{"photos": [{}]}]}, "no session"),
-            ({"city": {"name": "elsewhere", "fingerprint": "0"}}, "elsewhere"),
-        )
-    ):
+    changes: list[tuple[dict[str, Any] | None, str]] = [
+        (None, "no session"),
+        ({"version": 2}, "no session"),
+        ({"views": [{"photos": [{}]}]}, "no session"),
+        ({"city": {"name": "elsewhere", "fingerprint": "0"}}, "elsewhere"),
+    ]
+    for number, (change, word) in enumerate(changes):
         file = tmp_path / f"session{number}.json"
         text = "{" if change is None else json.dumps({**session, **change})
         file.write_text(text, encoding="utf-8")
