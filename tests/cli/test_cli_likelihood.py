@@ -257,7 +257,7 @@ def test_what_was_seen_is_said_without_an_option(city: Path, run: Run) -> None:
     assert f"Seen somewhere: {title}." in out
     # What is not there is told, too, beside symbols as well.
     code, out, _ = run("localize", city, "no bench", *options(SEEN))
-    assert (code, "Not there: bench." in out) == (0, True)
+    assert (code, "Not there: public bench." in out) == (0, True)
     sentence(run("localize", city, "no bench", *options(SEEN), "--paper"), "what is not there")
     mixed = run("localize", city, ", ".join([*words[:-1], names[-1]]), "--paper")
     sentence(mixed, "without a direction", "'edit+edit:5%'")
