@@ -35,7 +35,7 @@ FOLDERS = ("a", "b")
 PROGRAMS = ("python3.13", "python3.12", "python3.11", "python3.14", "python3", "python")
 PYTHONS = (
     "/usr/local/bin",
-    "/opt/homebrew/bin",
+    "/opt/*/bin",
     "/Library/Frameworks/Python.framework/Versions/3.*/bin",
     "~/.local/bin",
     "~/.pyenv/versions/3.*/bin",
