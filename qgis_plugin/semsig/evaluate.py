@@ -24,6 +24,7 @@ from .algorithm import (
 )
 from .arguments import (
     DISTORTIONS,
+    LIKELIHOOD,
     METHOD_HELP,
     METHODS,
     NOISES,
@@ -145,7 +146,7 @@ map page for the eye.
                 queries=self.parameterAsInt(parameters, "QUERIES", context),
                 distortion=",".join(one for one in distortions if one),
                 method=method,
-                noise=noise,
+                noise=noise if method == LIKELIHOOD else "",
                 top=self.parameterAsInt(parameters, "TOP", context),
                 seed=self.parameterAsInt(parameters, "SEED", context),
             ),

@@ -43,7 +43,14 @@ from .answers import (
     parse_answer,
     place_row,
 )
-from .arguments import METHOD_HELP, METHODS, NOISES, command_line, require_likelihood
+from .arguments import (
+    LIKELIHOOD,
+    METHOD_HELP,
+    METHODS,
+    NOISES,
+    command_line,
+    require_likelihood,
+)
 
 if TYPE_CHECKING:
     from qgis.core import (
@@ -166,6 +173,9 @@ they rank cells by a distance, and cells that look the same share a rank.
         regions = str(self.parameterAsOutputLayer(parameters, "REGIONS", context) or "")
         method = self.text(parameters, "METHOD", context)
         heading = self.text(parameters, "HEADING", context)
+        noise = self.text(parameters, "NOISE", context)
+        if noise != NOISES[0]:
+            require_likelihood(method, "Detector")
         if heading == "uncertain":
             heading = str(self.parameterAsDouble(parameters, "HEADING_SIGMA", context))
         if self.sink_file(parameters, "PLACE", context):
@@ -178,8 +188,8 @@ they rank cells by a distance, and cells that look the same share a rank.
                 bearings=self.text(parameters, "BEARINGS", context),
                 method=method,
                 # The command refuses what its other methods do not have.
-                noise=self.text(parameters, "NOISE", context),
-                heading=heading,
+                noise=noise if method == LIKELIHOOD else "",
+                heading="" if heading == HEADINGS[0] else heading,
                 area=self.polygons(parameters, "AREA", context, feedback),
                 require=self.text(parameters, "REQUIRE", context),
                 top=self.parameterAsInt(parameters, "TOP", context),
