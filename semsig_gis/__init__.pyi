@@ -68,7 +68,11 @@ from .database.city import (
     save_with_store as save_with_store,
 )
 from .database.tiles import TileSpec as TileSpec, build_tiles as build_tiles
-from .database.update import update_database as update_database, update_file as update_file
+from .database.update import (
+    update_database as update_database,
+    update_file as update_file,
+    update_tiles as update_tiles,
+)
 from .database.views import ViewpointSpec as ViewpointSpec
 from .matching.method import Method as Method
 from .matching.scores import score_cells as score_cells

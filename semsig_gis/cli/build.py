@@ -177,6 +177,18 @@ def update(
         Path, typer.Option(help="New street objects; their layers replace those of the database.")
     ],
     out: Annotated[Path | None, typer.Option(help="Database to write; default: in place.")] = None,
+    before: Annotated[
+        Path | None,
+        typer.Option(help="Street objects that a database in tiles was built from."),
+    ] = None,
+    buildings: Annotated[
+        Path | None, typer.Option(help="Buildings that a database in tiles was built with.")
+    ] = None,
+    streets: Annotated[
+        Path | None, typer.Option(help="Streets that a database in tiles was built with.")
+    ] = None,
+    workers: Workers = 0,
+    scheduler: Scheduler = None,
     years: Annotated[
         float | None,
         typer.Option(
@@ -190,13 +202,39 @@ def update(
 ) -> None:
     """Apply changed street objects to a database."""
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.update import update_file
+    from semsig_gis.database.update import update_file, update_tiles
     from semsig_gis.objects.table import open_objects
 
-    keep_inputs(out, read=(objects,))
+    keep_inputs(out, read=(objects, before, buildings, streets))
     had_columns = open_city(database).has_columns
+    tiled = database.is_dir()
+    if tiled and before is None:
+        msg = (
+            f"{database} is a database in tiles, which holds no copy of its street objects; give "
+            "the file that it was built from with --before."
+        )
+        raise InputError(msg)
+    if not tiled and (before or buildings or streets or workers or scheduler):
+        msg = (
+            f"{database} is not in tiles, and has what it was built from beside it; leave out "
+            "--before, --buildings, --streets, --workers and --scheduler."
+        )
+        raise InputError(msg)
     with progress("updating") as advance:
-        report = update_file(database, open_objects(objects), out=out, progress=advance)
+        if before is None:
+            report = update_file(database, open_objects(objects), out=out, progress=advance)
+        else:
+            report = update_tiles(
+                database,
+                objects,
+                before=before,
+                out=out,
+                buildings=buildings,
+                streets=streets,
+                workers=workers,
+                scheduler=scheduler,
+                progress=advance,
+            )
     if had_columns:
         remark("the new database lacks the columns of semsig identify; run semsig identify again")
     for note in report.notes:

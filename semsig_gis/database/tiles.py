@@ -210,7 +210,7 @@ def build_tiles(
     True
     """
     check_workers(workers, scheduler)
-    with _in_files(objects, out, buildings=buildings, streets=streets) as surroundings:
+    with in_files(objects, out, buildings=buildings, streets=streets) as surroundings:
         plan = plan_tiles(
             objects,
             out,
@@ -221,13 +221,14 @@ def build_tiles(
             tell=tell,
             **surroundings,
         )
-        return _build_all(
+        parts = build_parts(
             plan, objects, workers=workers, scheduler=scheduler, progress=progress, tell=tell
         )
+        return publish(plan.folder, parts)
 
 
 @contextlib.contextmanager
-def _in_files(
+def in_files(
     objects: str | Path, out: str | Path, **tables: str | Path | gpd.GeoDataFrame | None
 ) -> Iterator[dict[str, Path]]:
     """Give the files of buildings and streets; tables are written to some beside the result.
@@ -251,7 +252,7 @@ def _in_files(
         yield files
 
 
-def _build_all(
+def build_parts(
     plan: TilePlan,
     objects: str | Path,
     *,
@@ -259,8 +260,8 @@ def _build_all(
     scheduler: str | None,
     progress: Callable[[int, int], None] | None,
     tell: Callable[[str], None] | None,
-) -> Manifest:
-    """Build the tiles of a plan that are not there yet, and put the database in its place."""
+) -> list[Part]:
+    """Build the tiles of a plan that are not there yet, and return all parts, ordered by tile."""
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
         done = finished_tiles(plan.folder, tiles)
@@ -301,7 +302,7 @@ def _build_all(
             "streets and the buildings."
         )
         raise EmptyResultError(msg)
-    return publish(plan.folder, parts)
+    return parts
 
 
 def _look_ahead(
@@ -387,7 +388,7 @@ def plan_tiles(
         "viewpoints": viewpoints.to_dict(),
         "occlusion": TOLERANCE_M if "buildings" in paths else None,
         "tile": {"cells": tile.cells(grid)},
-        "inputs": {name: _fingerprint(path) for name, path in paths.items()},
+        "inputs": {name: fingerprint(path) for name, path in paths.items()},
     }
     folder = begin(out, recipe)
     try:
@@ -412,7 +413,7 @@ def plan_tiles(
         raise
 
 
-def _fingerprint(path: Path) -> str:
+def fingerprint(path: Path) -> str:
     """Return the digest of a file, with its companions, or of a folder."""
     if path.is_dir():
         files = sorted(one for one in path.rglob("*") if one.is_file())

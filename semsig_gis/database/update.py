@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+from collections import Counter
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,25 +14,47 @@ from semsig_gis import __version__
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import SOURCE, cell_ids, cells_near
+from semsig_gis.core.parallel import check_workers
+from semsig_gis.core.ranges import MOST_METRES
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.terminal import percent
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city, save_with_store
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
+from semsig_gis.database.file import (
+    database_specs,
+    open_database,
+    part_files,
+    part_name,
+    read_manifest,
+    save_database,
+)
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
+from semsig_gis.database.tiles import (
+    EMPTY,
+    TileSpec,
+    build_parts,
+    fingerprint,
+    in_files,
+    plan_tiles,
+    publish,
+    touched_tiles,
+)
 from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import licenses_of
+from semsig_gis.objects.table import licenses_of, open_objects
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
+    from collections.abc import Callable, Iterable
 
+    import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.changes import ClassChange
+    from semsig_gis.database.file import Manifest, Part
+    from semsig_gis.database.tiles import Tile, TilePlan
+    from semsig_gis.objects.changes import ClassChange, ObjectChanges
     from semsig_gis.objects.table import StreetObjects
 
     _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
@@ -239,8 +264,7 @@ def update_database(
         )
         raise InputError(msg)
     changes = compare_objects(store.objects, merged)
-    places = np.concatenate([store.objects.xy[changes.gone], merged.xy[changes.come]])
-    codes = np.concatenate([store.objects.codes[changes.gone], merged.codes[changes.come]])
+    places, codes = _changed_places(store.objects, merged, changes)
     cells = _cells_in_range(new, places, codes)
     after = replace(store, objects=merged)
     stale = np.isin(database.cell_ids, cell_ids(*cells))
@@ -249,7 +273,7 @@ def update_database(
     if len(updated) == 0:
         msg = f"no cell would see any of the {len(merged):,} objects; look at the new objects."
         raise EmptyResultError(msg)
-    layers = {*store.objects.table[SOURCE].unique(), *merged.table[SOURCE].unique()}
+    layers = _layers(store.objects) | _layers(merged)
     drifted = compare_cells(database.select(stale), fresh)
     report = UpdateReport(
         classes=changes.classes,
@@ -264,6 +288,198 @@ def update_database(
         notes=notes,
     )
     return updated, after, report
+
+
+def update_tiles(
+    path: str | Path,
+    objects: str | Path,
+    *,
+    before: str | Path,
+    out: str | Path | None = None,
+    buildings: str | Path | gpd.GeoDataFrame | None = None,
+    streets: str | Path | gpd.GeoDataFrame | None = None,
+    workers: int = 0,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> UpdateReport:
+    """Update a database in tiles: those that see a change are built again, the others are kept.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder of the database.
+    objects : str or Path
+        The street objects as they are now, all layers, as `save_objects` wrote them.
+    before : str or Path
+        The street objects that the database was built from; it holds no copy of them.
+    out : str or Path, optional
+        Another folder to write to; `path` itself by default.
+    buildings, streets : str, Path or GeoDataFrame, optional
+        Those that the database was built with.
+    workers, scheduler : optional
+        As in `build_tiles`.
+    progress : callable, optional
+        Called with the number of tiles done and in all.
+
+    Returns
+    -------
+    UpdateReport
+        What changed. The folder holds what `build_tiles` would make of the new objects, byte for
+        byte.
+
+    Raises
+    ------
+    InputError
+        If a file is not the one that the database was built from, the new objects lack a layer, use
+        a class code for something else or are seen from another longest distance.
+    CrsError
+        If the new objects are in another CRS.
+    DatabaseError, EmptyResultError
+        As `build_tiles` does; the database is as it was then.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import build_tiles, save_objects
+    >>> fewer = replace(demo_objects, table=demo_objects.table[1:])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     old, new, town = f"{folder}/old.parquet", f"{folder}/new.parquet", f"{folder}/town"
+    ...     save_objects(demo_objects, old)
+    ...     save_objects(fewer, new)
+    ...     tiles = build_tiles(old, town)
+    ...     report = update_tiles(town, new, before=old)
+    >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
+    (1, True)
+    """
+    check_workers(workers, scheduler)
+    manifest, folder = read_manifest(path), Path(path)
+    files = dict(zip((part.tile for part in manifest.parts), part_files(path), strict=True))
+    first = open_database(next(iter(files.values()))).select(slice(0))
+    old, new = open_objects(before), open_objects(objects)
+    joined, kept, _ = replace_layers(old, new)
+    if kept:
+        msg = (
+            f"{objects} lacks the layers {', '.join(kept)} of {before}; load all layers of a "
+            "database in tiles into one file."
+        )
+        raise InputError(msg)
+    facts: dict[str, Any] = {
+        "taxonomy": new.taxonomy,
+        "licenses": (*map(str, new.licenses), *first.licenses[len(old.licenses) :]),
+        "version": __version__,
+        "notes": new.notes,
+    }
+    now = replace(first, **facts)
+    if now.reach != first.reach:  # the unit in which all distances are stored
+        msg = (
+            f"the longest visibility range of {objects} is {now.reach:g} m and that of {path} "
+            f"{first.reach:g} m, which concerns every cell; build the database again."
+        )
+        raise InputError(msg)
+    changes = compare_objects(old, joined)
+    places, codes = _changed_places(old, joined, changes)
+    cells = _cells_in_range(replace(now, taxonomy=joined.taxonomy), places, codes)
+    target = path if out is None else out
+    with in_files(objects, target, buildings=buildings, streets=streets) as surroundings:
+        _require_inputs(folder, manifest, {"objects": Path(before), **surroundings})
+        side = int(manifest.recipe["tile"]["cells"])
+        plan = plan_tiles(
+            objects,
+            target,
+            tile=TileSpec(min(max(side * first.grid.step, 1.0), MOST_METRES)),
+            grid=first.grid,
+            spec=first.spec,
+            viewpoints=first.viewpoints,
+            tell=None,
+            **surroundings,
+        )
+        numbers = np.unique(np.stack([cells[0] // side, cells[1] // side], axis=1), axis=0)
+        stale: set[Tile] = {(column, row) for column, row in numbers.tolist()}
+        same = database_specs(now) == database_specs(first) and not open_city(path).has_columns
+        _keep_tiles(plan, files, stale, facts={} if same else facts)
+        parts = build_parts(
+            plan, objects, workers=workers, scheduler=scheduler, progress=progress, tell=None
+        )
+        drift = _drift(plan, files, stale, parts)
+        publish(plan.folder, parts)
+    return UpdateReport(
+        classes=changes.classes,
+        replaced=tuple(sorted(_layers(old) | _layers(new))),
+        kept=(),
+        cells_before=manifest.cells,
+        cells=sum(part.cells for part in parts),
+        recomputed=len(cells[0]),
+        changed=drift["changed"],
+        appeared=drift["appeared"],
+        vanished=drift["vanished"],
+    )
+
+
+def _require_inputs(folder: Path, manifest: Manifest, given: dict[str, Path]) -> None:
+    """Refuse files that are not those that a database in tiles was built from."""
+    built: dict[str, str] = manifest.recipe["inputs"]
+    for name in sorted({*built, *given}):
+        if name not in given:
+            msg = f"{folder} was built with {name}; give the same {name} again."
+        elif name not in built:
+            msg = f"{folder} was built without {name}; give none, or build the database again."
+        elif fingerprint(given[name]) != built[name]:
+            msg = (
+                f"{given[name]} does not hold the {name} that {folder} was built from; give the "
+                "file that does, or build the database again."
+            )
+        else:
+            continue
+        raise InputError(msg)
+
+
+def _keep_tiles(
+    plan: TilePlan, files: dict[Tile, Path], stale: set[Tile], *, facts: dict[str, Any]
+) -> None:
+    """Put the tiles that see no change into the folder of a run, as if it had built them.
+
+    `facts` are those that the whole database has anew, none where it has the same.
+    """
+    tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
+    for tile in set(tiles) - stale:
+        kept = plan.folder / part_name(tile)
+        if tile not in files:
+            kept.with_suffix(EMPTY).touch()
+        elif not facts:
+            shutil.copyfile(files[tile], kept)
+        else:
+            save_database(replace(open_database(files[tile]), **facts), kept)
+
+
+def _drift(
+    plan: TilePlan, files: dict[Tile, Path], stale: set[Tile], parts: Iterable[Part]
+) -> Counter[str]:
+    """Count the cells that changed, appeared and vanished in the tiles that were built again."""
+    fresh = {part.tile: plan.folder / part.file for part in parts}
+    drift: Counter[str] = Counter()
+    for tile in stale & (files.keys() | fresh.keys()):
+        if tile in files and tile in fresh:
+            cells = compare_cells(open_database(files[tile]), open_database(fresh[tile]))
+            drift["changed"] += len(cells.changed)
+            drift["appeared"] += len(cells.appeared)
+            drift["vanished"] += len(cells.vanished)
+        elif tile in fresh:
+            drift["appeared"] += len(open_database(fresh[tile]))
+        else:
+            drift["vanished"] += len(open_database(files[tile]))
+    return drift
+
+
+def _layers(objects: StreetObjects) -> set[str]:
+    return set(objects.table[SOURCE].unique())
+
+
+def _changed_places(
+    old: StreetObjects, new: StreetObjects, changes: ObjectChanges
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """Return where an object is gone or has come, shape (c, 2) in metres, and its class codes."""
+    places = np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
+    return places, np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
 
 
 def _cells_in_range(

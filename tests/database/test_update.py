@@ -22,10 +22,11 @@ from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.file import open_database
-from semsig_gis.database.update import compare_cells, update_database, update_file
+from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles
+from semsig_gis.database.update import compare_cells, update_database, update_file, update_tiles
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.objects.table import Licence
+from semsig_gis.objects.table import Licence, save_objects
 from semsig_gis.sources.catalog import load_catalog
 
 if TYPE_CHECKING:
@@ -307,6 +308,97 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
         update_database(database, ObjectStore.of(objects), objects)
     with refused(DatabaseError, "lacks the streets"):
         update_database(database, ObjectStore.of(objects, footprints=HOUSES), objects)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    side=st.sampled_from([90.0, 1000.0]),
+    edits=st.integers(0, 6),
+    mode=st.sampled_from(["all", "outdoor", "streets"]),
+)
+@example(seed=1, side=90.0, edits=3, mode="streets")
+@example(seed=2, side=90.0, edits=0, mode="all")
+@settings(max_examples=3)
+def test_an_update_of_tiles_is_a_rebuild(*, seed: int, side: float, edits: int, mode: Mode) -> None:
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, 60)
+    options: dict[str, Any] = {
+        "buildings": None if mode == "all" else HOUSES,
+        "streets": STREETS if mode == "streets" else None,
+    }
+    specs: dict[str, Any] = {"tile": TileSpec(side), "viewpoints": ViewpointSpec(mode=mode)}
+    with tempfile.TemporaryDirectory() as folder:
+        old, new, city, rebuilt = (Path(folder, name) for name in ("old", "new", "city", "rebuilt"))
+        save_objects(objects_of(table), old)
+        build_tiles(old, city, **specs, **options)
+        save_objects(objects_of(edited(table, rng, edits)), new)
+        before = open_database(city)
+        try:
+            report = update_tiles(city, new, before=old, **options)
+        except InputError as error:  # an edit took the last object of a layer
+            assert "lacks the layers" in str(error)  # noqa: PT017
+            return
+        build_tiles(new, rebuilt, **specs, **options)
+        assert folder_bytes(city) == folder_bytes(rebuilt)
+        check_report(report, before, open_database(city))
+        assert {path.name for path in Path(folder).iterdir()} == {"old", "new", "city", "rebuilt"}
+
+
+def folder_bytes(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture
+def tiled(table: pd.DataFrame, tmp_path: Path) -> Path:
+    save_objects(objects_of(table), tmp_path / "old.parquet")
+    build_tiles(tmp_path / "old.parquet", tmp_path / "tiles", tile=TileSpec(100.0))
+    return tmp_path / "tiles"
+
+
+def test_tiles_far_from_a_change_are_kept_with_what_is_said_of_all(
+    tiled: Path, table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new, later = (tmp_path / f"{name}.parquet" for name in ("old", "new", "later"))
+    moved = table.copy()
+    moved.loc[0, ["x", "y"]] = at(50.0, 50.0)
+    objects = objects_of(moved)
+    objects = dataclasses.replace(objects, licenses=(Licence("B (ODbL)", ()),), notes=("new",))
+    save_objects(objects_of(moved), new)
+    save_objects(objects, later)
+    built: list[Any] = []
+
+    def noted(*given: Any) -> Any:  # noqa: ANN401
+        built.append(given[1])
+        return build_tile(*given)
+
+    monkeypatch.setattr("semsig_gis.database.tiles.build_tile", noted)
+    update_tiles(tiled, new, before=old)
+    assert 0 < len(built) < len(list(tiled.glob("tile_*")))
+    built.clear()
+    update_tiles(tiled, later, before=new)
+    assert not built
+    build_tiles(later, tmp_path / "rebuilt", tile=TileSpec(100.0))
+    assert folder_bytes(tiled) == folder_bytes(tmp_path / "rebuilt")
+
+
+def test_what_does_not_fit_tiles_is_refused(
+    tiled: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    old, new, far = (tmp_path / f"{name}.parquet" for name in ("old", "new", "far"))
+    content = folder_bytes(tiled)
+    save_objects(objects_of(table[table["source"] != "trees"]), new)
+    tower = CLASSES.extended([ObjectClass(250, "9", "tower", "Tower", 90.0)])
+    save_objects(objects_of(table, tower), far)
+    with refused(InputError, "lacks the layers trees", "into one file"):
+        update_tiles(tiled, new, before=old)
+    with refused(InputError, "90 m", "45 m", "build the database again"):
+        update_tiles(tiled, far, before=old)
+    with refused(InputError, "far.parquet", "does not hold the objects"):
+        update_tiles(tiled, old, before=far)
+    with refused(InputError, "built without buildings"):
+        update_tiles(tiled, old, before=old, buildings=HOUSES)
+    assert folder_bytes(tiled) == content
+    assert not tiled.with_name("tiles.partial").exists()
 
 
 def test_cells_of_different_ranges_are_not_compared(database: SignatureDatabase) -> None:
