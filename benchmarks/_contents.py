@@ -34,6 +34,7 @@ TIMES = {"timing.json", "times.json"}
 _TEXTS = {".csv", ".geojson", ".html", ".json", ".jsonl", ".md", ".svg", ".toml"}
 _SCHEMA = "SELECT type, name, sql FROM sqlite_master ORDER BY name"
 _STAMPS = {"last_change", "timestamp", "update_time"}  # columns of a GeoPackage
+_PROJECT_STAMP = r'"last_modified_time":"[^"]*"'
 
 
 def masked(text: str) -> str:
@@ -64,4 +65,5 @@ def _dump(path: Path) -> Iterator[str]:
             if kind == "table":
                 rows = file.execute(f'SELECT * FROM "{name}"')  # noqa: S608 - as the file says
                 kept = [i for i, (item, *_) in enumerate(rows.description) if item not in _STAMPS]
-                yield from sorted(repr([row[i] for i in kept]) for row in rows)
+                texts = (repr([row[i] for i in kept]) for row in rows)
+                yield from sorted(re.sub(_PROJECT_STAMP, "", text) for text in texts)
