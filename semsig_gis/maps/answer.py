@@ -12,6 +12,7 @@ import shapely
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import CHANCES
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.database import require_same_place
 from semsig_gis.maps.location import CANDIDATE
 from semsig_gis.maps.parts import (
@@ -124,5 +125,5 @@ def _text(column: str, value: Any) -> str | None:  # noqa: ANN401 - as the file 
     if column == "types":
         return str(value)
     number = float(value)  # KML and CSV hold texts
-    shown = {"chance": f"{number:.2%}", "km2": f"{number:.4g}"}
+    shown = {"chance": f"{percent(number, 2)}", "km2": f"{number:.4g}"}
     return shown.get(column, f"{number:.0f}")

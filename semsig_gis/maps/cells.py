@@ -20,6 +20,7 @@ from semsig_gis.core.signs import (
     SAME_TYPES,
     group_labels,
 )
+from semsig_gis.core.terminal import percent
 from semsig_gis.maps.image import (
     QUANTUM_M,
     CellPixels,
@@ -361,13 +362,14 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
     scales = []
     for (name, size), line in zip(sizes.items(), shares, strict=True):
         rows = "".join(
-            f"<tr><td>{swatch(colour, LIFTING)}{label}</td><td class='count'>{share:.1%}</td></tr>"
+            f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
+            f"<td class='count'>{percent(share)}</td></tr>"
             for colour, label, share in zip(
                 GROUP_COLOURS.values(), group_labels(), line, strict=True
             )
         )
         scale = (
-            f"<p><b>{line[0]:.1%}</b> of {len(size):,} cells look like no other<br>"
+            f"<p><b>{percent(line[0])}</b> of {len(size):,} cells look like no other<br>"
             f"How many cells have the {escape(name.lower())}</p><table>{rows}</table>"
         )
         scales.append(part_of(name, scale))
@@ -385,7 +387,8 @@ def identifiability_legend(identifiability: Identifiability) -> str:
     within, view = f"within {facts['radius_m']:g} m", facts["view_degrees"]
     asked = "query" if view == FULL_TURN else f"photo of {view:g} degrees"
     bands = "<br>".join(
-        f"{band['from']:.0%} to {band['to']:.0%}: {band['share']:.1%} of the cells"
+        f"{percent(band['from'], 0)} to {percent(band['to'], 0)}: "
+        f"{percent(band['share'])} of the cells"
         for band in reversed(facts["bands"])
     )
     classes = "".join(
@@ -401,7 +404,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
     )
     return (
         "<summary>Where a query can be placed</summary>"
-        f"<p><b>{facts['chance_found']:.1%}</b> chance to answer a {asked} {within}<br>"
+        f"<p><b>{percent(facts['chance_found'])}</b> chance to answer a {asked} {within}<br>"
         f"Mean of {facts['cells']:,} cells, "
         f"{made_by(isolated(facts['noise']) + ' noise')}<br>"
         "Click a cell to see what it is taken for</p>"

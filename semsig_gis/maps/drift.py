@@ -11,6 +11,7 @@ import pandas as pd
 from semsig_gis.core.errors import CrsError
 from semsig_gis.core.geometry import SOURCE, SOURCE_ID
 from semsig_gis.core.signs import DRIFT_COLOURS, OBJECT_COLOURS
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.cells import CellFacts, Cells, city_view, packed_signatures
@@ -226,13 +227,13 @@ def drift_legend(
     total = sum(len(rows) for rows, _ in kinds.values())
     lines = "".join(
         f"<tr><td>{swatch(colour, FLIPPING if kind == 'same' else LIFTING)}{kinds[kind][1]}</td>"
-        f"<td>{len(kinds[kind][0]):,}</td><td>{len(kinds[kind][0]) / total:.1%}</td></tr>"
+        f"<td>{len(kinds[kind][0]):,}</td><td>{percent(len(kinds[kind][0]) / total)}</td></tr>"
         for kind, colour in DRIFT_COLOURS.items()
     )
     changed = 1.0 - len(cells.same) / total
     return (
         "<summary>What has changed</summary>"
-        f"<p><b>{changed:.1%}</b> of {total:,} cells see something else<br>"
+        f"<p><b>{percent(changed)}</b> of {total:,} cells see something else<br>"
         "Click a cell to see what it saw before</p>"
         f"{part_of('What has changed', f'<table>{lines}</table>')}"
         f"{'' if objects is None else _object_changes(objects, taxonomy)}"

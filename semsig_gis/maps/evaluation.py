@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.signs import ERROR_BREAKS, FAILURES, OUTCOMES
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.observation import parse_view
 from semsig_gis.evaluation.field import ENOUGH, error_field
 from semsig_gis.evaluation.result import Evaluation
@@ -307,10 +308,10 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     successes = int(evaluation.successful.sum())
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
     shares = "".join(
-        f"<tr><td>P(error ≤ {threshold} m)</td><td>{share:.1%}</td></tr>"
+        f"<tr><td>P(error ≤ {threshold} m)</td><td>{percent(share)}</td></tr>"
         for threshold, share in zip(ERROR_BREAKS, evaluation.cdf(ERROR_BREAKS), strict=True)
     )
-    limits = [f"{least:.0%}" for least in FAILURES if least]
+    limits = [f"{percent(least, 0)}" for least in FAILURES if least]
     within = f"within {Evaluation.success_metres} m"
     successful = (
         f"{mark_svg(OUTCOMES['successful'])} {successes:,} successful: {within} with probability "
@@ -324,7 +325,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     )
     return (
         "<summary>Localization errors</summary>"
-        f"<p><b>{evaluation.cdf([Evaluation.success_metres])[0]:.1%}</b> of {count:,} queries "
+        f"<p><b>{percent(evaluation.cdf([Evaluation.success_metres])[0])}</b> of {count:,} queries "
         f"{within}<br>{made_by(f'{escape(str(evaluation.method))}, {best}')}<br>"
         f"Distortion: {isolated(distortions or 'none')}</p>"
         f"{part_of('Successful queries', successful)}"

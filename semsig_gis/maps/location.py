@@ -15,6 +15,7 @@ from semsig_gis.core.signs import (
     VERDICTS,
     mixed,
 )
+from semsig_gis.core.terminal import percent
 from semsig_gis.core.view import View
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.database.north import GRID_NORTH
@@ -181,7 +182,7 @@ def posterior_map(
     _colour_chances(page, posterior, radius=radius, near=False)
     cell, mass = posterior.best_place(radius)
     (place,) = exact_latlon(database.xy[cell], database.crs)
-    told = f"{mass:.1%} within {radius:g} m"
+    told = f"{percent(mass)} within {radius:g} m"
     seen = cell_signature(database, cell, place=place)
     details = [told, seen, str(database.cell_ids[cell]), _position(place)]
     record = [place, CANDIDATE, 8, "Best place", details, "1"]
@@ -271,7 +272,7 @@ class _Drawings:
         )
         ellipse = f"{longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across"
         details = [
-            f"{location.answer.mass:.1%} within {location.rule.radius:g} m",
+            f"{percent(location.answer.mass)} within {location.rule.radius:g} m",
             _position(centre),
             f"{place.sigma:.1f} m each way; 90 %: {ellipse}",
             _north(place.heading, place.heading_sigma),
@@ -296,7 +297,7 @@ class _Drawings:
             details = [
                 query_signature(query, taxonomy, radius=radius, place=place, turn=turn),
                 cell_signature(self.database, row["cell"], query, turn, place=place),
-                f"{row['chance']:.2%}",
+                f"{percent(row['chance'], 2)}",
                 f"{row['loglik']:.2f}",
                 _north(row.get("heading")),
                 str(row["cell_id"]),
@@ -399,7 +400,7 @@ def location_legend(location: Location) -> str:
     asked = f"<p>{query_text(location.query, posterior.database.taxonomy)}</p>"
     return (
         "<summary>Where it was seen</summary>"
-        f"<p>{mark_svg(mark)} <b>{verdict}</b>: {answer.mass:.1%} within "
+        f"<p>{mark_svg(mark)} <b>{verdict}</b>: {percent(answer.mass)} within "
         f"{location.rule.radius:g} m<br>If there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
         f"(ellipse: 90 %)<br>{made_by(method)}</p>{note}{_notes(location)}"
         f"{_chances_legend(posterior)}"
@@ -413,7 +414,8 @@ def _chances_legend(posterior: Posterior) -> str:
     """Return what the colours of chances mean."""
     counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
     regions = "<br>".join(
-        f"{swatch(CHANCES[share], FLIPPING)}{share:.0%} in {count:,} cell{'s' * (count != 1)}"
+        f"{swatch(CHANCES[share], FLIPPING)}{percent(share, 0)} in {count:,} "
+        f"cell{'s' * (count != 1)}"
         for share, count in counts.items()
     )
     chances = " ".join(

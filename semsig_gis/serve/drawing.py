@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.signs import CHANCES
+from semsig_gis.core.terminal import percent
 from semsig_gis.likelihood.explain import UNKNOWN_NAME
 from semsig_gis.maps.location import REGION_COLOURS, region_levels
 from semsig_gis.maps.parts import data_url, exact_latlon, to_metres
@@ -186,7 +187,7 @@ class _Drawer:
             if verdict == "matched":
                 share = max(float(self.shares[self.codes[kind]]), LEAST_SHARE)
                 weight = -chance * math.log2(share)
-                text = f"{title}: it is where one stands, and {share:.1%} of the cells see one"
+                text = f"{title}: it is where one stands, and {percent(share)} of the cells see one"
             elif verdict == "misnamed":
                 odds = float(self.table.misnamed[length, class_row])
                 weight = chance * math.log2(max(odds, LEAST_SHARE))

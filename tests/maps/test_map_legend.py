@@ -14,6 +14,7 @@ from small_city import chances_of, small_city
 import semsig_gis
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.core.terminal import percent
 from semsig_gis.database.update import CellChanges
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.methods import localize
@@ -108,11 +109,11 @@ def test_the_numbers_are_those_of_the_results() -> None:
     facts = chances_of(CITY).summary()
     distances = localize(CITY, QUERY, top=7, method=Method()).candidates["distance"]
     for name, words in (
-        ("evaluation", f"P(error ≤ 50 m) {EVALUATION.cdf([50])[0]:.1%}"),
+        ("evaluation", f"P(error ≤ 50 m) {percent(EVALUATION.cdf([50])[0])}"),
         ("evaluation", f"{int(EVALUATION.successful.sum())} successful"),
         ("localization", f"{distances.max():.3f}"),
-        ("identifiability", f"{facts['chance_found']:.1%} chance to answer"),
-        ("identifiability", f"90% to 100%: {facts['bands'][-1]['share']:.1%} of the cells"),
+        ("identifiability", f"{percent(facts['chance_found'])} chance to answer"),
+        ("identifiability", f"90 % to 100 %: {percent(facts['bands'][-1]['share'])} of the cells"),
     ):
         assert words in LEGENDS[name].text
 

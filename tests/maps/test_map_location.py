@@ -15,6 +15,7 @@ from worlds import random_town
 
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.signs import ANSWERS, CANDIDATE_RAMP, VERDICTS
+from semsig_gis.core.terminal import percent
 from semsig_gis.core.view import Photo, View
 from semsig_gis.database.city import ObjectStore
 from semsig_gis.evaluation.methods import localize
@@ -59,8 +60,8 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     numbers = [str(one.get_property("textContent")) for one in page.all(".semsig-number")]
     assert sorted(numbers) == ["1", "2", "3", "4", "5"]
     legend = page.text(LEGEND)
-    assert "The answer: 100.0% within 50 m" in legend
-    assert "90% in" in legend
+    assert "The answer: 100.0 % within 50 m" in legend
+    assert "90 % in" in legend
     assert "matched: a street object" in legend
     assert page.circles(ANSWERS["given"].colour) == 1
     counts = location.explanations[0].counts
@@ -97,7 +98,7 @@ def test_clicks_tell_of_places_and_objects(page: MapPage) -> None:
     page.point_at("circles(arguments[0])[0]", ANSWERS["given"].colour)
     said = page.panel()
     assert said.startswith("The answer")
-    assert f"{location.answer.mass:.1%} within 50 m" in said
+    assert f"{percent(location.answer.mass)} within 50 m" in said
     assert f"± {location.estimate.heading_sigma:.1f}°" in said
     said = page.panel_of(VERDICTS["matched"])
     rows = location.explanations[0].to_dict()["rows"]

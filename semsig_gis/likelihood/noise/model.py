@@ -19,6 +19,7 @@ import numpy as np
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import HALF_TURN
+from semsig_gis.core.terminal import percent
 from semsig_gis.storage.toml import read_values, toml_text
 from semsig_gis.storage.whole import whole_file
 
@@ -205,7 +206,7 @@ class NoiseMixture(Displayed):
         models = zip(self.specs, self.weights, strict=True)
         return {
             "name": self.name,
-            "models": ", ".join(f"{spec.name} {weight:.0%}" for spec, weight in models),
+            "models": ", ".join(f"{spec.name} {percent(weight, 0)}" for spec, weight in models),
         }
 
     def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseMixture:
@@ -440,7 +441,7 @@ _LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
 # A person leaves out much or little, hardly errs about the rest, and makes nothing up.
 _MARKED = tuple(
     NoiseSpec(
-        detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:.0%} marked"
+        detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:g} marked"
     )
     for share in (0.9, 0.6, 0.3)
 )
