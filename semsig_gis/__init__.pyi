@@ -67,6 +67,7 @@ from .database.city import (
     open_store as open_store,
     save_with_store as save_with_store,
 )
+from .database.merge import merge_databases as merge_databases
 from .database.tiles import TileSpec as TileSpec, build_tiles as build_tiles
 from .database.update import (
     update_database as update_database,

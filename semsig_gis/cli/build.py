@@ -1,4 +1,4 @@
-"""`semsig build`, `info` and `clean`: street objects become a signature database."""
+"""`semsig build`, `update`, `merge`, `info` and `clean`: street objects become a database."""
 
 from __future__ import annotations
 
@@ -245,6 +245,34 @@ def update(
     from semsig_gis.reports.quality import update_tables
 
     print_tables(update_tables(report))
+
+
+@app.command()
+def merge(
+    first: Annotated[Path, typer.Argument(help="Signature database in one file.")],
+    second: Annotated[Path, typer.Argument(help="Another one, built in the same way.")],
+    *,
+    out: Annotated[Path, typer.Option(help="Signature database to write (.parquet).")],
+    as_json: AsJson = False,
+) -> None:
+    """Merge the databases of two places into one.
+
+    What both hold is taken once, and cells near both are computed again from the objects of both.
+    """
+    from semsig_gis.database.merge import merge_databases
+
+    keep_inputs(out, read=(first, second))
+    require_suffix(".parquet", out)
+    with progress("merging") as advance:
+        report = merge_databases(first, second, out=out, progress=advance)
+    if as_json:
+        print_json(report.to_dict())
+        return
+    say(
+        f"{report.cells:,} cells of {report.objects:,} objects: {out}. In both were "
+        f"{report.shared_cells:,} cells and {report.shared_objects:,} objects; "
+        f"{report.recomputed:,} cells near both were computed again."
+    )
 
 
 @app.command()

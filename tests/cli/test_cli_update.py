@@ -23,3 +23,14 @@ def test_tiles_are_updated_with_the_objects_of_before(town: Path, run: Run) -> N
     ):
         code, _, told = run("update", city, "--objects", objects, *more)
         assert (code, words in told) == (2, True)
+
+
+def test_two_cities_become_a_region(town: Path, run: Run) -> None:
+    city, region = town / "city.parquet", town / "region.parquet"
+    objects = town / "objects.parquet"
+    assert run("build", objects, "--out", city)[0] == 0
+    code, printed, _ = run("merge", city, city, "--out", region)
+    assert (code, "were computed again" in printed) == (0, True)
+    assert region.read_bytes() == city.read_bytes()
+    code, _, told = run("merge", city, city, "--out", city)
+    assert (code, "a name of its own" in told) == (2, True)

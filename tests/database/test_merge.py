@@ -1,0 +1,154 @@
+"""Merging: the databases of two places come to what is built from the objects of both."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import shapely
+from sentences import refused
+from worlds import CODES, CORNER, TAXONOMY, objects_of, surroundings
+
+from semsig_gis.core.errors import DatabaseError
+from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.database.build import build_database
+from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
+from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.merge import merge_databases
+from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.objects.table import Licence
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import geopandas as gpd
+
+    from semsig_gis.database.views import Mode
+    from semsig_gis.objects.table import StreetObjects
+
+EAST = float(CORNER[0])
+CLASSES = Taxonomy(
+    tuple(
+        dataclasses.replace(one, range_m={CODES[0]: 45.0, CODES[1]: 12.5}.get(one.code))
+        for one in TAXONOMY.classes
+    )
+)
+# Houses wall to wall from west to east, across the border, and some that stand alone.
+HOUSES = surroundings(
+    *(
+        shapely.transform(shapely.box(x, y, x + 11.96, y + 9), lambda xy: xy + CORNER)
+        for y in (20, 75, 130)
+        for x in range(0, 400, 12)
+        if x % 60
+    )
+).to_crs("EPSG:2154")
+STREETS = surroundings(
+    *(
+        shapely.transform(shapely.LineString([(x, y), (x + 100, y)]), lambda xy: xy + CORNER)
+        for y in (50, 110)
+        for x in (0, 100, 200, 300)
+    ),
+    half_width=[9.0, np.nan, 14.0, 6.0] * 2,
+).to_crs("EPSG:2154")
+
+
+def city(
+    objects: StreetObjects,
+    path: Path,
+    mode: Mode,
+    west: float,
+    east: float,
+    **specs: Any,  # noqa: ANN401
+) -> Path:
+    """Build the database of a strip of the town, which has what stands or begins there."""
+
+    def cut(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+        left = table.geometry.bounds["minx"] - EAST
+        return table[(left >= west) & (left < east)]
+
+    part = dataclasses.replace(objects, table=cut(objects.table))
+    around: dict[str, Any] = {
+        "footprints": None if mode == "all" else cut(HOUSES),
+        "streets": cut(STREETS) if mode == "streets" else None,
+    }
+    database = build_database(part, viewpoints=ViewpointSpec(mode=mode), **around, **specs)
+    save_with_store(database, ObjectStore.of(part, **around), path)
+    return path
+
+
+@pytest.fixture
+def objects() -> StreetObjects:
+    rng = np.random.default_rng(7)
+    places = np.round(rng.uniform((0, 0), (400, 160), (180, 2)) * 4) / 4 + CORNER
+    rows = zip(
+        *places.T, rng.choice(CODES[:6], 180), ["trees"] * 180, map(str, range(180)), strict=True
+    )
+    return objects_of(*rows, licenses=(Licence("A (CC0)", ("trees",)),), taxonomy=CLASSES)
+
+
+@pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
+@pytest.mark.parametrize(("end", "start"), [(200, 200), (230, 170), (120, 300), (400, 0)])
+def test_a_merger_is_built_from_both(
+    objects: StreetObjects, tmp_path: Path, mode: Mode, end: float, start: float
+) -> None:
+    west = city(objects, tmp_path / "west.parquet", mode, 0, end)
+    east = city(objects, tmp_path / "east.parquet", mode, start, 400)
+    region, whole = tmp_path / "region.parquet", tmp_path / "whole.parquet"
+    report = merge_databases(west, east, out=region)
+    store = open_store(region)
+    around = {"footprints": store.footprints, "streets": store.streets}
+    save_database(
+        build_database(store.objects, viewpoints=ViewpointSpec(mode=mode), **around), whole
+    )
+    assert region.read_bytes() == whole.read_bytes()
+    left = objects.xy[:, 0] - EAST
+    kept = objects.table[(left < end) | (left >= start)]
+    assert sorted(store.objects.table["source_id"]) == sorted(kept["source_id"])
+    assert report.shared_objects == ((left < end) & (left >= start)).sum()
+    ids = [open_database(path).cell_ids for path in (west, east)]
+    assert report.shared_cells == np.isin(ids[0], ids[1]).sum()
+    assert (report.recomputed == 0) == (end == 120)
+    assert (report.cells, report.objects) == (len(open_database(region)), len(kept))
+    if start == end:
+        save_with_store(*_whole(objects, mode), tmp_path / "all.parquet")
+        assert (tmp_path / "all.parquet").read_bytes() == region.read_bytes()
+
+
+def _whole(objects: StreetObjects, mode: Mode) -> tuple[Any, ObjectStore]:
+    around: dict[str, Any] = {
+        "footprints": None if mode == "all" else HOUSES,
+        "streets": STREETS if mode == "streets" else None,
+    }
+    database = build_database(objects, viewpoints=ViewpointSpec(mode=mode), **around)
+    return database, ObjectStore.of(objects, **around)
+
+
+def test_what_was_made_in_another_way_is_refused(objects: StreetObjects, tmp_path: Path) -> None:
+    west = city(objects, tmp_path / "west.parquet", "all", 0, 200)
+    out = tmp_path / "region.parquet"
+    others = dataclasses.replace(objects, table=objects.table.to_crs("EPSG:32631"))
+    other_classes = dataclasses.replace(objects, taxonomy=TAXONOMY)
+    for words, part, mode, specs in (
+        ("grid", objects, "all", {"grid": GridSpec(7.0)}),
+        ("range or angle levels", objects, "all", {"spec": SignatureSpec(20.0)}),
+        ("viewpoints", objects, "outdoor", {}),
+        ("classes", other_classes, "all", {}),
+    ):
+        east = city(part, tmp_path / "east.parquet", mode, 200, 400, **specs)  # type: ignore[arg-type]
+        with refused(DatabaseError, f"differ in their {words}", "build both in the same way"):
+            merge_databases(west, east, out=out)
+    save_with_store(build_database(others), ObjectStore.of(others), tmp_path / "east.parquet")
+    with refused(DatabaseError, "coordinate reference system"):
+        merge_databases(west, tmp_path / "east.parquet", out=out)
+    bare = tmp_path / "bare.parquet"
+    save_database(open_database(west), bare)
+    with refused(DatabaseError, "bare.parquet has no object store"):
+        merge_databases(west, bare, out=out)
+    with refused(DatabaseError, "nowhere.parquet does not exist"):
+        merge_databases(west, "nowhere.parquet", out=out)
+    assert not out.exists()
+    assert not store_path(out).exists()
