@@ -1,14 +1,17 @@
-"""Building a country of fifty towns in tiles on two processes of dask, beside one process."""
+"""Building a country of fifty towns in tiles, and updating it, on two processes of dask."""
 
 from __future__ import annotations
 
 import logging
+import shutil
 import tempfile
 import time
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import geopandas as gpd
 import numpy as np
 from distributed import Client, LocalCluster
 
@@ -17,9 +20,10 @@ from benchmarks.memory import own_peak
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles, plan_tiles
+from semsig_gis.database.update import update_tiles
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import build_objects
-from semsig_gis.objects.table import save_objects
+from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 
@@ -37,6 +41,7 @@ _CORNER = np.array([400_000.0, 5_300_000.0])
 _ROW = 10  # towns from west to east
 _SAMPLE = 12  # tiles that are built again and compared
 _MOST_MB = 2048.0
+_CHANGED = 0.01  # share of the objects
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +91,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
         if one.manifest != two.manifest:
             msg = "two processes have built something else than one."
             raise ArithmeticError(msg)
+        updates = list(_updates(folder, scale))
     what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
     print(
         f"{what}: {two.manifest.cells / two.seconds:,.0f} cells a second; the files of one process "
@@ -115,6 +121,49 @@ def comparisons(size: str) -> Iterator[Comparison]:
         peer_name=f"with {scale.few} towns in {len(few.manifest.parts)} tiles",
         bar=0.8,
     )
+    yield from updates
+
+
+def _updates(folder: Path, scale: _Size) -> Iterator[Comparison]:
+    """Move some objects, of one town and of all, and update the country beside a fresh build."""
+    objects = open_objects(folder / "country.parquet")
+    xy, count = objects.xy, int(_CHANGED * len(objects))
+    from_first = np.hypot(*(xy - xy[0]).T)
+    rng = np.random.default_rng(_SEED)
+    for where, chosen in (
+        ("in one place", np.argsort(from_first, kind="stable")[:count]),
+        ("everywhere", rng.permutation(len(objects))[:count]),
+    ):
+        table = objects.table.copy()
+        shifts = np.zeros((len(table), 2))
+        shifts[chosen] = rng.uniform(-5.0, 5.0, (count, 2))
+        table.geometry = gpd.GeoSeries.from_xy(*(xy + shifts).T, index=table.index, crs=table.crs)
+        save_objects(replace(objects, table=table), folder / "later.parquet")
+        fresh = _build(folder, "later", scale, workers=2)
+        with _cluster(2) as (_, address):
+            start = time.perf_counter()
+            update_tiles(
+                folder / "country",
+                folder / "later.parquet",
+                before=folder / "country.parquet",
+                out=folder / "updated",
+                scheduler=address,
+            )
+            seconds = time.perf_counter() - start
+        for file in sorted((folder / "later").iterdir()):
+            if file.read_bytes() != (folder / "updated" / file.name).read_bytes():
+                msg = f"{file.name} of the update differs from that of a fresh build."
+                raise ArithmeticError(msg)
+        for name in ("later", "updated"):
+            shutil.rmtree(folder / name)
+        yield Comparison(
+            name=f"updating {fresh.manifest.cells:,} cells where {count:,} objects {where} moved",
+            unit="s",
+            ours=seconds,
+            peer=fresh.seconds,
+            peer_name="a fresh build",
+            bar=None,
+        )
 
 
 def _save_country(path: Path, towns: int, metres: float) -> None:
@@ -129,8 +178,9 @@ def _save_country(path: Path, towns: int, metres: float) -> None:
     save_objects(objects, path)
 
 
-def _build(folder: Path, name: str, scale: _Size, *, workers: int) -> _Run:
-    """Build a country on new processes, so that each starts with little memory."""
+@contextmanager
+def _cluster(workers: int) -> Iterator[tuple[Client, str]]:
+    """Start new processes, so that each has little memory, with the modules that they need."""
     with (
         LocalCluster(
             n_workers=workers,
@@ -142,13 +192,19 @@ def _build(folder: Path, name: str, scale: _Size, *, workers: int) -> _Run:
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
-        client.run(paper_taxonomy)  # so that the modules are there
+        client.run(paper_taxonomy)
+        yield client, cluster.scheduler_address
+
+
+def _build(folder: Path, name: str, scale: _Size, *, workers: int) -> _Run:
+    """Build a country on new processes."""
+    with _cluster(workers) as (client, address):
         start = time.perf_counter()
         manifest = build_tiles(
             folder / f"{name}.parquet",
             folder / name,
             tile=TileSpec(scale.tile),
-            scheduler=cluster.scheduler_address,
+            scheduler=address,
         )
         seconds = time.perf_counter() - start
         return _Run(manifest, seconds, max(client.run(own_peak).values()))
