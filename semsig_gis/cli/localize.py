@@ -184,7 +184,7 @@ def localize(options: LocalizeOptions) -> None:
             )
             raise InputError(msg)
         locator: Any = _locator(options, city, method, north)
-        if method is None:
+        if unplaced or absent:
             from semsig_gis.likelihood.questions import with_unplaced
 
             locator = with_unplaced(locator, query, unplaced, absent=absent)

@@ -143,7 +143,7 @@ def test_an_interrupt_after_the_work_is_done() -> None:
         ("info \udcff.parquet", ["not text in UTF-8"]),
         ("info a\0.parquet", ["null byte"]),
         (f"load {'n' * 300} --catalog openstreetmap --out o.parquet", ["File name too long"]),
-        (f"suggest {'n' * 300}", ["File name too long"]),
+        (f"draft {'n' * 300}", ["File name too long"]),
     ],
 )
 def test_what_cannot_be_meant_is_refused(
