@@ -32,7 +32,7 @@ def demo(
 ) -> None:
     """Run every step on the embedded synthetic city, offline."""
     from semsig_gis.database.build import build_database
-    from semsig_gis.database.city import ObjectStore, save_with_store
+    from semsig_gis.database.file import save_database
     from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.evaluation.file import save_evaluation
     from semsig_gis.exports import export_database
@@ -51,7 +51,7 @@ def demo(
     remark(f"a synthetic city with {len(objects):,} street objects")
     with progress("building") as advance:
         database = build_database(objects, progress=advance)
-    save_with_store(database, ObjectStore.of(objects), out / "city.parquet")
+    save_database(database, out / "city.parquet")
     remark(f"its signature database: {len(database):,} cells")
     with progress("evaluating") as advance:
         evaluation = run(database, queries=queries, seed=seed, progress=advance)

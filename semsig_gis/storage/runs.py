@@ -6,6 +6,7 @@ appears whole, so the same command goes on after the last finished step.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -146,10 +147,11 @@ def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+    """Remove a file or a folder, while a late process may remove of it what it had made."""
+    while path.is_dir():
+        with contextlib.suppress(FileNotFoundError):
+            shutil.rmtree(path)
+    path.unlink(missing_ok=True)
 
 
 def read_json(path: Path) -> Recipe:

@@ -97,3 +97,19 @@ def test_a_finished_run_is_renamed_to_its_place(folder: Path) -> None:
     assert finish(folder, keep={"part_1"}) == out
     assert [path.name for path in out.iterdir()] == ["part_1"]
     assert [path.name for path in out.parent.iterdir()] == ["out"]
+
+
+def test_what_a_late_process_removes_meanwhile_is_no_fault(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "late" / "half").mkdir(parents=True)
+    remove = shutil.rmtree
+
+    def removed_twice(path: Path, **options: Any) -> None:  # noqa: ANN401
+        monkeypatch.setattr(shutil, "rmtree", remove)
+        (path / "half").rmdir()
+        raise FileNotFoundError(path, options)
+
+    monkeypatch.setattr(shutil, "rmtree", removed_twice)
+    out = finish(folder, keep={"part_1"})
+    assert [path.name for path in out.iterdir()] == ["part_1"]
