@@ -208,7 +208,8 @@ class Location(Answer):
 class LikelihoodLocator:
     """An index, and how queries to it are answered; `locate` describes the fields.
 
-    A place is refined, too, where `refined` is None and there are a store and bearings.
+    A place is refined, too, where `refined` is None and there are a store and bearings. The best
+    cells are looked at from `aside` of their middles, too, unless time is short.
     """
 
     index: LikelihoodIndex
@@ -221,6 +222,7 @@ class LikelihoodLocator:
     explained: int = 0
     known: Mapping[str, Any] = field(default_factory=dict)
     north: North = GRID_NORTH
+    aside: bool = True
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -301,11 +303,26 @@ class LikelihoodLocator:
         known = query.among(self.index.database.present_codes)
         return query if known.all() else query.select(known)
 
-    def scores(self, query: Signature, log_prior: NDArray[np.float64] | None = None) -> CellScores:
-        """Return the scores of all cells, the best ones by one-to-one associations."""
-        query, sigma = self._known(query), self.north_sigma
-        scores = self.index.scores(query, north_sigma=sigma)
-        return rerank(self.index, query, scores, north_sigma=sigma, log_prior=log_prior)
+    def scan(self, query: Signature) -> CellScores:
+        """Return the scores of all cells by the sum over detections, one by one."""
+        return self.index.scores(self._known(query), north_sigma=self.north_sigma)
+
+    def scores(
+        self,
+        query: Signature,
+        log_prior: NDArray[np.float64] | None = None,
+        *,
+        scanned: CellScores | None = None,
+    ) -> CellScores:
+        """Return the scores of all cells, of the best by one-to-one associations."""
+        return rerank(
+            self.index,
+            self._known(query),
+            scanned or self.scan(query),
+            north_sigma=self.north_sigma,
+            log_prior=log_prior,
+            aside=self.aside,
+        )
 
     def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
         """Return the street objects to refine places with, if they are to be refined."""

@@ -324,7 +324,7 @@ class Workbench:
         locator = with_unplaced(self._locators[key], question.views[0], absent=question.absent)
         locator = replace(locator, top=question.top, explained=question.top)
         if self._is_quick(question):
-            return replace(locator, refined=False, explained=QUICKLY_EXPLAINED)
+            return replace(locator, refined=False, aside=False, explained=QUICKLY_EXPLAINED)
         return locator
 
     def _is_quick(self, question: Question) -> bool:
@@ -343,9 +343,12 @@ class Workbench:
             before, self._scores, scores = self._scores, {}, []
             for number, view in enumerate(question.views):
                 absent, prior = ((), None) if number else (question.absent, locator.log_prior)
-                name = json.dumps([*setting, absent, view.to_dict(self.taxonomy)])
-                self._scores[name] = before.get(name) or locator.scores(view, prior)
-                scores.append(self._scores[name])
+                name = json.dumps([*setting, view.to_dict(self.taxonomy)])
+                scanned = before.get(name) or locator.scan(view)
+                ranked = json.dumps([name, absent, locator.aside])
+                best = before.get(ranked) or locator.scores(view, prior, scanned=scanned)
+                self._scores |= {name: scanned, ranked: best}
+                scores.append(best)
             if question.legs:
                 locations = locator.locate_route(question.views, question.legs, scores=scores)
             else:
