@@ -329,7 +329,7 @@ class Workbench:
 
     def _is_quick(self, question: Question) -> bool:
         """Tell whether an answer leaves out what takes long, and there is something to leave."""
-        return question.quick and self.store is not None and question.seen_from == "anywhere"
+        return question.quick and question.seen_from == "anywhere"
 
     def _located(self, told: object) -> tuple[Question, Location]:
         """Return a question and its answer, which is found once."""
