@@ -204,7 +204,7 @@ class QueryOptions:
 
     def query(self, dataset: SignatureDatabase | PartitionedDatabase, *, others: str = "") -> View:
         """Return the query of the options; `others` says what else may be given."""
-        from semsig_gis.database.observation import parse_view, said_row, unplaced_parts
+        from semsig_gis.database.observation import parse_view, said_row
 
         taxonomy = dataset.taxonomy
         told: dict[str, Any] = {
@@ -221,38 +221,40 @@ class QueryOptions:
                 f"--types, --bearings or both{others}."
             )
             raise InputError(msg)
-        if self.seen is not None:
-            words = unplaced_parts(self.seen)[0]
-            if self.types is not None and words:
+        if sentence := self._parts[0]:
+            if self.types is not None:
                 msg = f"{self.seen!r} was given with --types; tell what was seen in one way."
                 raise InputError(msg)
-            told |= said_row(words, taxonomy) if words else {}
+            told |= said_row(sentence, taxonomy)
         return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
 
     def usual_noise(self, taxonomy: Taxonomy) -> str:
         """Return the noise of what was seen: a person who says it in words leaves much out."""
-        from semsig_gis.database.observation import said_row, unplaced_parts
+        from semsig_gis.database.observation import said_row
 
-        words = "" if self.seen is None else unplaced_parts(self.seen)[0]
-        return "by-hand" if words and "see" in said_row(words, taxonomy) else "generic"
+        sentence = self._parts[0]
+        return "by-hand" if sentence and "see" in said_row(sentence, taxonomy) else "generic"
 
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase
     ) -> tuple[list[int], list[int]]:
         """Return the class codes of what was seen in no known direction, and was not seen."""
-        from semsig_gis.database.observation import unplaced_parts
-
-        if self.seen is None:
-            return [], []
-        seen, absent = unplaced_parts(self.seen)[1:]
+        _, seen, absent = self._parts
         if not seen and not absent:
             return [], []
         from semsig_gis.objects.keywords import class_code
 
-        taxonomy = dataset.taxonomy
-        return [class_code(word, taxonomy) for word in seen], [
-            class_code(word, taxonomy) for word in absent
-        ]
+        def codes(words: list[str]) -> list[int]:
+            return [class_code(word, dataset.taxonomy) for word in words]
+
+        return codes(seen), codes(absent)
+
+    @property
+    def _parts(self) -> tuple[str, list[str], list[str]]:
+        """The sentence of what was seen, what else was seen, and what was not."""
+        from semsig_gis.database.observation import unplaced_parts
+
+        return unplaced_parts(self.seen or "")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.city import City, ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.index import CellScores
+    from semsig_gis.likelihood.index import CellScores, LikelihoodIndex
     from semsig_gis.likelihood.locate import Location
     from semsig_gis.likelihood.noise.model import Noise
 
@@ -94,7 +94,7 @@ class Workbench:
     store: ObjectStore | None
     noises: Mapping[str, Noise] = field(default_factory=lambda: {USUAL: NOISES[USUAL], **NOISES})
     options: Sequence[str] = ()
-    _locators: dict[tuple[str, str], LikelihoodLocator] = field(default_factory=dict)
+    _indexes: dict[tuple[str, str], LikelihoodIndex] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
     _scores: dict[str, CellScores] = field(default_factory=dict)
 
@@ -272,7 +272,7 @@ class Workbench:
         """Return the answer to a question, and all that the page draws of it."""
         start = time.perf_counter()
         question, location = self._located(told)
-        table = self._locator(question).index.table
+        table = self._index(question).table
         drawing = answer_drawing(
             location, question, table=table, shares=self._shares, pixels=self._pixels
         )
@@ -309,23 +309,28 @@ class Workbench:
             raise UnknownNameError(msg)
         return name
 
-    def _locator(self, question: Question) -> LikelihoodLocator:
-        """Return what answers a question."""
+    def _index(self, question: Question) -> LikelihoodIndex:
+        """Return what views of a question are compared with."""
         key = self._noise(question), question.seen_from
-        if key not in self._locators:
+        if key not in self._indexes:
             noise = self.noises[key[0]]
             if question.seen_from == "anywhere":
                 noise = cell_noise(noise, self.database.grid.step)
-            self._locators[key] = LikelihoodLocator(
-                index=build_index(self.database, noise),
-                store=self.store,
-                refined=None if question.seen_from == "anywhere" else False,
-            )
-        locator = with_unplaced(self._locators[key], question.views[0], absent=question.absent)
-        locator = replace(locator, top=question.top, explained=question.top)
+            self._indexes[key] = build_index(self.database, noise)
+        return self._indexes[key]
+
+    def _locator(self, question: Question) -> LikelihoodLocator:
+        """Return what answers a question."""
+        locator = LikelihoodLocator(
+            index=self._index(question),
+            store=self.store,
+            refined=None if question.seen_from == "anywhere" else False,
+            top=question.top,
+            explained=question.top,
+        )
         if self._is_quick(question):
-            return replace(locator, refined=False, aside=False, explained=QUICKLY_EXPLAINED)
-        return locator
+            locator = replace(locator, refined=False, aside=False, explained=QUICKLY_EXPLAINED)
+        return with_unplaced(locator, question.views[0], absent=question.absent)
 
     def _is_quick(self, question: Question) -> bool:
         """Tell whether an answer leaves out what takes long, and there is something to leave."""
@@ -359,8 +364,7 @@ class Workbench:
     def suggest(self, told: object) -> list[dict[str, Any]]:
         """Return what to look for next, what is expected to tell most first."""
         question, location = self._located(told)
-        index = self._locator(question).index
-        questions = next_questions(index, location, absent=question.absent)
+        questions = next_questions(self._index(question), location, absent=question.absent)
         return [one.to_dict() for one in questions]
 
     def cell(self, told: Mapping[str, Any]) -> dict[str, Any]:
