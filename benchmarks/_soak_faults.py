@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks._soak_city import digests, files_in
-from benchmarks._soak_runs import Ending, Stop, forked, run
+from benchmarks._soak_runs import LIMIT_S, Ending, Stop, forked, run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -175,7 +175,7 @@ def _started(command: str, folder: Path, environment: Mapping[str, str | None]) 
         stdin=subprocess.DEVNULL,
         capture_output=True,
         check=False,
-        timeout=600,
+        timeout=LIMIT_S,
     )
     err = done.stderr.decode(errors="backslashreplace")
     Path(f"{folder}.tmp").mkdir(exist_ok=True)

@@ -24,6 +24,7 @@ import osmium
 
 import semsig_gis as sg
 from benchmarks._contents import digest
+from benchmarks._soak_runs import LIMIT_S
 from semsig_gis.evaluation.identify.result import open_identifiability
 from semsig_gis.likelihood.noise.model import open_noise
 from semsig_gis.objects.surroundings import read_area
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from benchmarks._soak_city import World
 
 BATCH = 200
-_LIMIT_S = 30.0
 _RESPELT = 0.6  # of the damages to texts
 _SMALL = 30  # objects in files that others write
 _MEMORY = 6 * 2**30  # bytes more than there are at the beginning
@@ -120,7 +120,7 @@ def _portal(path: Path) -> None:
 
 
 def _draft(path: Path) -> None:
-    sg.suggest_catalog(path)
+    sg.draft_catalog(path)
 
 
 def _taxonomy(path: Path) -> sg.Taxonomy:
@@ -290,7 +290,7 @@ def faults(batch: Batch, corpus: Path, folder: Path) -> list[tuple[int, str]]:
         with open(reading, "rb", buffering=0) as pipe:  # noqa: PTH123 - a descriptor
             text = b""
             while True:
-                if not select.select([pipe], [], [], _LIMIT_S)[0]:
+                if not select.select([pipe], [], [], LIMIT_S)[0]:
                     fault = "hangs"
                     break
                 part = pipe.read(65536)

@@ -145,13 +145,13 @@ def _updates(folder: Path, scale: _Size) -> Iterator[Comparison]:
             update_tiles(
                 folder / "country",
                 folder / "later.parquet",
-                before=folder / "country.parquet",
                 out=folder / "updated",
                 scheduler=address,
             )
             seconds = time.perf_counter() - start
-        for file in sorted((folder / "later").iterdir()):
-            if file.read_bytes() != (folder / "updated" / file.name).read_bytes():
+        for file in sorted((folder / "later").rglob("*.*")):
+            part = file.relative_to(folder / "later")
+            if file.read_bytes() != (folder / "updated" / part).read_bytes():
                 msg = f"{file.name} of the update differs from that of a fresh build."
                 raise ArithmeticError(msg)
         for name in ("later", "updated"):

@@ -28,6 +28,7 @@ class StreetPhoto:
     """A photo in a file: the symbol and box of each object that is whole in it, rarest first."""
 
     file: Path
+    heading: float
     fov: float
     things: list[tuple[str, tuple[float, float, float, float]]]
 
@@ -80,4 +81,4 @@ def street_photo(
         things.append((kind.symbol, (left, top, right, bottom)))
     picture.save(file, quality=90)
     symbols = [symbol for symbol, _ in things]
-    return StreetPhoto(file, fov, sorted(things, key=lambda one: symbols.count(one[0])))
+    return StreetPhoto(file, heading, fov, sorted(things, key=lambda one: symbols.count(one[0])))

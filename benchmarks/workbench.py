@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
 
 from benchmarks.street_photos import WIDTH, street_photo
 from semsig_gis.cli.options import object_store
@@ -46,8 +47,8 @@ return Boolean(session) && !session.asking && !document.body.ariaBusy
   && (session.scenes.length > 0 || !arguments[0]);
 """
 _SLIDE = """
-const slider = document.getElementById("fov");
-slider.value = arguments[0];
+const slider = document.getElementById(arguments[0]);
+slider.value = arguments[1];
 slider.dispatchEvent(new Event("input"));
 """
 _TIMES = "return performance.getEntriesByName('semsig-answer').map((one) => one.duration)"
@@ -84,13 +85,21 @@ def photo_in(city: City, folder: Path) -> StreetPhoto:
     return street_photo(sight, database.taxonomy, heading=best, file=file)
 
 
-def asked(browser: Chrome, address: str, photo: StreetPhoto, *, marks: int) -> list[float]:
-    """Open the page, drop a photo, mark some objects; return milliseconds from change to answer."""
+def asked(
+    browser: Chrome, address: str, photo: StreetPhoto, *, marks: int, known: bool
+) -> list[float]:
+    """Open the page, drop a photo, mark some objects; return milliseconds from change to answer.
+
+    Its heading is `known`, give or take ten degrees, or is not.
+    """
     browser.get(address)
     _settle(browser)
     browser.execute_script(_DROP, list(photo.file.read_bytes()), photo.file.name)
     _settle(browser, seen=True)
-    browser.execute_script(_SLIDE, photo.fov)
+    browser.execute_script(_SLIDE, "fov", photo.fov)
+    if known:
+        Select(browser.find_element(By.ID, "heading-known")).select_by_value("known")
+        browser.execute_script(_SLIDE, "heading", photo.heading)
     _settle(browser)
     for symbol, (left, top, right, bottom) in photo.things[:marks]:
         stage = browser.find_element(By.CSS_SELECTOR, _STAGE)

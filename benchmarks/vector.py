@@ -1,0 +1,63 @@
+"""Published shapefiles read whole, beside fiona row by row: ``python -m benchmarks.vector FOLDER``.
+
+The folder holds zipped shapefiles, such as those of a city. Both read every field and geometry.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.comparison import compare
+from semsig_gis.sources.vector.by_fiona import read_each
+from semsig_gis.sources.vector.by_pyogrio import describe, read_whole
+from semsig_gis.sources.vector.member import members
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from semsig_gis.sources.vector.by_pyogrio import Layer
+    from semsig_gis.sources.vector.member import Member
+
+REPEATS = 3
+
+
+def main() -> None:
+    """Measure the files of a folder, together and for the largest alone."""
+    files = [member for path in sorted(Path(sys.argv[1]).glob("*.zip")) for member in members(path)]
+    layers = [(member, describe(member)) for member in files]
+    largest = max(layers, key=lambda item: item[1].rows)
+    for name, some in (
+        (f"reading {len(layers)} published shapefiles", layers),
+        (f"reading the largest, {largest[1].rows:,} rows", [largest]),
+    ):
+        print(
+            compare(
+                name,
+                partial(_read_all, some, _whole),
+                partial(_read_all, some, read_each),
+                peer_name="fiona",
+                repeats=REPEATS,
+            )
+        )
+
+
+def _read_all(
+    layers: Sequence[tuple[Member, Layer]],
+    read: Callable[[Member, Sequence[str], int], object],
+    _: int,
+) -> None:
+    for member, layer in layers:
+        read(member, layer.fields, layer.rows)
+
+
+def _whole(member: Member, fields: Sequence[str], count: int) -> object:
+    """Read as `read_layer` does, again row by row where something could be damaged."""
+    rows = read_whole(member, fields, count)
+    return read_each(member, fields, count) if rows is None else rows
+
+
+if __name__ == "__main__":
+    main()
