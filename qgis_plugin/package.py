@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import configparser
 import io
+import os
 import re
 import struct
 import subprocess
@@ -18,8 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 from xml.etree import ElementTree as ET
-
-import tomllib
 
 __all__ = [
     "build_wheel",
@@ -39,20 +38,30 @@ ROOT = HERE.parent
 KINDS = {".py", ".qml", ".svg", ".txt"}
 # The first moment that a zip file can tell, so that the same files make the same bytes.
 MOMENT = (1980, 1, 1, 0, 0, 0)
+ADDRESSES = ("tracker", "repository", "homepage")
 # What the official repository of plugins asks of metadata.txt, and how large a zip file it takes.
 REQUIRED = (
     *("name", "description", "version", "qgisMinimumVersion", "author", "email", "about"),
-    *("tracker", "repository", "homepage"),
+    *ADDRESSES,
 )
 MOST_BYTES = 25_000_000
 # How files of compiled translations begin.
 QM = bytes.fromhex("3cb86418caef9c95cd211cbf60a1bddd")
-# What metadata.txt calls the addresses of the project, by their names in pyproject.toml.
-ADDRESSES = {"Homepage": "homepage", "Issues": "tracker", "Repository": "repository"}
 
 
-def files() -> dict[str, bytes]:
-    """Return the files of the plugin by their names in the zip, sorted; all but the engine."""
+def files(email: str = "") -> dict[str, bytes]:
+    """Return the files of the plugin by their names in the zip, sorted; all but the engine.
+
+    Parameters
+    ----------
+    email : str, optional
+        Where its authors can be reached.
+
+    Returns
+    -------
+    dict
+        What each file holds.
+    """
     plugin = HERE / "semsig"
     found = {path.relative_to(HERE).as_posix(): path for path in plugin.rglob("*")}
     found = {name: path for name, path in found.items() if path.suffix in KINDS}
@@ -62,7 +71,7 @@ def files() -> dict[str, bytes]:
     told = {name: path.read_bytes() for name, path in found.items()}
     for path in (HERE / "i18n").glob("*.ts"):
         told[f"semsig/i18n/{path.stem}.qm"] = compiled(read_words(path))
-    told["semsig/metadata.txt"] = metadata().encode()
+    told["semsig/metadata.txt"] = metadata(email).encode()
     return dict(sorted(told.items()))
 
 
@@ -128,14 +137,25 @@ def _elf(text: bytes) -> int:
     return value or 1
 
 
-def metadata() -> str:
-    """Return metadata.txt, with the addresses of the project that pyproject.toml names."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    urls = project.get("urls", {})
-    told = {field: urls[name] for name, field in ADDRESSES.items() if name in urls}
-    told["email"] = next((one["email"] for one in project["authors"] if "email" in one), "none")
+def metadata(email: str = "") -> str:
+    """Return metadata.txt, with the addresses of the project that SEMSIG_REPOSITORY tells.
+
+    Parameters
+    ----------
+    email : str, optional
+        Where its authors can be reached.
+
+    Returns
+    -------
+    str
+        The text; without a line for what is not told.
+    """
+    told = {"email": email}
+    if repository := os.environ.get("SEMSIG_REPOSITORY", "").rstrip("/"):
+        told |= {"homepage": repository, "repository": repository}
+        told["tracker"] = f"{repository}/issues"
     text = (HERE / "semsig" / "metadata.txt").read_text("utf-8")
-    return text + "".join(f"{name}={value}\n" for name, value in told.items())
+    return text + "".join(f"{name}={value}\n" for name, value in told.items() if value)
 
 
 def faults(plugin: Path) -> list[str]:
@@ -161,13 +181,13 @@ def faults(plugin: Path) -> list[str]:
         told = configparser.ConfigParser()
         told.read_string(archive.read("semsig/metadata.txt").decode())
     general = told["general"]
-    missing = [name for name in REQUIRED if not general.get(name) or general[name] == "none"]
+    missing = [name for name in REQUIRED if not general.get(name)]
     if missing:
         found.append(
-            f"metadata.txt has no {', '.join(missing)}; name them in pyproject.toml, the addresses "
-            "as Homepage, Issues and Repository of [project.urls], the e-mail with the authors."
+            f"metadata.txt has no {', '.join(missing)}; give the address of the project in "
+            "SEMSIG_REPOSITORY and that of its authors as --email (with make, SEMSIG_EMAIL)."
         )
-    for name in set(ADDRESSES.values()) - set(missing):
+    for name in set(ADDRESSES) - set(missing):
         parts = urlsplit(general[name])
         if not (parts.scheme and parts.netloc):
             found.append(f"The {name} {general[name]} is not an address.")
@@ -201,7 +221,7 @@ def build_wheel(folder: Path) -> Path:
     return wheel
 
 
-def write_zip(folder: Path, wheel: Path | None = None) -> Path:
+def write_zip(folder: Path, wheel: Path | None = None, *, email: str = "") -> Path:
     """Write the zip file.
 
     Parameters
@@ -210,19 +230,21 @@ def write_zip(folder: Path, wheel: Path | None = None) -> Path:
         Where to; made when missing.
     wheel : Path, optional
         The engine. Without it, the plugin asks the package index for one of its version.
+    email : str, optional
+        Where its authors can be reached.
 
     Returns
     -------
     Path
         The file. The same files give the same bytes, on every machine.
     """
-    packed = files()
+    packed = files(email)
     if wheel is not None:
         with zipfile.ZipFile(wheel) as archive:
             held = {name: archive.read(name) for name in archive.namelist()}
         packed[f"semsig/{wheel.name}"] = _archive(held)
     told = configparser.ConfigParser()
-    told.read_string(metadata())
+    told.read_string(packed["semsig/metadata.txt"].decode())
     target = folder / f"semsig-qgis-{told['general']['version']}.zip"
     folder.mkdir(parents=True, exist_ok=True)
     target.write_bytes(_archive(packed))
@@ -246,10 +268,11 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="where to write it")
     parser.add_argument("--without-engine", action="store_true", help="leave the wheel out")
+    parser.add_argument("--email", default="", help="where its authors can be reached")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         engine = None if given.without_engine else build_wheel(Path(place))
-        plugin = write_zip(given.folder, engine)
+        plugin = write_zip(given.folder, engine, email=given.email)
     print(plugin)
     for fault in faults(plugin):
         print(f"The official repository would refuse it: {fault}", file=sys.stderr)

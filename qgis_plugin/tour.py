@@ -5,7 +5,8 @@ a folder of wheels by the button, OpenStreetMap is downloaded for the canvas fro
 machine that plays Overpass, a database is built, a cell is clicked, a view composed, and its place
 found. Each step leaves a picture. Nothing of the network is used, and no other `semsig`.
 
-The folder of wheels is filled once with ``pip download -c constraints.txt -d FOLDER '.[serve]'``.
+The folder of wheels is filled once with ``pip download -c constraints.txt -d FOLDER
+'.[raster,serve]'``.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""Tell where in a city a view was taken from the street objects in it.
+"""Find where in a city a view was taken, from the street objects in it.
 
+Every public name is imported from here, whichever package defines it.
 The road in one glance::
 
     catalog = load_catalog("montpellier")
@@ -10,10 +11,28 @@ The road in one glance::
     localize(database, query).candidates
 """
 
+import warnings
+
 import lazy_loader
 
-__version__ = "0.1.0"
+__version__ = "0.1.0"  # CITATION.cff, codemeta.json, CHANGELOG.md and the QGIS plugin repeat it
 
 # The names of `__init__.pyi` are imported when they are first used, so that the command line can
 # print its help without loading a GIS stack.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_attached, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+_RENAMED = {"suggest_catalog": ("draft_catalog", "0.3.0")}
+"""Names that were public, as they are called now, and the version without the old one."""
+
+
+def __getattr__(name: str) -> object:
+    """Return a public name; one by its old name, too, with a warning."""
+    if name in _RENAMED:
+        new, end = _RENAMED[name]
+        warnings.warn(
+            f"semsig_gis.{name} is called {new} now; the old name goes with version {end}.",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        name = new
+    return _attached(name)

@@ -25,7 +25,7 @@ from .sources.synthetic.city import (
 from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
 from .objects.conflate import conflate as conflate
-from .objects.draft import suggest_catalog as suggest_catalog
+from .objects.draft import draft_catalog as draft_catalog
 from .objects.fetch import (
     fetch_layers as fetch_layers,
     find_area as find_area,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import hypothesis
 import pytest
 from browser_coverage import BrowserCoverage
-from machine import Part, qgis_variables, required, unavailable
+from machine import PATIENCE_S, Part, qgis_variables, required, unavailable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 # QGIS runs these with its own Python.
 collect_ignore = ["qgis_draw.py", "qgis_plugin/qgis_session.py"]
 
-# Fifty examples find what a hundred find, in a suite that is run many times.
-plain = hypothesis.settings(deadline=None, max_examples=50)
+# Twenty examples are enough in a suite that is run many times. To try five hundred:
+# pytest -m hypothesis --hypothesis-profile semsig-soak
+plain = hypothesis.settings(deadline=None, max_examples=20)
+hypothesis.settings.register_profile("semsig-soak", plain, max_examples=500)
 hypothesis.settings.register_profile("semsig", plain)
 hypothesis.settings.register_profile("semsig-ci", plain, derandomize=True, print_blob=True)
 hypothesis.settings.load_profile("semsig-ci" if os.environ.get("CI") else "semsig")
@@ -42,6 +44,11 @@ def pytest_configure(config: pytest.Config) -> None:
     if unknown:
         msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {get_args(Part)}."
         raise pytest.UsageError(msg)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest tests, lest one of them runs alone at the end."""
+    items.sort(key=lambda item: item.path.parent.name != "project")
 
 
 def is_local(address: object) -> bool:
@@ -164,6 +171,7 @@ def carried() -> None:
 
 @pytest.fixture(scope="session")
 def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
+    from map_pages import UNPACKING
     from selenium import webdriver
 
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
@@ -186,7 +194,9 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     service = webdriver.ChromeService(executable_path=driver)
     browser = webdriver.Chrome(options=options, service=service)
+    browser.set_script_timeout(PATIENCE_S)
     BROWSER_COVERAGE.start(browser)
+    browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": UNPACKING})
     yield browser
     BROWSER_COVERAGE.take(browser)
     browser.quit()
@@ -213,8 +223,13 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
     import dask
     from distributed import LocalCluster
 
+    settings = {
+        "temporary-directory": str(tmp_path_factory.mktemp("dask")),
+        # On a busy machine, a worker takes a while to start again after it was killed.
+        "distributed.deploy.lost-worker-timeout": f"{PATIENCE_S} s",
+    }
     with (
-        dask.config.set({"temporary-directory": str(tmp_path_factory.mktemp("dask"))}),
+        dask.config.set(settings),
         LocalCluster(
             n_workers=2,
             threads_per_worker=1,

@@ -1,4 +1,4 @@
-"""What a machine may lack: programs and data, and room on its disk."""
+"""What a machine may lack: programs and data, room on its disk, and time."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+PATIENCE_S = 300.0
+"""What takes longer hangs, on the busiest machine, too; programs that do much have six times it."""
 
 Part = Literal["browser", "geodata", "qgis"]
 """A test that needs one of them skips where it is missing, unless SEMSIG_REQUIRE names it."""

@@ -34,6 +34,9 @@ const atRest = (then, frames = 3) => {
   else requestAnimationFrame(() => atRest(then, moves ? 3 : frames - 1));
 };
 
+// Kept once the arrays that the page has begun to unpack are there.
+const unpacked = () => Promise.all(window.unpacking);
+
 // What the panel says.
 const panel = () => document.querySelector(".semsig-panel").innerText;
 

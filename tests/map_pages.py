@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-import time
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from machine import PATIENCE_S
 from pyproj import Transformer
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
 
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.maps.page import save_map
@@ -32,12 +33,20 @@ HOSTILE = (
 IMAGES = "img.leaflet-image-layer"
 LEGEND = ".semsig-legend"
 
-# What the script of a page can be asked about its one map.
-# Numbers are unpacked when the page is there.
-READY = """
-const parts = Object.values(window.semsig?.held ?? {}).map((one) => one.ready);
-Promise.all(parts).then(() => requestAnimationFrame(() => arguments[0]()));
+# Run before each page: what it unpacks is known.
+UNPACKING = """
+window.unpacking = [];
+for (const name of ["arrayBuffer", "json"]) {
+  const read = Response.prototype[name];
+  Response.prototype[name] = function () {
+    const result = read.call(this);
+    window.unpacking.push(result);
+    return result;
+  };
+}
 """
+READY = "unpacked().then(() => requestAnimationFrame(() => arguments[0]()));"
+# What the script of a page can be asked about its one map.
 ASK = Path(__file__).with_name("map_pages.js").read_text(encoding="utf-8")
 
 
@@ -57,7 +66,7 @@ class MapPage:
     def visit(self, address: str) -> None:
         """Open an address, and wait until the page has unpacked its numbers."""
         self.browser.get(address)
-        self.browser.execute_async_script(READY)
+        self.ask_later(READY)
 
     def ask_later(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
         """Return what a script hands to the last of its arguments."""
@@ -72,7 +81,7 @@ class MapPage:
 
     def drawn(self, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
         """Return the number of pixels of about this colour on a canvas, by default the circles'."""
-        time.sleep(0.3)  # canvases are drawn with the next frame
+        self.rest()
         return int(self.ask("return drawn(...arguments)", colour, canvas))
 
     def one(self, selector: str) -> WebElement:
@@ -105,12 +114,20 @@ class MapPage:
         offered = [one.text for one in self.all(".semsig-search [role=option]")]
         for key in keys:
             box.send_keys(key)
-        self.ask_later("atRest(arguments[arguments.length - 1])")
+        self.rest()
         return offered
+
+    def rest(self) -> None:
+        """Wait until arrays are unpacked, canvases are drawn, and the map lies still."""
+        self.ask_later("unpacked().then(() => atRest(arguments[0]))")
+
+    def until_gone(self, selector: str) -> None:
+        """Wait until the last such element has faded away."""
+        WebDriverWait(self.browser, PATIENCE_S).until(lambda _: self.all(selector) == [])
 
     def panel(self) -> str:
         """Return what the panel says, nothing if it is closed."""
-        time.sleep(0.4)  # arrays are unpacked once
+        self.rest()
         return str(self.ask("return panel()"))
 
     def told(self) -> dict[str, str]:

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Self
 from urllib.parse import parse_qsl, urlsplit
 
 import pytest
+from machine import PATIENCE_S
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -167,7 +168,7 @@ class Server(contextlib.ExitStack):
 
 class _Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
-    timeout = 10.0  # for a client that connects and says nothing
+    timeout = PATIENCE_S  # for a client that connects and says nothing
     playing: Server
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - the base class's name

@@ -289,13 +289,6 @@ def cell_loglik(
     return float(np.logaddexp.reduce(each))
 
 
-def normal_turns(sigma: float, *, step: float) -> list[tuple[float, float]]:
-    """Return turns a step apart over the full turn and their chances; sigma may be infinite."""
-    turns = np.arange(-180.0, 180.0, step)
-    chances = np.ones(len(turns)) if math.isinf(sigma) else np.exp(-0.5 * (turns / sigma) ** 2)
-    return list(zip(turns.tolist(), (chances / chances.sum()).tolist(), strict=True))
-
-
 def random_view(
     database: SignatureDatabase, rng: np.random.Generator, *, size: int, photos: Sequence[Photo]
 ) -> View:

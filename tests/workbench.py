@@ -11,6 +11,8 @@ import zlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from machine import PATIENCE_S
+
 from semsig_gis.serve import server
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ class Page:
         """Return the code, the headers and the body of the answer to a request."""
         own = {"X-Semsig-Token": self.token, **self.headers}
         own |= {name.replace("_", "-"): value for name, value in headers.items()}
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
         connection.request("GET" if body is None else "POST", path, body, own)
         answer = connection.getresponse()
         content = answer.read()

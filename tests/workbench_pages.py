@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from machine import PATIENCE_S
 from map_pages import requested
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -25,7 +26,6 @@ const {session} = semsig;
 return Boolean(session) && !session.asking && !document.body.ariaBusy
   && Number(document.body.dataset.answered) === session.changedAt;
 """
-PATIENCE_S = 30
 
 
 @dataclass(frozen=True)

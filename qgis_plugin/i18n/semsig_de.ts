@@ -28,12 +28,60 @@
         <translation>6. Zellen exportieren</translation>
     </message>
     <message>
+        <source>A CRS in metres; by default that of the catalogue, or the UTM zone.</source>
+        <translation>Ein KBS in Metern; ohne Angabe das des Katalogs oder die UTM-Zone.</translation>
+    </message>
+    <message>
+        <source>A GeoTIFF: of each cell, how many look the same.</source>
+        <translation>Ein GeoTIFF: zu jeder Zelle, wie viele gleich aussehen.</translation>
+    </message>
+    <message>
+        <source>A catalogue file, besides those chosen above or instead of them.</source>
+        <translation>Eine Katalogdatei, neben den oben gewählten oder statt ihrer.</translation>
+    </message>
+    <message>
+        <source>A catalogue says which file holds what: the open data of Montpellier and of Paris, and OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).</source>
+        <translation>Ein Katalog sagt, welche Datei was enthält: die offenen Daten von Montpellier und Paris und OpenStreetMap sind eingebaut; für andere Daten schreiben Sie einen („Katalog vorschlagen“ entwirft ihn).</translation>
+    </message>
+    <message>
         <source>A cell is drawn as</source>
         <translation>Eine Zelle wird gezeichnet als</translation>
     </message>
     <message>
         <source>A cell must see</source>
         <translation>Eine Zelle muss sehen</translation>
+    </message>
+    <message>
+        <source>A folder in which the catalogue's files are looked for, instead of files.</source>
+        <translation>Ein Ordner, in dem die Dateien des Katalogs gesucht werden, statt einzelner Dateien.</translation>
+    </message>
+    <message>
+        <source>A large city takes minutes. What is known already is not computed again.</source>
+        <translation>Eine große Stadt braucht Minuten. Was schon bekannt ist, wird nicht noch einmal berechnet.</translation>
+    </message>
+    <message>
+        <source>A page for the browser with the chances and the candidates.</source>
+        <translation>Eine Seite für den Browser mit den Chancen und den Kandidaten.</translation>
+    </message>
+    <message>
+        <source>A page for the browser, on which cells can be clicked.</source>
+        <translation>Eine Seite für den Browser, auf der Zellen angeklickt werden können.</translation>
+    </message>
+    <message>
+        <source>A page for the browser: successful and failed queries, and where they fail.</source>
+        <translation>Eine Seite für den Browser: erfolgreiche und gescheiterte Anfragen, und wo sie scheitern.</translation>
+    </message>
+    <message>
+        <source>A query counts as found if its best place is as near as this to the true one.</source>
+        <translation>Eine Anfrage gilt als gefunden, wenn ihr bester Ort dem wahren so nahe ist.</translation>
+    </message>
+    <message>
+        <source>A query is right if one of so many is.</source>
+        <translation>Eine Anfrage ist richtig beantwortet, wenn einer von so vielen Kandidaten stimmt.</translation>
+    </message>
+    <message>
+        <source>A vector file of any format.</source>
+        <translation>Eine Vektordatei beliebigen Formats.</translation>
     </message>
     <message>
         <source>Ambiguity</source>
@@ -44,8 +92,24 @@
         <translation>Winkelstufen</translation>
     </message>
     <message>
+        <source>Another number draws other queries.</source>
+        <translation>Eine andere Zahl zieht andere Anfragen.</translation>
+    </message>
+    <message>
+        <source>Another number makes another city.</source>
+        <translation>Eine andere Zahl ergibt eine andere Stadt.</translation>
+    </message>
+    <message>
+        <source>Another number simulates other queries.</source>
+        <translation>Eine andere Zahl simuliert andere Anfragen.</translation>
+    </message>
+    <message>
         <source>Answer</source>
         <translation>Antwort</translation>
+    </message>
+    <message>
+        <source>Applies new street objects to a database: only the cells that see a change are made anew. The layers of the new objects take the place of those in the database.</source>
+        <translation>Bringt eine Datenbank auf den Stand neuer Straßenobjekte: nur die Zellen, die eine Änderung sehen, werden neu berechnet. Die Layer der neuen Objekte ersetzen die der Datenbank.</translation>
     </message>
     <message>
         <source>Area</source>
@@ -62,6 +126,14 @@
     <message>
         <source>Best candidates that count</source>
         <translation>Beste Kandidaten, die zählen</translation>
+    </message>
+    <message>
+        <source>Building footprints to write too, where the files have some. “Build signature database” hides what is behind them.</source>
+        <translation>Auch Gebäudegrundrisse schreiben, wo die Dateien welche haben. „Signaturdatenbank aufbauen“ verdeckt, was hinter ihnen liegt.</translation>
+    </message>
+    <message>
+        <source>Building footprints to write too. “Build signature database” hides what is behind them.</source>
+        <translation>Auch Gebäudegrundrisse schreiben. „Signaturdatenbank aufbauen“ verdeckt, was hinter ihnen liegt.</translation>
     </message>
     <message>
         <source>Buildings</source>
@@ -112,6 +184,22 @@
         <translation>Zellen</translation>
     </message>
     <message>
+        <source>Cells that see nothing are left out. Beside the database a folder appears with the street objects, ready to be searched; keep it there.</source>
+        <translation>Zellen, die nichts sehen, fallen weg. Neben der Datenbank erscheint ein Ordner mit den Straßenobjekten; lassen Sie ihn dort.</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets to write too, where the files have some.</source>
+        <translation>Auch Mittellinien von Straßen schreiben, wo die Dateien welche haben.</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets to write too.</source>
+        <translation>Auch Mittellinien von Straßen schreiben.</translation>
+    </message>
+    <message>
+        <source>Centre lines, for the viewpoints along streets.</source>
+        <translation>Mittellinien, für Standpunkte entlang der Straßen.</translation>
+    </message>
+    <message>
         <source>Chance</source>
         <translation>Wahrscheinlichkeit</translation>
     </message>
@@ -160,8 +248,24 @@
         <translation>Verfälschung</translation>
     </message>
     <message>
+        <source>Divides the city into square cells and notes for each which street objects are seen from its centre, clockwise from north: its signature. That is what queries are compared with.</source>
+        <translation>Teilt die Stadt in quadratische Zellen und hält für jede fest, welche Straßenobjekte von ihrer Mitte aus zu sehen sind, von Norden an im Uhrzeigersinn: ihre Signatur. Damit werden Anfragen verglichen.</translation>
+    </message>
+    <message>
         <source>Download OpenStreetMap for this canvas</source>
         <translation>OpenStreetMap für diesen Kartenausschnitt laden</translation>
+    </message>
+    <message>
+        <source>Downloads the street objects of OpenStreetMap (trees, lamps, benches, stops...) in a part of the map, from an Overpass server, into a table that “Build signature database” takes.</source>
+        <translation>Lädt die Straßenobjekte von OpenStreetMap (Bäume, Laternen, Bänke, Haltestellen …) in einem Teil der Karte von einem Overpass-Server herunter, in eine Tabelle für „Signaturdatenbank aufbauen“.</translation>
+    </message>
+    <message>
+        <source>Downloads the street objects of a city: by its name, or in the polygons of a layer. A catalogue says from where: OpenStreetMap has every place; a city's own portal has more of that city.</source>
+        <translation>Lädt die Straßenobjekte einer Stadt herunter: nach ihrem Namen oder in den Polygonen eines Layers. Ein Katalog sagt, woher: OpenStreetMap kennt jeden Ort; das Portal einer Stadt hat mehr von dieser Stadt.</translation>
+    </message>
+    <message>
+        <source>Drafts a catalogue for a file of your own: which column says what an object is, and which class of street objects each of its values may be. Look through the draft in a text editor, mend it, and give it to “Load street objects” as a catalogue of your own.</source>
+        <translation>Entwirft einen Katalog für eine eigene Datei: welche Spalte sagt, was ein Objekt ist, und welche Klasse von Straßenobjekten jeder ihrer Werte sein könnte. Sehen Sie den Entwurf in einem Texteditor durch, verbessern Sie ihn, und geben Sie ihn „Straßenobjekte laden“ als eigenen Katalog.</translation>
     </message>
     <message>
         <source>Engine of Semantic signatures</source>
@@ -170,6 +274,10 @@
     <message>
         <source>Engine...</source>
         <translation>Engine ...</translation>
+    </message>
+    <message>
+        <source>Every cell, those outside the buildings, or along the streets and outside them.</source>
+        <translation>Alle Zellen, die außerhalb der Gebäude, oder die entlang der Straßen und außerhalb der Gebäude.</translation>
     </message>
     <message>
         <source>Explore a city</source>
@@ -212,12 +320,28 @@
         <translation>Ordner mit Wheels (leer lassen, um sie herunterzuladen)</translation>
     </message>
     <message>
+        <source>Folder to write to.</source>
+        <translation>Der Ordner, in den geschrieben wird.</translation>
+    </message>
+    <message>
+        <source>Footprints: what they hide is not seen.</source>
+        <translation>Grundrisse: was sie verdecken, ist nicht zu sehen.</translation>
+    </message>
+    <message>
+        <source>For files that do not state theirs.</source>
+        <translation>Für Dateien, die ihres nicht angeben.</translation>
+    </message>
+    <message>
         <source>Found within (m)</source>
         <translation>Gefunden im Umkreis von (m)</translation>
     </message>
     <message>
         <source>Found: the place is within {metres} m with a chance of {chance}.</source>
         <translation>Gefunden: Der Ort liegt mit einer Wahrscheinlichkeit von {chance} im Umkreis von {metres} m.</translation>
+    </message>
+    <message>
+        <source>From how far an object is seen, unless the catalogue says it of its class.</source>
+        <translation>Von wie weit ein Objekt zu sehen ist, wenn der Katalog es nicht für seine Klasse sagt.</translation>
     </message>
     <message>
         <source>From the true to the best place</source>
@@ -232,6 +356,34 @@
         <translation>Hilfe</translation>
     </message>
     <message>
+        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by how many objects must be added, taken away or exchanged to turn one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells whose types fit best. histogram+histogram: by how often each type and each angle occurs, whatever the order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by the types or the angles alone.</source>
+        <translation>Wie Zellen mit einer Anfrage verglichen werden. likelihood: nach der Chance, dass ein Detektor die Anfrage von dort sieht. edit+edit: danach, wie viele Objekte hinzukommen, wegfallen oder getauscht werden müssen, um die eine Folge in die andere zu verwandeln, im Mittel von Typen und Winkeln. edit+edit:5%: dasselbe unter den 5 % der Zellen, deren Typen am besten passen. histogram+histogram: danach, wie oft jeder Typ und jeder Winkel vorkommt, gleich in welcher Reihenfolge. jaccard+jaccard: danach, welche Typen und welche Winkel überhaupt vorkommen. types:edit und angles:edit: wie edit+edit, nach den Typen oder den Winkeln allein.</translation>
+    </message>
+    <message>
+        <source>How many are asked.</source>
+        <translation>Wie viele gestellt werden.</translation>
+    </message>
+    <message>
+        <source>How many cells to list.</source>
+        <translation>Wie viele Zellen aufgeführt werden.</translation>
+    </message>
+    <message>
+        <source>How many objects the detector gets wrong: none, 1, 7 or 13.</source>
+        <translation>Bei wie vielen Objekten der Detektor sich irrt: keinem, 1, 7 oder 13.</translation>
+    </message>
+    <message>
+        <source>How much of what is seen will be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person notes down.</source>
+        <translation>Wie viel von dem Gesehenen falsch sein wird: light (wenig), medium (mittel), strong (viel) oder generic, wo das nicht bekannt ist; by-hand für das, was ein Mensch notiert.</translation>
+    </message>
+    <message>
+        <source>If “Where queries can be placed” was run, what it found goes with the cells.</source>
+        <translation>Wurde „Wo Anfragen verortet werden können“ ausgeführt, steht bei den Zellen, was es ergab.</translation>
+    </message>
+    <message>
+        <source>In how many equal sectors the methods of the paper compare bearings. More of them tell cells apart better, and forgive less where bearings are off.</source>
+        <translation>In wie vielen gleichen Sektoren die Verfahren des Aufsatzes Richtungen vergleichen. Mehr davon unterscheiden Zellen besser und verzeihen falsche Richtungen weniger.</translation>
+    </message>
+    <message>
         <source>Install</source>
         <translation>Installieren</translation>
     </message>
@@ -244,16 +396,36 @@
         <translation>Die Engine von Semantische Signaturen wird installiert</translation>
     </message>
     <message>
+        <source>Its square, or its centre.</source>
+        <translation>Ihr Quadrat oder ihre Mitte.</translation>
+    </message>
+    <message>
         <source>Looking for Python...</source>
         <translation>Python wird gesucht ...</translation>
+    </message>
+    <message>
+        <source>Makes up a small city, builds its database, asks it, and shows what came out: for trying things, without any data or network. The folder holds city.parquet for the other tools.</source>
+        <translation>Erfindet eine kleine Stadt, baut ihre Datenbank, befragt sie und zeigt, was herauskam: zum Ausprobieren, ohne Daten und Netz. Der Ordner enthält city.parquet für die anderen Werkzeuge.</translation>
     </message>
     <message>
         <source>Map page</source>
         <translation>Kartenseite</translation>
     </message>
     <message>
+        <source>Measures how often answers are right. Cells are drawn as queries, their signatures are distorted as a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is compared with the true place.</source>
+        <translation>Misst, wie oft Antworten stimmen. Zellen werden als Anfragen gezogen, ihre Signaturen verfälscht, wie ein schlechter Detektor es täte (Objekte übersehen, erfunden oder falsch benannt, Richtungen ungenau), und die beste Antwort wird mit dem wahren Ort verglichen.</translation>
+    </message>
+    <message>
         <source>Method</source>
         <translation>Methode</translation>
+    </message>
+    <message>
+        <source>Name of a city or quarter, such as Gentilly, France.</source>
+        <translation>Name einer Stadt oder eines Viertels, etwa Gentilly, France.</translation>
+    </message>
+    <message>
+        <source>New ones: the file that “Load street objects” or a download wrote.</source>
+        <translation>Neue: die Datei, die „Straßenobjekte laden“ oder ein Download geschrieben hat.</translation>
     </message>
     <message>
         <source>North</source>
@@ -296,6 +468,14 @@
         <translation>Ort</translation>
     </message>
     <message>
+        <source>Polygons instead of a name.</source>
+        <translation>Polygone statt eines Namens.</translation>
+    </message>
+    <message>
+        <source>Polygons that the cells must lie in.</source>
+        <translation>Polygone, in denen die Zellen liegen müssen.</translation>
+    </message>
+    <message>
         <source>Python (3.11 or newer)</source>
         <translation>Python (3.11 oder neuer)</translation>
     </message>
@@ -310,6 +490,10 @@
     <message>
         <source>Rank</source>
         <translation>Rang</translation>
+    </message>
+    <message>
+        <source>Reads files of open data (trees, street lights, benches, bus stops...) into one table of street objects, which “Build signature database” takes.</source>
+        <translation>Liest Dateien offener Daten (Bäume, Laternen, Bänke, Bushaltestellen …) in eine Tabelle von Straßenobjekten für „Signaturdatenbank aufbauen“.</translation>
     </message>
     <message>
         <source>Regions to search</source>
@@ -336,6 +520,10 @@
         <translation>Semantische Signaturen</translation>
     </message>
     <message>
+        <source>Shows how many cells see the same types in the same order: a cell alone can be told at once, one of a thousand cannot. “Where queries can be placed” tells more, and takes longer.</source>
+        <translation>Zeigt, wie viele Zellen dieselben Typen in derselben Reihenfolge sehen: eine einzelne erkennt man sofort, eine von tausend nicht. „Wo Anfragen verortet werden können“ sagt mehr und dauert länger.</translation>
+    </message>
+    <message>
         <source>Shows what is seen from a cell, and the cells most like it.</source>
         <translation>Zeigt, was man aus einer Zelle sieht, und die Zellen, die ihr am meisten gleichen.</translation>
     </message>
@@ -352,6 +540,14 @@
         <translation>Signaturdatenbanken (*.parquet)</translation>
     </message>
     <message>
+        <source>So far around their cells is searched too.</source>
+        <translation>So weit um ihre Zellen herum wird auch gesucht.</translation>
+    </message>
+    <message>
+        <source>Some square kilometres take seconds to minutes. What was downloaded before is taken from the cache. The server is a setting: Settings &gt; Options &gt; Processing &gt; Providers &gt; Semantic signatures.</source>
+        <translation>Einige Quadratkilometer brauchen Sekunden bis Minuten. Was schon heruntergeladen wurde, kommt aus dem Zwischenspeicher. Der Server wird eingestellt unter Einstellungen &gt; Optionen &gt; Verarbeitung &gt; Anbieter &gt; Semantische Signaturen.</translation>
+    </message>
+    <message>
         <source>Stopping...</source>
         <translation>Wird angehalten ...</translation>
     </message>
@@ -364,12 +560,60 @@
         <translation>Straßen</translation>
     </message>
     <message>
+        <source>Such as M (a bus stop), 2B (two trees or more), B=0 (no tree), ?&lt;=10 (ten objects or fewer).</source>
+        <translation>Etwa M (eine Bushaltestelle), 2B (zwei Bäume oder mehr), B=0 (kein Baum), ?&lt;=10 (höchstens zehn Objekte).</translation>
+    </message>
+    <message>
         <source>Suggest a catalogue</source>
         <translation>Katalog vorschlagen</translation>
     </message>
     <message>
+        <source>Symbols of what is seen, clockwise from north, such as DDBL; ? where one is unknown. The paper's: B tree, C fountain, D street light, E indicator, G traffic light, H bike station, I public toilet, J car sharing, K taxi rank, L bench, M bus stop; a catalogue may have more.</source>
+        <translation>Symbole dessen, was zu sehen ist, von Norden an im Uhrzeigersinn, etwa DDBL; ? für ein unbekanntes. Die des Aufsatzes: B Baum, C Brunnen, D Laterne, E Anzeiger, G Ampel, H Fahrradstation, I öffentliche Toilette, J Carsharing, K Taxistand, L Bank, M Bushaltestelle; ein Katalog kann mehr haben.</translation>
+    </message>
+    <message>
+        <source>Tells of every cell, before any query, how likely one from there will be found, and for which other cells it will be taken. A street with three lamps looks like thousands of others; here they are.</source>
+        <translation>Sagt für jede Zelle, noch vor jeder Anfrage, wie wahrscheinlich eine von dort gefunden wird und mit welchen anderen Zellen man sie verwechselt. Eine Straße mit drei Laternen sieht aus wie tausend andere; hier sind sie.</translation>
+    </message>
+    <message>
+        <source>Tells where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types alone or bearings alone are fine.</source>
+        <translation>Sagt, von wo in der Stadt eine Ansicht stammt: was zu sehen ist, von Norden an im Uhrzeigersinn, wird mit der Signatur jeder Zelle verglichen. Typen allein oder Richtungen allein genügen.</translation>
+    </message>
+    <message>
+        <source>The GeoPackage to write.</source>
+        <translation>Das GeoPackage, das geschrieben wird.</translation>
+    </message>
+    <message>
+        <source>The best cells.</source>
+        <translation>Die besten Zellen.</translation>
+    </message>
+    <message>
+        <source>The cells and the street objects as layers, in a GeoPackage.</source>
+        <translation>Die Zellen und die Straßenobjekte als Layer, in einem GeoPackage.</translation>
+    </message>
+    <message>
+        <source>The cells by their chance, in a GeoPackage.</source>
+        <translation>Die Zellen nach ihrer Chance, in einem GeoPackage.</translation>
+    </message>
+    <message>
         <source>The cells that a view from here would be taken for, by chance:</source>
         <translation>Die Zellen, für die ein Blick von hier gehalten würde, nach Wahrscheinlichkeit:</translation>
+    </message>
+    <message>
+        <source>The database gets columns that say so, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click what a cell is taken for.</source>
+        <translation>Die Datenbank erhält Spalten, die das sagen, und die Zellen werden nach ihrer Chance gezeigt. Die Kartenseite für den Browser zeigt auf einen Klick, wofür eine Zelle gehalten wird.</translation>
+    </message>
+    <message>
+        <source>The database to write.</source>
+        <translation>Die Datenbank, die geschrieben wird.</translation>
+    </message>
+    <message>
+        <source>The database to write. A temporary file is lost when QGIS is closed.</source>
+        <translation>Die Datenbank, die geschrieben wird. Eine temporäre Datei geht verloren, wenn QGIS beendet wird.</translation>
+    </message>
+    <message>
+        <source>The draft to write.</source>
+        <translation>Der Entwurf, der geschrieben wird.</translation>
     </message>
     <message>
         <source>The engine did not answer.</source>
@@ -396,8 +640,48 @@
         <translation>Die Engine wurde entfernt.</translation>
     </message>
     <message>
+        <source>The file that “Build signature database” wrote.</source>
+        <translation>Die Datei, die „Signaturdatenbank aufbauen“ geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>The file that “Load street objects” wrote, for a second layer.</source>
+        <translation>Die Datei, die „Straßenobjekte laden“ geschrieben hat, für einen zweiten Layer.</translation>
+    </message>
+    <message>
+        <source>The file that “Load street objects” wrote.</source>
+        <translation>Die Datei, die „Straßenobjekte laden“ geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>The likelihood method gives each candidate a chance, tells the place between the middles of the cells with its uncertainty, and says when it cannot tell. The other methods are those of the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
+        <translation>Das Verfahren likelihood gibt jedem Kandidaten eine Chance, nennt den Ort zwischen den Mitten der Zellen mit seiner Unsicherheit und sagt, wenn es ihn nicht nennen kann. Die anderen Verfahren sind die des Aufsatzes; sie ordnen Zellen nach einer Distanz, und Zellen, die gleich aussehen, teilen einen Rang.</translation>
+    </message>
+    <message>
+        <source>The log has a table of the results; the folder has them for other programs, the layers and the map page for the eye.</source>
+        <translation>Im Protokoll steht eine Tabelle der Ergebnisse; der Ordner enthält sie für andere Programme, die Layer und die Kartenseite sind fürs Auge.</translation>
+    </message>
+    <message>
+        <source>The log tells what became of every row: how many are objects, how many were left out, and why.</source>
+        <translation>Das Protokoll sagt, was aus jeder Zeile wurde: wie viele Objekte sind, wie viele wegfielen, und warum.</translation>
+    </message>
+    <message>
+        <source>The paper of Weng, Gouet-Brunet and Soheilian has 10 m.</source>
+        <translation>Im Aufsatz von Weng, Gouet-Brunet und Soheilian sind es 10 m.</translation>
+    </message>
+    <message>
+        <source>The queries at their true places, and lines to the places that were found, in a GeoPackage.</source>
+        <translation>Die Anfragen an ihren wahren Orten und Linien zu den gefundenen, in einem GeoPackage.</translation>
+    </message>
+    <message>
+        <source>The queries, their errors and a summary, for other programs.</source>
+        <translation>Die Anfragen, ihre Fehler und eine Zusammenfassung, für andere Programme.</translation>
+    </message>
+    <message>
         <source>The semsig command (leave empty to look for it)</source>
         <translation>Der Befehl semsig (leer lassen, um ihn zu suchen)</translation>
+    </message>
+    <message>
+        <source>The table of street objects to write. A temporary file is lost when QGIS is closed.</source>
+        <translation>Die Tabelle der Straßenobjekte, die geschrieben wird. Eine temporäre Datei geht verloren, wenn QGIS beendet wird.</translation>
     </message>
     <message>
         <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1.2 GB; nothing else on this computer is changed.</source>
@@ -420,12 +704,68 @@
         <translation>Aktualisierte Datenbank</translation>
     </message>
     <message>
+        <source>Vector files of any format, .osm or .osm.pbf; zipped is fine.</source>
+        <translation>Vektordateien beliebigen Formats, .osm oder .osm.pbf; auch gezippt.</translation>
+    </message>
+    <message>
         <source>Viewpoints</source>
         <translation>Standpunkte</translation>
     </message>
     <message>
         <source>Visibility range (m)</source>
         <translation>Sichtweite (m)</translation>
+    </message>
+    <message>
+        <source>What else happens to a query, with commas between, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
+        <translation>Was mit einer Anfrage noch geschieht, durch Kommas getrennt, etwa compass:10,view:90 (ein Kompass, der um 10° abweicht, ein Blickfeld von 90°).</translation>
+    </message>
+    <message>
+        <source>What is downloaded; that of the canvas by default.</source>
+        <translation>Was heruntergeladen wird; ohne Angabe der Ausschnitt der Karte.</translation>
+    </message>
+    <message>
+        <source>What of the city must be searched for the query, in a GeoPackage.</source>
+        <translation>Was von der Stadt für die Anfrage abgesucht werden muss, in einem GeoPackage.</translation>
+    </message>
+    <message>
+        <source>What the files hold. With several, objects that two of them have are merged; the first is taken for the best source.</source>
+        <translation>Was die Dateien enthalten. Bei mehreren werden Objekte, die zwei davon haben, zusammengelegt; der erste gilt als beste Quelle.</translation>
+    </message>
+    <message>
+        <source>Where each is seen, in degrees clockwise from north, with commas between them, such as 10,80,200,310.</source>
+        <translation>In welcher Richtung jedes zu sehen ist, in Grad von Norden im Uhrzeigersinn, durch Kommas getrennt, etwa 10,80,200,310.</translation>
+    </message>
+    <message>
+        <source>Where the data come from.</source>
+        <translation>Woher die Daten kommen.</translation>
+    </message>
+    <message>
+        <source>With likelihood and an uncertain north, the standard deviation.</source>
+        <translation>Bei likelihood und unsicherem Norden: die Standardabweichung.</translation>
+    </message>
+    <message>
+        <source>With likelihood, how much of what is seen may be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person noted down.</source>
+        <translation>Bei likelihood: wie viel von dem Gesehenen falsch sein kann: light (wenig), medium (mittel), strong (viel) oder generic, wo das nicht bekannt ist; by-hand für das, was ein Mensch notiert hat.</translation>
+    </message>
+    <message>
+        <source>With likelihood, whether the north is known.</source>
+        <translation>Bei likelihood: ob Norden bekannt ist.</translation>
+    </message>
+    <message>
+        <source>With likelihood: polygons that the place lies in.</source>
+        <translation>Bei likelihood: Polygone, in denen der Ort liegt.</translation>
+    </message>
+    <message>
+        <source>With likelihood: the ellipse in which the place lies with a chance of 90 %, if the answer is right.</source>
+        <translation>Bei likelihood: die Ellipse, in der der Ort mit einer Chance von 90 % liegt, wenn die Antwort stimmt.</translation>
+    </message>
+    <message>
+        <source>With likelihood: they are as large as needed for that, 0.9 by default.</source>
+        <translation>Bei likelihood: sie sind so groß wie dafür nötig, ohne Angabe 0,9.</translation>
+    </message>
+    <message>
+        <source>Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and how many other cells look the same; with the street objects, these become a second layer.</source>
+        <translation>Schreibt die Zellen einer Datenbank in ein GeoPackage: was von jeder aus zu sehen ist, von Norden an im Uhrzeigersinn, und wie viele andere Zellen gleich aussehen; werden die Straßenobjekte angegeben, so werden sie ein zweiter Layer.</translation>
     </message>
     <message>
         <source>downloaded</source>

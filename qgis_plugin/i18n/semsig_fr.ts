@@ -28,12 +28,60 @@
         <translation>6. Exporter les cellules</translation>
     </message>
     <message>
+        <source>A CRS in metres; by default that of the catalogue, or the UTM zone.</source>
+        <translation>Un SCR en mètres ; par défaut celui du catalogue, ou la zone UTM.</translation>
+    </message>
+    <message>
+        <source>A GeoTIFF: of each cell, how many look the same.</source>
+        <translation>Un GeoTIFF : pour chaque cellule, combien ont le même aspect.</translation>
+    </message>
+    <message>
+        <source>A catalogue file, besides those chosen above or instead of them.</source>
+        <translation>Un fichier de catalogue, en plus de ceux choisis ci-dessus ou à leur place.</translation>
+    </message>
+    <message>
+        <source>A catalogue says which file holds what: the open data of Montpellier and of Paris, and OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).</source>
+        <translation>Un catalogue dit quel fichier contient quoi : les données ouvertes de Montpellier et de Paris, et OpenStreetMap, sont intégrés ; pour d’autres données, écrivez-en un (« Proposer un catalogue » l’esquisse).</translation>
+    </message>
+    <message>
         <source>A cell is drawn as</source>
         <translation>Une cellule est dessinée comme</translation>
     </message>
     <message>
         <source>A cell must see</source>
         <translation>Une cellule doit voir</translation>
+    </message>
+    <message>
+        <source>A folder in which the catalogue's files are looked for, instead of files.</source>
+        <translation>Un dossier où sont cherchés les fichiers du catalogue, au lieu de fichiers.</translation>
+    </message>
+    <message>
+        <source>A large city takes minutes. What is known already is not computed again.</source>
+        <translation>Une grande ville prend des minutes. Ce qui est déjà connu n’est pas recalculé.</translation>
+    </message>
+    <message>
+        <source>A page for the browser with the chances and the candidates.</source>
+        <translation>Une page pour le navigateur avec les probabilités et les candidats.</translation>
+    </message>
+    <message>
+        <source>A page for the browser, on which cells can be clicked.</source>
+        <translation>Une page pour le navigateur, où l’on peut cliquer sur les cellules.</translation>
+    </message>
+    <message>
+        <source>A page for the browser: successful and failed queries, and where they fail.</source>
+        <translation>Une page pour le navigateur : requêtes réussies et manquées, et où elles échouent.</translation>
+    </message>
+    <message>
+        <source>A query counts as found if its best place is as near as this to the true one.</source>
+        <translation>Une requête compte comme trouvée si son meilleur lieu est à cette distance au plus du vrai.</translation>
+    </message>
+    <message>
+        <source>A query is right if one of so many is.</source>
+        <translation>Une requête est juste si l’un d’autant de candidats l’est.</translation>
+    </message>
+    <message>
+        <source>A vector file of any format.</source>
+        <translation>Un fichier vecteur de n’importe quel format.</translation>
     </message>
     <message>
         <source>Ambiguity</source>
@@ -44,8 +92,24 @@
         <translation>Niveaux d’angle</translation>
     </message>
     <message>
+        <source>Another number draws other queries.</source>
+        <translation>Un autre nombre tire d’autres requêtes.</translation>
+    </message>
+    <message>
+        <source>Another number makes another city.</source>
+        <translation>Un autre nombre donne une autre ville.</translation>
+    </message>
+    <message>
+        <source>Another number simulates other queries.</source>
+        <translation>Un autre nombre simule d’autres requêtes.</translation>
+    </message>
+    <message>
         <source>Answer</source>
         <translation>Réponse</translation>
+    </message>
+    <message>
+        <source>Applies new street objects to a database: only the cells that see a change are made anew. The layers of the new objects take the place of those in the database.</source>
+        <translation>Applique de nouveaux objets de rue à une base : seules les cellules qui voient un changement sont recalculées. Les couches des nouveaux objets remplacent celles de la base.</translation>
     </message>
     <message>
         <source>Area</source>
@@ -62,6 +126,14 @@
     <message>
         <source>Best candidates that count</source>
         <translation>Meilleurs candidats qui comptent</translation>
+    </message>
+    <message>
+        <source>Building footprints to write too, where the files have some. “Build signature database” hides what is behind them.</source>
+        <translation>Les emprises de bâtiments à écrire aussi, si les fichiers en ont. « Construire la base de signatures » cache ce qui est derrière.</translation>
+    </message>
+    <message>
+        <source>Building footprints to write too. “Build signature database” hides what is behind them.</source>
+        <translation>Les emprises de bâtiments à écrire aussi. « Construire la base de signatures » cache ce qui est derrière.</translation>
     </message>
     <message>
         <source>Buildings</source>
@@ -112,6 +184,22 @@
         <translation>Cellules</translation>
     </message>
     <message>
+        <source>Cells that see nothing are left out. Beside the database a folder appears with the street objects, ready to be searched; keep it there.</source>
+        <translation>Les cellules qui ne voient rien sont omises. À côté de la base apparaît un dossier avec les objets de rue ; laissez-le là.</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets to write too, where the files have some.</source>
+        <translation>Les lignes médianes des rues à écrire aussi, si les fichiers en ont.</translation>
+    </message>
+    <message>
+        <source>Centre lines of streets to write too.</source>
+        <translation>Les lignes médianes des rues à écrire aussi.</translation>
+    </message>
+    <message>
+        <source>Centre lines, for the viewpoints along streets.</source>
+        <translation>Lignes médianes, pour les points de vue le long des rues.</translation>
+    </message>
+    <message>
         <source>Chance</source>
         <translation>Probabilité</translation>
     </message>
@@ -160,8 +248,24 @@
         <translation>Distorsion</translation>
     </message>
     <message>
+        <source>Divides the city into square cells and notes for each which street objects are seen from its centre, clockwise from north: its signature. That is what queries are compared with.</source>
+        <translation>Découpe la ville en cellules carrées et note pour chacune quels objets de rue se voient de son centre, à partir du nord dans le sens des aiguilles d’une montre : sa signature. C’est à elle que les requêtes sont comparées.</translation>
+    </message>
+    <message>
         <source>Download OpenStreetMap for this canvas</source>
         <translation>Télécharger OpenStreetMap pour cette carte</translation>
+    </message>
+    <message>
+        <source>Downloads the street objects of OpenStreetMap (trees, lamps, benches, stops...) in a part of the map, from an Overpass server, into a table that “Build signature database” takes.</source>
+        <translation>Télécharge les objets de rue d’OpenStreetMap (arbres, lampadaires, bancs, arrêts…) d’une partie de la carte, depuis un serveur Overpass, dans une table pour « Construire la base de signatures ».</translation>
+    </message>
+    <message>
+        <source>Downloads the street objects of a city: by its name, or in the polygons of a layer. A catalogue says from where: OpenStreetMap has every place; a city's own portal has more of that city.</source>
+        <translation>Télécharge les objets de rue d’une ville : par son nom, ou dans les polygones d’une couche. Un catalogue dit d’où : OpenStreetMap a tous les lieux ; le portail d’une ville en sait plus sur elle.</translation>
+    </message>
+    <message>
+        <source>Drafts a catalogue for a file of your own: which column says what an object is, and which class of street objects each of its values may be. Look through the draft in a text editor, mend it, and give it to “Load street objects” as a catalogue of your own.</source>
+        <translation>Esquisse un catalogue pour un fichier à vous : quelle colonne dit ce qu’est un objet, et quelle classe d’objets de rue chacune de ses valeurs peut être. Relisez l’esquisse dans un éditeur de texte, corrigez-la, et donnez-la à « Charger les objets de rue » comme votre propre catalogue.</translation>
     </message>
     <message>
         <source>Engine of Semantic signatures</source>
@@ -170,6 +274,10 @@
     <message>
         <source>Engine...</source>
         <translation>Moteur…</translation>
+    </message>
+    <message>
+        <source>Every cell, those outside the buildings, or along the streets and outside them.</source>
+        <translation>Toutes les cellules, celles hors des bâtiments, ou celles le long des rues et hors des bâtiments.</translation>
     </message>
     <message>
         <source>Explore a city</source>
@@ -212,12 +320,28 @@
         <translation>Dossier de wheels (laisser vide pour les télécharger)</translation>
     </message>
     <message>
+        <source>Folder to write to.</source>
+        <translation>Le dossier où écrire.</translation>
+    </message>
+    <message>
+        <source>Footprints: what they hide is not seen.</source>
+        <translation>Emprises : ce qu’elles cachent ne se voit pas.</translation>
+    </message>
+    <message>
+        <source>For files that do not state theirs.</source>
+        <translation>Pour les fichiers qui n’indiquent pas le leur.</translation>
+    </message>
+    <message>
         <source>Found within (m)</source>
         <translation>Trouvé à moins de (m)</translation>
     </message>
     <message>
         <source>Found: the place is within {metres} m with a chance of {chance}.</source>
         <translation>Trouvé : le lieu est à moins de {metres} m avec une probabilité de {chance}.</translation>
+    </message>
+    <message>
+        <source>From how far an object is seen, unless the catalogue says it of its class.</source>
+        <translation>De quelle distance un objet se voit, si le catalogue ne le dit pas pour sa classe.</translation>
     </message>
     <message>
         <source>From the true to the best place</source>
@@ -232,6 +356,34 @@
         <translation>Aide</translation>
     </message>
     <message>
+        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by how many objects must be added, taken away or exchanged to turn one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells whose types fit best. histogram+histogram: by how often each type and each angle occurs, whatever the order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by the types or the angles alone.</source>
+        <translation>Comment les cellules sont comparées à une requête. likelihood : par la probabilité qu’un détecteur voie la requête de là. edit+edit : par le nombre d’objets à ajouter, à ôter ou à échanger pour changer une suite en l’autre, en moyenne des types et des angles. edit+edit:5% : de même, parmi les 5 % des cellules dont les types correspondent le mieux. histogram+histogram : par le nombre de fois que chaque type et chaque angle apparaît, quel que soit l’ordre. jaccard+jaccard : par les types et les angles qui apparaissent. types:edit et angles:edit : comme edit+edit, par les types ou les angles seuls.</translation>
+    </message>
+    <message>
+        <source>How many are asked.</source>
+        <translation>Combien sont posées.</translation>
+    </message>
+    <message>
+        <source>How many cells to list.</source>
+        <translation>Combien de cellules énumérer.</translation>
+    </message>
+    <message>
+        <source>How many objects the detector gets wrong: none, 1, 7 or 13.</source>
+        <translation>Sur combien d’objets le détecteur se trompe : aucun, 1, 7 ou 13.</translation>
+    </message>
+    <message>
+        <source>How much of what is seen will be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person notes down.</source>
+        <translation>Combien de ce qui est vu sera faux : light (peu), medium (moyen), strong (beaucoup), ou generic quand on ne le sait pas ; by-hand pour ce qu’une personne note.</translation>
+    </message>
+    <message>
+        <source>If “Where queries can be placed” was run, what it found goes with the cells.</source>
+        <translation>Si « Où les requêtes peuvent être situées » a été exécuté, ce qu’il a trouvé accompagne les cellules.</translation>
+    </message>
+    <message>
+        <source>In how many equal sectors the methods of the paper compare bearings. More of them tell cells apart better, and forgive less where bearings are off.</source>
+        <translation>En combien de secteurs égaux les méthodes de l’article comparent les azimuts. Plus il y en a, mieux les cellules se distinguent, et moins les azimuts faux sont pardonnés.</translation>
+    </message>
+    <message>
         <source>Install</source>
         <translation>Installer</translation>
     </message>
@@ -244,16 +396,36 @@
         <translation>Installation du moteur de Signatures sémantiques</translation>
     </message>
     <message>
+        <source>Its square, or its centre.</source>
+        <translation>Son carré, ou son centre.</translation>
+    </message>
+    <message>
         <source>Looking for Python...</source>
         <translation>Recherche de Python…</translation>
+    </message>
+    <message>
+        <source>Makes up a small city, builds its database, asks it, and shows what came out: for trying things, without any data or network. The folder holds city.parquet for the other tools.</source>
+        <translation>Invente une petite ville, construit sa base, l’interroge et montre le résultat : pour essayer, sans données ni réseau. Le dossier contient city.parquet pour les autres outils.</translation>
     </message>
     <message>
         <source>Map page</source>
         <translation>Page de carte</translation>
     </message>
     <message>
+        <source>Measures how often answers are right. Cells are drawn as queries, their signatures are distorted as a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is compared with the true place.</source>
+        <translation>Mesure combien de fois les réponses sont justes. Des cellules sont tirées comme requêtes, leurs signatures déformées comme par un mauvais détecteur (objets manqués, inventés ou mal nommés, azimuts faux), et la meilleure réponse est comparée au vrai lieu.</translation>
+    </message>
+    <message>
         <source>Method</source>
         <translation>Méthode</translation>
+    </message>
+    <message>
+        <source>Name of a city or quarter, such as Gentilly, France.</source>
+        <translation>Nom d’une ville ou d’un quartier, comme Gentilly, France.</translation>
+    </message>
+    <message>
+        <source>New ones: the file that “Load street objects” or a download wrote.</source>
+        <translation>Les nouveaux : le fichier qu’a écrit « Charger les objets de rue » ou un téléchargement.</translation>
     </message>
     <message>
         <source>North</source>
@@ -296,6 +468,14 @@
         <translation>Lieu</translation>
     </message>
     <message>
+        <source>Polygons instead of a name.</source>
+        <translation>Des polygones au lieu d’un nom.</translation>
+    </message>
+    <message>
+        <source>Polygons that the cells must lie in.</source>
+        <translation>Polygones où doivent se trouver les cellules.</translation>
+    </message>
+    <message>
         <source>Python (3.11 or newer)</source>
         <translation>Python (3.11 ou plus récent)</translation>
     </message>
@@ -310,6 +490,10 @@
     <message>
         <source>Rank</source>
         <translation>Rang</translation>
+    </message>
+    <message>
+        <source>Reads files of open data (trees, street lights, benches, bus stops...) into one table of street objects, which “Build signature database” takes.</source>
+        <translation>Lit des fichiers de données ouvertes (arbres, lampadaires, bancs, arrêts de bus…) dans une table d’objets de rue pour « Construire la base de signatures ».</translation>
     </message>
     <message>
         <source>Regions to search</source>
@@ -336,6 +520,10 @@
         <translation>Signatures sémantiques</translation>
     </message>
     <message>
+        <source>Shows how many cells see the same types in the same order: a cell alone can be told at once, one of a thousand cannot. “Where queries can be placed” tells more, and takes longer.</source>
+        <translation>Montre combien de cellules voient les mêmes types dans le même ordre : une cellule seule se reconnaît aussitôt, une parmi mille non. « Où les requêtes peuvent être situées » en dit plus, et prend plus de temps.</translation>
+    </message>
+    <message>
         <source>Shows what is seen from a cell, and the cells most like it.</source>
         <translation>Montre ce que l’on voit d’une cellule, et les cellules qui lui ressemblent le plus.</translation>
     </message>
@@ -352,6 +540,14 @@
         <translation>Bases de signatures (*.parquet)</translation>
     </message>
     <message>
+        <source>So far around their cells is searched too.</source>
+        <translation>On cherche aussi jusqu’à cette distance autour de leurs cellules.</translation>
+    </message>
+    <message>
+        <source>Some square kilometres take seconds to minutes. What was downloaded before is taken from the cache. The server is a setting: Settings &gt; Options &gt; Processing &gt; Providers &gt; Semantic signatures.</source>
+        <translation>Quelques kilomètres carrés prennent des secondes ou des minutes. Ce qui a déjà été téléchargé vient du cache. Le serveur se règle dans Préférences &gt; Options &gt; Traitement &gt; Fournisseurs &gt; Signatures sémantiques.</translation>
+    </message>
+    <message>
         <source>Stopping...</source>
         <translation>Arrêt…</translation>
     </message>
@@ -364,12 +560,60 @@
         <translation>Rues</translation>
     </message>
     <message>
+        <source>Such as M (a bus stop), 2B (two trees or more), B=0 (no tree), ?&lt;=10 (ten objects or fewer).</source>
+        <translation>Comme M (un arrêt de bus), 2B (deux arbres ou plus), B=0 (aucun arbre), ?&lt;=10 (dix objets au plus).</translation>
+    </message>
+    <message>
         <source>Suggest a catalogue</source>
         <translation>Proposer un catalogue</translation>
     </message>
     <message>
+        <source>Symbols of what is seen, clockwise from north, such as DDBL; ? where one is unknown. The paper's: B tree, C fountain, D street light, E indicator, G traffic light, H bike station, I public toilet, J car sharing, K taxi rank, L bench, M bus stop; a catalogue may have more.</source>
+        <translation>Symboles de ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, comme DDBL ; ? pour un inconnu. Ceux de l’article : B arbre, C fontaine, D lampadaire, E indicateur, G feu de circulation, H station de vélos, I toilettes publiques, J autopartage, K station de taxis, L banc, M arrêt de bus ; un catalogue peut en avoir d’autres.</translation>
+    </message>
+    <message>
+        <source>Tells of every cell, before any query, how likely one from there will be found, and for which other cells it will be taken. A street with three lamps looks like thousands of others; here they are.</source>
+        <translation>Dit pour chaque cellule, avant toute requête, avec quelle probabilité une requête faite là sera située, et pour quelles autres cellules elle sera prise. Une rue avec trois lampadaires ressemble à des milliers d’autres ; les voici.</translation>
+    </message>
+    <message>
+        <source>Tells where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types alone or bearings alone are fine.</source>
+        <translation>Dit d’où dans la ville une vue a été prise : ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, est comparé à la signature de chaque cellule. Des types seuls ou des azimuts seuls suffisent.</translation>
+    </message>
+    <message>
+        <source>The GeoPackage to write.</source>
+        <translation>Le GeoPackage à écrire.</translation>
+    </message>
+    <message>
+        <source>The best cells.</source>
+        <translation>Les meilleures cellules.</translation>
+    </message>
+    <message>
+        <source>The cells and the street objects as layers, in a GeoPackage.</source>
+        <translation>Les cellules et les objets de rue en couches, dans un GeoPackage.</translation>
+    </message>
+    <message>
+        <source>The cells by their chance, in a GeoPackage.</source>
+        <translation>Les cellules selon leur probabilité, dans un GeoPackage.</translation>
+    </message>
+    <message>
         <source>The cells that a view from here would be taken for, by chance:</source>
         <translation>Les cellules pour lesquelles une vue d’ici serait prise, par probabilité :</translation>
+    </message>
+    <message>
+        <source>The database gets columns that say so, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click what a cell is taken for.</source>
+        <translation>La base reçoit des colonnes qui le disent, et les cellules sont montrées selon leur probabilité. La page de carte, qui s’ouvre dans un navigateur, montre d’un clic pour quoi une cellule est prise.</translation>
+    </message>
+    <message>
+        <source>The database to write.</source>
+        <translation>La base à écrire.</translation>
+    </message>
+    <message>
+        <source>The database to write. A temporary file is lost when QGIS is closed.</source>
+        <translation>La base à écrire. Un fichier temporaire est perdu à la fermeture de QGIS.</translation>
+    </message>
+    <message>
+        <source>The draft to write.</source>
+        <translation>L’esquisse à écrire.</translation>
     </message>
     <message>
         <source>The engine did not answer.</source>
@@ -396,8 +640,48 @@
         <translation>Le moteur a été supprimé.</translation>
     </message>
     <message>
+        <source>The file that “Build signature database” wrote.</source>
+        <translation>Le fichier qu’a écrit « Construire la base de signatures ».</translation>
+    </message>
+    <message>
+        <source>The file that “Load street objects” wrote, for a second layer.</source>
+        <translation>Le fichier qu’a écrit « Charger les objets de rue », pour une seconde couche.</translation>
+    </message>
+    <message>
+        <source>The file that “Load street objects” wrote.</source>
+        <translation>Le fichier qu’a écrit « Charger les objets de rue ».</translation>
+    </message>
+    <message>
+        <source>The likelihood method gives each candidate a chance, tells the place between the middles of the cells with its uncertainty, and says when it cannot tell. The other methods are those of the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
+        <translation>La méthode likelihood donne à chaque candidat une probabilité, dit le lieu entre les centres des cellules avec son incertitude, et dit quand elle ne sait pas. Les autres méthodes sont celles de l’article ; elles classent les cellules par une distance, et les cellules de même aspect partagent un rang.</translation>
+    </message>
+    <message>
+        <source>The log has a table of the results; the folder has them for other programs, the layers and the map page for the eye.</source>
+        <translation>Le journal contient un tableau des résultats ; le dossier les contient pour d’autres programmes, les couches et la page de carte sont pour l’œil.</translation>
+    </message>
+    <message>
+        <source>The log tells what became of every row: how many are objects, how many were left out, and why.</source>
+        <translation>Le journal dit ce qu’est devenue chaque ligne : combien sont des objets, combien ont été omises, et pourquoi.</translation>
+    </message>
+    <message>
+        <source>The paper of Weng, Gouet-Brunet and Soheilian has 10 m.</source>
+        <translation>L’article de Weng, Gouet-Brunet et Soheilian prend 10 m.</translation>
+    </message>
+    <message>
+        <source>The queries at their true places, and lines to the places that were found, in a GeoPackage.</source>
+        <translation>Les requêtes à leurs vrais lieux, et des lignes vers les lieux trouvés, dans un GeoPackage.</translation>
+    </message>
+    <message>
+        <source>The queries, their errors and a summary, for other programs.</source>
+        <translation>Les requêtes, leurs erreurs et un résumé, pour d’autres programmes.</translation>
+    </message>
+    <message>
         <source>The semsig command (leave empty to look for it)</source>
         <translation>La commande semsig (laisser vide pour la chercher)</translation>
+    </message>
+    <message>
+        <source>The table of street objects to write. A temporary file is lost when QGIS is closed.</source>
+        <translation>La table d’objets de rue à écrire. Un fichier temporaire est perdu à la fermeture de QGIS.</translation>
     </message>
     <message>
         <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1.2 GB; nothing else on this computer is changed.</source>
@@ -420,12 +704,68 @@
         <translation>Base mise à jour</translation>
     </message>
     <message>
+        <source>Vector files of any format, .osm or .osm.pbf; zipped is fine.</source>
+        <translation>Fichiers vecteur de n’importe quel format, .osm ou .osm.pbf ; zippés aussi.</translation>
+    </message>
+    <message>
         <source>Viewpoints</source>
         <translation>Points de vue</translation>
     </message>
     <message>
         <source>Visibility range (m)</source>
         <translation>Portée de visibilité (m)</translation>
+    </message>
+    <message>
+        <source>What else happens to a query, with commas between, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
+        <translation>Ce qui arrive encore à une requête, séparé par des virgules, comme compass:10,view:90 (une boussole fausse de 10°, un champ de vision de 90°).</translation>
+    </message>
+    <message>
+        <source>What is downloaded; that of the canvas by default.</source>
+        <translation>Ce qui est téléchargé ; par défaut l’emprise de la carte.</translation>
+    </message>
+    <message>
+        <source>What of the city must be searched for the query, in a GeoPackage.</source>
+        <translation>Ce qu’il faut chercher de la ville pour la requête, dans un GeoPackage.</translation>
+    </message>
+    <message>
+        <source>What the files hold. With several, objects that two of them have are merged; the first is taken for the best source.</source>
+        <translation>Ce que contiennent les fichiers. S’il y en a plusieurs, les objets communs sont fusionnés ; le premier passe pour la meilleure source.</translation>
+    </message>
+    <message>
+        <source>Where each is seen, in degrees clockwise from north, with commas between them, such as 10,80,200,310.</source>
+        <translation>Dans quelle direction chacun se voit, en degrés à partir du nord dans le sens des aiguilles d’une montre, séparés par des virgules, comme 10,80,200,310.</translation>
+    </message>
+    <message>
+        <source>Where the data come from.</source>
+        <translation>D’où viennent les données.</translation>
+    </message>
+    <message>
+        <source>With likelihood and an uncertain north, the standard deviation.</source>
+        <translation>Avec likelihood et un nord incertain : l’écart type.</translation>
+    </message>
+    <message>
+        <source>With likelihood, how much of what is seen may be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person noted down.</source>
+        <translation>Avec likelihood : combien de ce qui est vu peut être faux : light (peu), medium (moyen), strong (beaucoup), ou generic quand on ne le sait pas ; by-hand pour ce qu’une personne a noté.</translation>
+    </message>
+    <message>
+        <source>With likelihood, whether the north is known.</source>
+        <translation>Avec likelihood : si le nord est connu.</translation>
+    </message>
+    <message>
+        <source>With likelihood: polygons that the place lies in.</source>
+        <translation>Avec likelihood : polygones où se trouve le lieu.</translation>
+    </message>
+    <message>
+        <source>With likelihood: the ellipse in which the place lies with a chance of 90 %, if the answer is right.</source>
+        <translation>Avec likelihood : l’ellipse où se trouve le lieu avec une probabilité de 90 %, si la réponse est juste.</translation>
+    </message>
+    <message>
+        <source>With likelihood: they are as large as needed for that, 0.9 by default.</source>
+        <translation>Avec likelihood : elles sont aussi grandes qu’il le faut pour cela, 0,9 par défaut.</translation>
+    </message>
+    <message>
+        <source>Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and how many other cells look the same; with the street objects, these become a second layer.</source>
+        <translation>Écrit les cellules d’une base dans un GeoPackage : ce qui se voit de chacune, à partir du nord dans le sens des aiguilles d’une montre, et combien d’autres cellules ont le même aspect ; si les objets de rue sont donnés, ils deviennent une seconde couche.</translation>
     </message>
     <message>
         <source>downloaded</source>

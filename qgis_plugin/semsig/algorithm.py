@@ -37,6 +37,8 @@ from .words import tr
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingFeedback, QgsProject
 
+    Definitions = tuple[QgsProcessingParameterDefinition, ...]
+
 __all__ = [
     "REGIONS",
     "SemsigAlgorithm",
@@ -118,6 +120,15 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         except CommandError as error:
             return False, str(error)
         return True, ""
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
+        """Say what goes in and out."""
+        for parameter in self.definitions():
+            self.addParameter(parameter)
+
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
+        raise NotImplementedError
 
     def processAlgorithm(  # noqa: N802
         self,

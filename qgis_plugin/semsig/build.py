@@ -21,6 +21,8 @@ from .export import CELLS, OBJECTS, export_layers
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
+    from .algorithm import Definitions
+
 __all__ = ["Build"]
 
 
@@ -38,10 +40,10 @@ Cells that see nothing are left out. Beside the database a folder appears with t
 ready to be searched; keep it there.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         any_vector = "Vector files (*.parquet *.gpkg *.shp *.geojson *.zip)"
-        for parameter in (
+        return (
             file_to_read("OBJECTS", "Street objects", "The file that “Load street objects” wrote."),
             number(
                 "STEP",
@@ -99,8 +101,7 @@ ready to be searched; keep it there.
                 "The cells and the street objects as layers, in a GeoPackage.",
                 optional=True,
             ),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,

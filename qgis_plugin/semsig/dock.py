@@ -47,7 +47,7 @@ __all__ = ["SemsigDock"]
 
 LAST = "semsig/database"
 """The setting that remembers the database."""
-CELL, LOOKALIKE, CHOSEN = QColor("#d55e00"), QColor("#0072b2"), QColor("#cc79a7")
+CELL, LOOKALIKE = QColor("#d55e00"), QColor("#0072b2")
 LOOKALIKES = 20
 SCALE = 2500.0
 KIND = 0x0100  # the first role of data that is ours

@@ -302,7 +302,7 @@ def _program(folder: Path, name: str) -> Path:
 def _requirement(version: str) -> str:
     """Return what pip shall install: the wheel that is packed with the plugin, or else by name."""
     packed = sorted(HERE.glob("semsig_gis-*.whl"))
-    return f"{packed[-1]}[serve]" if packed else f"semsig_gis[serve]=={version}"
+    return f"{packed[-1]}[raster,serve]" if packed else f"semsig_gis[raster,serve]=={version}"
 
 
 def _remove(folder: Path) -> None:

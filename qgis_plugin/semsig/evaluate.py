@@ -39,6 +39,8 @@ if TYPE_CHECKING:
         QgsProcessingFeedback,
     )
 
+    from .algorithm import Definitions
+
 __all__ = ["Evaluate"]
 
 LAYERS = {"evaluation": "Queries", "evaluation_lines": "From the true to the best place"}
@@ -59,11 +61,11 @@ The log has a table of the results; the folder has them for other programs, the 
 map page for the eye.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         more = QgsProcessingParameterString("MORE", "Further distortions", optional=True)
         folder = QgsProcessingParameterFolderDestination("OUTPUT", "Folder for the results")
-        for parameter in (
+        return (
             database(),
             whole_number(
                 "QUERIES", "Number of queries", 500, (1, 1_000_000), "How many are asked."
@@ -113,8 +115,11 @@ map page for the eye.
             map_to_write(
                 "A page for the browser: successful and failed queries, and where they fail."
             ),
-        ):
-            self.addParameter(parameter)
+        )
+
+    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802
+        """Say what goes in and out."""
+        super().initAlgorithm(configuration)
         self.addOutput(
             QgsProcessingOutputNumber("WITHIN_50_M", "Chance of an error of 50 m or less")
         )

@@ -17,6 +17,8 @@ from .arguments import command_line
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
+    from .algorithm import Definitions
+
 __all__ = ["CELLS", "OBJECTS", "Export", "export_layers"]
 
 CELLS = {"cells": "Cells"}
@@ -37,9 +39,9 @@ how many other cells look the same; with the street objects, these become a seco
 If “Where queries can be placed” was run, what it found goes with the cells.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
-        for parameter in (
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
+        return (
             database(),
             file_to_read(
                 "OBJECTS",
@@ -54,8 +56,7 @@ If “Where queries can be placed” was run, what it found goes with the cells.
                 "Its square, or its centre.",
             ),
             layers_to_write("OUTPUT", "Cells", "The GeoPackage to write."),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,

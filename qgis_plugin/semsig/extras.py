@@ -25,6 +25,8 @@ from .arguments import command_line
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
+    from .algorithm import Definitions
+
 __all__ = ["Ambiguity", "Demo", "Draft", "Update"]
 
 
@@ -39,9 +41,9 @@ Applies new street objects to a database: only the cells that see a change are m
 of the new objects take the place of those in the database.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
-        for parameter in (
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
+        return (
             database(),
             file_to_read(
                 "OBJECTS",
@@ -49,8 +51,7 @@ of the new objects take the place of those in the database.
                 "New ones: the file that “Load street objects” or a download wrote.",
             ),
             file_to_write("OUTPUT", "Updated database", "The database to write."),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,
@@ -78,14 +79,13 @@ street objects each of its values may be. Look through the draft in a text edito
 it to “Load street objects” as a catalogue of your own.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
-        any_vector = "Vector files (*.gpkg *.shp *.geojson *.parquet *.csv *.zip *.fgb *.kml)"
-        for parameter in (
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
+        any_vector = "Vector files (*.gpkg *.shp *.geojson *.parquet *.csv *.zip *.fgb *.kml *.gml)"
+        return (
             file_to_read("FILE", "File", "A vector file of any format.", kind=any_vector),
             file_to_write("OUTPUT", "Catalogue", "The draft to write.", kind="Catalogue (*.toml)"),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,
@@ -113,15 +113,14 @@ Shows how many cells see the same types in the same order: a cell alone can be t
 a thousand cannot. “Where queries can be placed” tells more, and takes longer.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         raster = QgsProcessingParameterRasterDestination("OUTPUT", "Ambiguity")
-        for parameter in (
+        return (
             database(),
             described(raster, "A GeoTIFF: of each cell, how many look the same."),
             map_to_write("A page for the browser, on which cells can be clicked."),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,
@@ -151,15 +150,14 @@ Makes up a small city, builds its database, asks it, and shows what came out: fo
 without any data or network. The folder holds city.parquet for the other tools.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         folder = QgsProcessingParameterFolderDestination("OUTPUT", "Folder")
-        for parameter in (
+        return (
             whole_number("QUERIES", "Queries", 200, (1, 100_000), "How many are asked."),
             whole_number("SEED", "Seed", 0, (0, 2**31 - 1), "Another number makes another city."),
             described(folder, "Folder to write to."),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,

@@ -20,6 +20,8 @@ from .command import CommandError
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
+    from .algorithm import Definitions
+
 __all__ = ["FetchCanvas", "FetchCity"]
 
 OPENSTREETMAP = "openstreetmap"
@@ -41,10 +43,12 @@ OUTPUTS = (
 class _Fetch(SemsigAlgorithm):
     """`semsig fetch`."""
 
-    def add_outputs(self) -> None:
-        """Say what goes out."""
-        for name, title, text in OUTPUTS:
-            self.addParameter(file_to_write(name, title, text, optional=name != "OUTPUT"))
+    def definitions(self) -> Definitions:
+        """Return what goes out."""
+        return tuple(
+            file_to_write(name, title, text, optional=name != "OUTPUT")
+            for name, title, text in OUTPUTS
+        )
 
     def fetch(
         self,
@@ -84,11 +88,11 @@ Some square kilometres take seconds to minutes. What was downloaded before is ta
 The server is a setting: Settings > Options > Processing > Providers > Semantic signatures.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         extent = QgsProcessingParameterExtent("EXTENT", "Extent", _canvas())
-        self.addParameter(described(extent, "What is downloaded; that of the canvas by default."))
-        self.add_outputs()
+        text = "What is downloaded; that of the canvas by default."
+        return (described(extent, text), *super().definitions())
 
     def work(
         self,
@@ -128,10 +132,10 @@ Downloads the street objects of a city: by its name, or in the polygons of a lay
 from where: OpenStreetMap has every place; a city's own portal has more of that city.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         place = QgsProcessingParameterString("PLACE", "Place", optional=True)
-        for parameter in (
+        return (
             choice(
                 "CATALOG",
                 "Catalogue",
@@ -141,9 +145,8 @@ from where: OpenStreetMap has every place; a city's own portal has more of that 
             ),
             described(place, "Name of a city or quarter, such as Gentilly, France."),
             area("Polygons instead of a name."),
-        ):
-            self.addParameter(parameter)
-        self.add_outputs()
+            *super().definitions(),
+        )
 
     def work(
         self,

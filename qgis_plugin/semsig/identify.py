@@ -20,6 +20,8 @@ from .export import CELLS, export_layers
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
+    from .algorithm import Definitions
+
 __all__ = ["Identify"]
 
 
@@ -39,9 +41,9 @@ opens in a browser, shows on a click what a cell is taken for.
 A large city takes minutes. What is known already is not computed again.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
-        for parameter in (
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
+        return (
             database(),
             choice(
                 "NOISE",
@@ -64,8 +66,7 @@ A large city takes minutes. What is known already is not computed again.
             ),
             layers_to_write("CELLS", "Cells", "The cells by their chance, in a GeoPackage."),
             map_to_write("A page for the browser, on which cells can be clicked."),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
         QgsProcessingFeedback,
     )
 
+    from .algorithm import Definitions
+
 __all__ = ["Load"]
 
 
@@ -43,24 +45,16 @@ OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue�
 The log tells what became of every row: how many are objects, how many were left out, and why.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         files = QgsProcessingParameterMultipleLayers(
             "FILES", "Files", layerType=QgsProcessing.SourceType.TypeFile, optional=True
-        )
-        self.addParameter(
-            described(files, "Vector files of any format, .osm or .osm.pbf; zipped is fine.")
         )
         folder = QgsProcessingParameterFile(
             "FOLDER",
             "Folder",
             behavior=QgsProcessingParameterFile.Behavior.Folder,
             optional=True,
-        )
-        self.addParameter(
-            described(
-                folder, "A folder in which the catalogue's files are looked for, instead of files."
-            )
         )
         catalogs = QgsProcessingParameterEnum(
             "CATALOGS",
@@ -70,56 +64,51 @@ The log tells what became of every row: how many are objects, how many were left
             optional=True,
             usesStaticStrings=True,
         )
-        self.addParameter(
+        own = QgsProcessingParameterCrs("CRS", "CRS of the files", optional=True)
+        metric = QgsProcessingParameterCrs("METRIC_CRS", "CRS to work in", optional=True)
+        return (
+            described(files, "Vector files of any format, .osm or .osm.pbf; zipped is fine."),
+            described(
+                folder, "A folder in which the catalogue's files are looked for, instead of files."
+            ),
             described(
                 catalogs,
                 "What the files hold. With several, objects that two of them have are merged; the "
                 "first is taken for the best source.",
-            )
-        )
-        self.addParameter(
+            ),
             file_to_read(
                 "CATALOG_FILE",
                 "Catalogue of your own",
                 "A catalogue file, besides those chosen above or instead of them.",
                 kind="Catalogue (*.toml)",
                 optional=True,
-            )
-        )
-        for name, title, text in (
-            ("CRS", "CRS of the files", "For files that do not state theirs."),
-            (
-                "METRIC_CRS",
-                "CRS to work in",
-                "A CRS in metres; by default that of the catalogue, or the UTM zone.",
             ),
-        ):
-            crs = QgsProcessingParameterCrs(name, title, optional=True)
-            self.addParameter(advanced(described(crs, text)))
-        self.addParameter(
+            advanced(described(own, "For files that do not state theirs.")),
+            advanced(
+                described(
+                    metric,
+                    "A CRS in metres; by default that of the catalogue, or the UTM zone.",
+                )
+            ),
             file_to_write(
                 "OUTPUT",
                 "Street objects",
                 "The table of street objects to write. A temporary file is lost when QGIS is "
                 "closed.",
-            )
-        )
-        self.addParameter(
+            ),
             file_to_write(
                 "BUILDINGS",
                 "Buildings",
                 "Building footprints to write too, where the files have some. “Build signature "
                 "database” hides what is behind them.",
                 optional=True,
-            )
-        )
-        self.addParameter(
+            ),
             file_to_write(
                 "STREETS",
                 "Streets",
                 "Centre lines of streets to write too, where the files have some.",
                 optional=True,
-            )
+            ),
         )
 
     def work(

@@ -59,6 +59,8 @@ if TYPE_CHECKING:
         QgsProcessingFeedback,
     )
 
+    from .algorithm import Definitions
+
 __all__ = ["Localize"]
 
 HEADINGS = ("known", "uncertain", "unknown")
@@ -79,8 +81,8 @@ cells with its uncertainty, and says when it cannot tell. The other methods are 
 they rank cells by a distance, and cells that look the same share a rank.
 """
 
-    def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+    def definitions(self) -> Definitions:
+        """Return what goes in and out."""
         types = QgsProcessingParameterString("TYPES", "Types", optional=True)
         bearings = QgsProcessingParameterString("BEARINGS", "Bearings (°)", optional=True)
         candidates = QgsProcessingParameterFeatureSink(
@@ -89,7 +91,7 @@ they rank cells by a distance, and cells that look the same share a rank.
         place = QgsProcessingParameterFeatureSink(
             "PLACE", "Place", QgsProcessing.SourceType.TypeVectorPolygon, optional=True
         )
-        for parameter in (
+        return (
             database(),
             described(
                 types,
@@ -159,8 +161,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 )
             ),
             map_to_write("A page for the browser with the chances and the candidates."),
-        ):
-            self.addParameter(parameter)
+        )
 
     def work(
         self,

@@ -103,7 +103,7 @@ def _require_place() -> None:
     try:
         os.getcwd()  # noqa: PTH109 - only whether there is one
     except OSError as error:
-        msg = "the working folder is not there any more; change to another folder."
+        msg = "the working folder no longer exists; change to another folder."
         raise InputError(msg) from error
     for argument in sys.argv[1:]:
         try:
@@ -123,7 +123,7 @@ def _pass_over(unraisable: sys.UnraisableHookArgs) -> None:
         threading.Thread(target=_interrupt_again, args=(passed,), daemon=True).start()
         passed.set()  # here it would be passed over again
     elif isinstance(unraisable.exc_value, Exception):
-        _remark(f"a library passed over an error ({_brief(unraisable.exc_value)})")
+        _remark(f"a library ignored an error ({_brief(unraisable.exc_value)})")
 
 
 def _interrupt_again(passed: threading.Event) -> None:
@@ -149,10 +149,8 @@ def _remark(text: str) -> None:
 
 
 def _short_of_memory(error: MemoryError) -> str:
-    return (
-        f"memory is short on this machine ({_brief(error)}); end other programs, or give less at "
-        "once."
-    )
+    remedy = "close other programs, or process less at once"
+    return f"this machine is short of memory ({_brief(error)}); {remedy}."
 
 
 def _refusal(error: OSError) -> str:
@@ -174,7 +172,8 @@ def _fault(error: Exception) -> str:
     except OSError:  # a full or read-only disk
         proof = "this line"
     return (
-        f"a fault of semsig, not of yours ({_brief(error)}); please report it to the authors of "
+        f"a fault in semsig, not in your input ({_brief(error)}); please report it to the "
+        "authors of "
         f"semsig_gis, with {proof}."
     )
 

@@ -99,7 +99,7 @@ def build(
     from semsig_gis.storage.geoparquet import NOWHERE
 
     if streets is not None and viewpoints != "streets":
-        msg = "--streets was given, which only --viewpoints streets uses; give both or none."
+        msg = "--streets is used only with --viewpoints streets; give both or neither."
         raise InputError(msg)
     keep_inputs(out, read=(objects, buildings, streets, area))
     specs: dict[str, Any] = {
@@ -156,7 +156,7 @@ def _build_whole(
     lines = None if streets is None else read(streets, role="streets")
     if houses is not None and (invalid := int((~houses.is_valid).sum())):
         notes.append(
-            f"{invalid} building footprints in {buildings} are invalid polygons; repaired here"
+            f"{invalid} building footprints in {buildings} are invalid polygons; they were repaired"
         )
     for note in notes:
         remark(note)
@@ -177,16 +177,6 @@ def update(
         Path, typer.Option(help="New street objects; their layers replace those of the database.")
     ],
     out: Annotated[Path | None, typer.Option(help="Database to write; default: in place.")] = None,
-    before: Annotated[
-        Path | None,
-        typer.Option(help="Street objects that a database in tiles was built from."),
-    ] = None,
-    buildings: Annotated[
-        Path | None, typer.Option(help="Buildings that a database in tiles was built with.")
-    ] = None,
-    streets: Annotated[
-        Path | None, typer.Option(help="Streets that a database in tiles was built with.")
-    ] = None,
     workers: Workers = 0,
     scheduler: Scheduler = None,
     years: Annotated[
@@ -194,8 +184,7 @@ def update(
         typer.Option(
             min=0.001,
             max=100,
-            help="Years between the old objects and the new ones, to be told in the report of "
-            "--json.",
+            help="Years between the old objects and the new ones, for the report of --json.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -205,32 +194,20 @@ def update(
     from semsig_gis.database.update import update_file, update_tiles
     from semsig_gis.objects.table import open_objects
 
-    keep_inputs(out, read=(objects, before, buildings, streets))
+    keep_inputs(out, read=(objects,))
     had_columns = open_city(database).has_columns
     tiled = database.is_dir()
-    if tiled and before is None:
-        msg = (
-            f"{database} is a database in tiles, which holds no copy of its street objects; give "
-            "the file that it was built from with --before."
-        )
-        raise InputError(msg)
-    if not tiled and (before or buildings or streets or workers or scheduler):
-        msg = (
-            f"{database} is not in tiles, and has what it was built from beside it; leave out "
-            "--before, --buildings, --streets, --workers and --scheduler."
-        )
+    if not tiled and (workers or scheduler):
+        msg = f"{database} is not in tiles; leave out --workers and --scheduler."
         raise InputError(msg)
     with progress("updating") as advance:
-        if before is None:
+        if not tiled:
             report = update_file(database, open_objects(objects), out=out, progress=advance)
         else:
             report = update_tiles(
                 database,
                 objects,
-                before=before,
                 out=out,
-                buildings=buildings,
-                streets=streets,
                 workers=workers,
                 scheduler=scheduler,
                 progress=advance,
@@ -249,15 +226,17 @@ def update(
 
 @app.command()
 def merge(
-    first: Annotated[Path, typer.Argument(help="Signature database in one file.")],
-    second: Annotated[Path, typer.Argument(help="Another one, built in the same way.")],
+    first: Annotated[Path, typer.Argument(help="Signature database in one file or in tiles.")],
+    second: Annotated[
+        Path, typer.Argument(help="Another signature database, built in the same way.")
+    ],
     *,
     out: Annotated[Path, typer.Option(help="Signature database to write (.parquet).")],
     as_json: AsJson = False,
 ) -> None:
     """Merge the databases of two places into one.
 
-    What both hold is taken once, and cells near both are computed again from the objects of both.
+    Objects in both are kept once, and cells near both are computed again.
     """
     from semsig_gis.database.merge import merge_databases
 
@@ -277,7 +256,7 @@ def merge(
 
 @app.command()
 def info(database: Database, *, as_json: AsJson = False) -> None:
-    """Print the properties of a database, as the paper's tables do."""
+    """Print the properties of a database, beside the paper's."""
     if as_json:
         print_json(_info(database))
         return
@@ -326,17 +305,17 @@ def clean(
         bool,
         typer.Option(
             "--objects",
-            help="Remove the street objects, too, which updates and refined places need.",
+            help="Also remove the street objects, which updates and refined places need.",
         ),
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Tell what would be removed, and remove nothing.")
+        bool, typer.Option("--dry-run", help="List what would be removed, but remove nothing.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Remove what lies beside a database and nothing reads any more.
+    """Remove leftover files beside a database.
 
-    That is what older versions and runs that were killed left; the database stays as it is.
+    Older versions and interrupted runs leave them; the database is not changed.
     """
     from semsig_gis.database.beside import remove_companions
 

@@ -83,4 +83,4 @@ def _common(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Tell where in a city a view was taken from the street objects in it."""
+    """Find where in a city a view was taken, from the street objects in it."""

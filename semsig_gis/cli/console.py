@@ -221,10 +221,10 @@ def _progress_lines(label: str) -> Callable[[int, int], None]:
 
 
 Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print results alone: no progress, no remarks.")
+    bool, typer.Option("--quiet", "-q", help="Print results only, without progress and remarks.")
 ]
 Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Tell each step, and how long it took.")
+    bool, typer.Option("--verbose", "-v", help="Report each step and how long it took.")
 ]
 
 
@@ -276,7 +276,7 @@ class Commands(typer.Typer):
 
 app = Commands(
     name="semsig",
-    help="Tell where in a city a view was taken from the street objects in it.",
+    help="Find where in a city a view was taken, from the street objects in it.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -333,8 +333,8 @@ def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> Non
             continue
         if os.path.realpath(path) in taken:
             msg = (
-                f"{path} is to be written, but it is also another file of this command; "
-                "give it a name of its own."
+                f"{path} would be written, but this command uses it for something else as "
+                "well; give another name."
             )
             raise InputError(msg)
         taken.add(os.path.realpath(path))
@@ -374,7 +374,7 @@ def tell_if_online(offline: bool, *, tiles: str | None = None) -> None:  # noqa:
     """Remark that a map needs a network, where it does."""
     if not offline:
         what = "Leaflet" if tiles is None else "its tiles"
-        remark(f"the map takes {what} from the web, so it needs a network to be seen")
+        remark(f"the map takes {what} from the web, so it needs a network to be displayed")
 
 
 def print_tables(tables: Iterable[Table]) -> None:

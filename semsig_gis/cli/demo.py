@@ -30,7 +30,7 @@ def demo(
         int, typer.Option(min=0, max=MOST_SEED, help="Seed of the city and the queries.")
     ] = 0,
 ) -> None:
-    """Run every step on the embedded synthetic city, offline."""
+    """Run every step on a small made-up city, offline."""
     from semsig_gis.database.build import build_database
     from semsig_gis.database.file import save_database
     from semsig_gis.evaluation.evaluate import evaluate as run
@@ -103,8 +103,10 @@ def synthesize(
     )
 
     spec = CitySpec(size=PARIS_LIKE.size if size is None else size, seed=seed)
-    with progress("making up a city"):
+    with progress("making up a city") as advance:
+        advance(0, 2)
         layers = synthetic_city(spec)
+        advance(1, 2)
         surroundings = synthetic_surroundings(spec)
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
     save_objects(objects, out / "objects.parquet")

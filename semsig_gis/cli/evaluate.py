@@ -65,7 +65,7 @@ def evaluate(
     ] = "medium",
     keep_order: Annotated[
         bool,
-        typer.Option("--keep-order", help="Do not sort again after the bearing noise."),
+        typer.Option("--keep-order", help="Do not sort the objects again after the bearing noise."),
     ] = False,
     false_class: Annotated[
         Literal["uniform", "frequency"] | None,
@@ -88,7 +88,7 @@ def evaluate(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Ask queries from known places and measure the errors."""
+    """Measure how far off answers to queries of known places are."""
     require_suffix(".html", report)
     keep_inputs(report, read=[database, drift_report])
     ranking = chosen_method(method, paper=paper)
@@ -175,7 +175,7 @@ def experiment(
     scheduler: Scheduler = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run the evaluations of an experiment, or go on with them."""
+    """Run the evaluations of an experiment, or resume them."""
     from semsig_gis.evaluation.spec import open_experiment_spec
     from semsig_gis.experiments.run import run_experiment
     from semsig_gis.reports.evaluation import experiment_tables
@@ -240,9 +240,7 @@ def reproduce(
     ] = "full",
     queries: Annotated[
         int | None,
-        typer.Option(
-            min=1, max=MOST_QUERIES, help="Number of queries, in place of that of --size."
-        ),
+        typer.Option(min=1, max=MOST_QUERIES, help="Number of queries, instead of that of --size."),
     ] = None,
     seed: Seed = 0,
     workers: Annotated[
@@ -250,13 +248,13 @@ def reproduce(
         typer.Option(
             min=0,
             max=MOST_WORKERS,
-            help="Number of processes, 0 for this one alone; default: all processors, 0 for "
+            help="Number of processes, 0 to use this one only; default: all processors, 0 for "
             "--size small.",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run the paper's experiments, ours beside its figures."""
+    """Repeat the paper's experiments and compare the figures."""
     import contextlib
 
     from semsig_gis.experiments.paper.report import reproduction_report
@@ -333,7 +331,7 @@ def identify(
         typer.Option(
             min=10,
             max=360,
-            help="Degrees that a query sees: a photo in any direction; default: all round.",
+            help="Field of view of a query in degrees, in any direction; default: all round.",
         ),
     ] = 360.0,
     seed: Annotated[
@@ -426,5 +424,5 @@ def identify(
 def _require_check(check: int | None, out: Path | None) -> None:
     """Refuse a folder for a report that nobody asked for."""
     if out is not None and check is None:
-        msg = "--out was given without --check; give both or none."
+        msg = "--out was given without --check; give both or neither."
         raise InputError(msg)

@@ -28,10 +28,9 @@ def export(
     out: Annotated[
         Path,
         typer.Option(
-            help="File to write: a GeoPackage of all layers, for QGIS (.gpkg), one layer as "
-            "GeoParquet (.parquet), FlatGeobuf (.fgb), GeoJSON (.geojson) or CSV (.csv), the cells "
-            "by zoom for maps of the web (.pmtiles), or numbers of places as a Cloud-Optimised "
-            "GeoTIFF (.tif); or what the database is as an item of STAC (.json)."
+            help="File to write. Its suffix is the format: .gpkg (all layers, for QGIS), "
+            ".parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), "
+            ".tif (one number a cell) or .json (STAC item)."
         ),
     ],
     objects: Annotated[Path | None, typer.Option(help="Street objects to add as a layer.")] = None,
@@ -42,10 +41,9 @@ def export(
     layer: Annotated[
         list[str] | None,
         typer.Option(
-            help="What the file holds: cells, objects, evaluation, evaluation_lines or hexagons, "
-            "by default the first, in a GeoPackage all that there are (give the option once for "
-            "each); in a GeoTIFF ambiguity (the default), identifiability, error, or field: which "
-            "share of the queries around fails."
+            help="Layer to write: cells, objects, evaluation, evaluation_lines or hexagons; "
+            "by default cells, in a .gpkg all (repeat for several). In a .tif: ambiguity (the "
+            "default), identifiability, error, or field (share of the queries around that fail)."
         ),
     ] = None,
     smooth: Smooth = None,
@@ -54,8 +52,8 @@ def export(
         typer.Option(
             min=0,
             max=15,
-            help="Add up the cells, objects and queries in hexagons of H3 of a resolution, such as "
-            "9; the file then holds these.",
+            help="Write hexagons of this resolution of H3, such as 9, that sum up cells, "
+            "objects and queries.",
             show_default=False,
         ),
     ] = None,
@@ -75,7 +73,7 @@ def export(
     keep_inputs(out, read=(database, objects))
     if out.suffix.lower() == ITEM:
         if any(option is not None for option in (evaluation, layer, smooth, h3, geometry)):
-            msg = f"{out} tells of the files of a database; give no option but --objects with it."
+            msg = f"{out} describes the files of a database; give only --objects with it."
             raise InputError(msg)
         export_item(database, out, objects=objects)
         say(f"exported: {out}")

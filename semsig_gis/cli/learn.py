@@ -64,7 +64,7 @@ def learn(
 ) -> None:
     """Learn how a detector fails from detections of known places.
 
-    What the age of the map explains of the misses and false objects is not the detector's.
+    Misses and false objects that the age of the map explains are not counted.
     """
     from dataclasses import replace
 
@@ -98,7 +98,8 @@ def learn(
     )
     if map_age:
         say(
-            f"Without what a map of {map_age:g} years explains: detection {noise.detection:.3f} "
+            f"Corrected for what a map of {map_age:g} years explains: detection "
+            f"{noise.detection:.3f} "
             f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects a full turn (was "
             f"{learnt.clutter:.3f})."
         )
@@ -170,7 +171,7 @@ def calibrate(
     out: Annotated[Path, typer.Option(help="Rule to write (.json), for --rule.")],
     precision: Annotated[
         float,
-        typer.Option(min=0.01, max=0.9999, help="Share of the answers that shall be right."),
+        typer.Option(min=0.01, max=0.9999, help="Share of the answers that should be right."),
     ] = 0.98,
     noise: NoiseName = "generic",
     map_age: MapAge = 0.0,
@@ -181,7 +182,7 @@ def calibrate(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose from which chance on `semsig localize` gives an answer."""
+    """Choose the chance from which an answer is given."""
     from dataclasses import asdict
 
     import numpy as np

@@ -57,7 +57,7 @@ MaxDistortion = Annotated[
     typer.Option(
         min=0,
         max=180,
-        help="Refuse data with bearings off by more degrees, or lengths by more percent.",
+        help="Largest distortion of the CRS: degrees of bearings, percent of lengths.",
     ),
 ]
 Filters = Annotated[
@@ -68,10 +68,10 @@ Merge = Annotated[
     bool, typer.Option(help="Merge objects of different layers within the catalogue's radii.")
 ]
 Buildings = Annotated[
-    Path | None, typer.Option(help="Building footprints to write too (.parquet).")
+    Path | None, typer.Option(help="Building footprints to write as well (.parquet).")
 ]
 Streets = Annotated[
-    Path | None, typer.Option(help="Centre lines of streets to write too (.parquet).")
+    Path | None, typer.Option(help="Centre lines of streets to write as well (.parquet).")
 ]
 AT_THE_EDGE = (
     "cells within sight of the edge of the clip see only a part of what is there; give `semsig "
@@ -88,8 +88,8 @@ def load(
         typer.Option(
             "--catalog",
             autocompletion=_catalogs,
-            help="Catalogue, by name or .toml file, where the files do not tell it (those of "
-            "OpenStreetMap and Overture do); repeat to merge, best first.",
+            help="Catalogue, by name or .toml file; not needed for OpenStreetMap and "
+            "Overture. Repeat to merge several, best first.",
         ),
     ] = None,
     out: Objects,
@@ -103,8 +103,8 @@ def load(
     clip: Annotated[
         str | None,
         typer.Option(
-            help="Leave out what is outside WEST,SOUTH,EAST,NORTH in degrees, the polygons of a "
-            "file, or the 'box' that OpenStreetMap files say they cover."
+            help="Keep only what is in WEST,SOUTH,EAST,NORTH in degrees, in the polygons of a "
+            "file, or in the 'box' that OpenStreetMap files say they cover."
         ),
     ] = None,
     max_distortion: MaxDistortion = 6.0,
@@ -196,11 +196,13 @@ def fetch(
     timeout: Annotated[
         float,
         typer.Option(
-            min=1.0, max=86_400.0, help="Give up a file after so many seconds, all attempts in all."
+            min=1.0,
+            max=86_400.0,
+            help="Give up a download after this many seconds, all attempts together.",
         ),
     ] = 600.0,
     server: Annotated[
-        str | None, typer.Option(help="Address to ask instead of the catalogue's servers.")
+        str | None, typer.Option(help="Address of a server to use instead of the catalogue's.")
     ] = None,
     metric_crs: MetricCrs = None,
     max_distortion: MaxDistortion = 6.0,
@@ -305,10 +307,10 @@ def draft(
         str | None, typer.Option(help="CRS of a file that states none, such as EPSG:2154.")
     ] = None,
 ) -> None:
-    """Draft a catalogue for a vector file, to be edited."""
-    from semsig_gis.objects.draft import suggest_catalog
+    """Draft a catalogue for a vector file, for you to edit."""
+    from semsig_gis.objects.draft import draft_catalog
 
-    say(suggest_catalog(file, crs=crs), end="")
+    say(draft_catalog(file, crs=crs), end="")
 
 
 @app.command()
@@ -322,7 +324,7 @@ def sources(
     *,
     as_json: AsJson = False,
 ) -> None:
-    """List the catalogues, what they need and hold, or the layers of one."""
+    """List the catalogues, or the layers of one."""
     import dataclasses
 
     from semsig_gis.core.plugins import installed_readers

@@ -38,7 +38,7 @@ from semsig_gis.core.method import LIKELIHOOD
 from semsig_gis.core.terminal import percent
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from semsig_gis.core.view import View
     from semsig_gis.database.answer import Answer, Locator
@@ -57,8 +57,8 @@ class RankedOptions(QueryOptions):
     queries: Annotated[
         str | None,
         typer.Option(
-            help="Many queries: a CSV or JSON lines file with such columns, or - for JSON lines "
-            "from standard input; the answers are JSON lines, one for each, or its error."
+            help="File of many queries, as CSV or JSON lines, or - for JSON lines from "
+            "standard input. Prints a line of JSON for each: an answer or an error."
         ),
     ] = None
     method: MethodText = None
@@ -101,14 +101,14 @@ class LocalizeOptions(SearchOptions, RankedOptions):
     share: Annotated[
         float | None,
         typer.Option(
-            min=0.001, max=1, help="Of the chance, that the regions of --out hold.  [default: 0.9]"
+            min=0.001,
+            max=1,
+            help="Share of the chance that the regions of --out hold.  [default: 0.9]",
         ),
     ] = None
     within: Annotated[
         float,
-        typer.Option(
-            min=0, max=MOST_METRES, help="Metres around the cells of --out to search, too."
-        ),
+        typer.Option(min=0, max=MOST_METRES, help="Metres to add around the cells of --out."),
     ] = 0.0
     as_json: AsJson = False
 
@@ -158,7 +158,7 @@ class LocalizeOptions(SearchOptions, RankedOptions):
 
 @command(LocalizeOptions)
 def localize(options: LocalizeOptions) -> None:
-    """Tell where a query was seen from, or many.
+    """Find where a view was seen from, or many views.
 
     The options --explain, --share and those from --noise to --objects are for likelihood alone.
     """
@@ -175,23 +175,36 @@ def localize(options: LocalizeOptions) -> None:
 
     if options.queries is None:
         query = options.query(city.dataset, others=", or --queries")
-        unplaced, absent = options.unplaced(city.dataset)
-        if (unplaced or absent) and method is not None:
-            what = "objects without a direction beside others" if unplaced else "what is not there"
-            msg = (
-                f"{options.seen!r} has {what}, which the method {options.ranking!r} cannot take; "
-                "give directions to all objects or to none, or leave out the method."
-            )
-            raise InputError(msg)
-        locator: Any = _locator(options, city, method, north)
-        if unplaced or absent:
-            from semsig_gis.likelihood.questions import with_unplaced
-
-            locator = with_unplaced(locator, query, unplaced, absent=absent)
-        _answer(options, city, locator, query)
+        told = options.unplaced(city.dataset)
+        locator = _locator(options, city, method, north)
+        _answer(options, city, _beside(locator, query, *told, ranking=options.ranking), query)
         return
     queries = options.read_queries(city.dataset)
-    _answer_lines(queries, _locator(options, city, method, north), options.source)
+    _answer_lines(queries, _locator(options, city, method, north), options)
+
+
+def _beside(
+    locator: Locator[Any],
+    query: View,
+    unplaced: Sequence[int],
+    absent: Sequence[int],
+    *,
+    ranking: str,
+) -> Locator[Any]:
+    """Return what answers a query given what else was seen, and was not."""
+    if not unplaced and not absent:
+        return locator
+    if ranking != LIKELIHOOD:
+        what = "objects without a direction beside others" if unplaced else "what is not there"
+        msg = (
+            f"the query has {what}, which the method {ranking!r} cannot take; give directions to "
+            "all objects or to none, or leave out the method."
+        )
+        raise InputError(msg)
+    from semsig_gis.likelihood.questions import with_unplaced
+
+    likelihood: Any = locator
+    return with_unplaced(likelihood, query, unplaced, absent=absent)
 
 
 def _locator(
@@ -218,15 +231,19 @@ def _distance_locator(
     )
 
 
-def _answer_lines(queries: Iterable[QueryLine], locator: Locator[Any], source: str) -> None:
+def _answer_lines(
+    queries: Iterable[QueryLine], locator: Locator[Any], options: LocalizeOptions
+) -> None:
     """Print an answer for each line, or its error, as soon as there is one."""
-    first_error, answered, failed = "", 0, 0
+    source, first_error, answered, failed = options.source, "", 0, 0
     for one in queries:
         result: dict[str, Any]
         try:
             if isinstance(one.query, InputError):
                 raise one.query
-            result = locator.locate(one.query).to_dict()
+            told = one.unplaced, one.absent
+            asked = _beside(locator, one.query, *told, ranking=options.ranking)
+            result = asked.locate(one.query).to_dict()
             answered += 1
         except (EmptyResultError, InputError, UnknownNameError) as error:
             result = {"error": str(error)}
@@ -239,7 +256,7 @@ def _answer_lines(queries: Iterable[QueryLine], locator: Locator[Any], source: s
         raise InputError(msg)
     if failed:
         of = f"{failed:,} of {answered + failed:,} queries of {source}"
-        remark(f"{of} could not be answered; their lines say why under error.")
+        remark(f"{of} could not be answered; their lines say why in the field error.")
 
 
 def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: View) -> None:

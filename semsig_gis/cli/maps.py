@@ -75,7 +75,7 @@ def _require_content(evaluation: Path | None, smooth: float | None, *, other: bo
         )
         raise InputError(msg)
     if smooth is not None and evaluation is None:
-        msg = "--smooth is of the field of an evaluation; give --evaluation, too, or leave it out."
+        msg = "--smooth is only for an evaluation; give --evaluation as well, or leave it out."
         raise InputError(msg)
 
 
@@ -130,7 +130,7 @@ def map_(
     ] = None,
     out: Annotated[Path, typer.Option(help="Map to write (.html).")],
 ) -> None:
-    """Draw an evaluation, cells, changes, an answer and street objects on one map."""
+    """Draw cells, evaluations, changes, answers or objects on a map."""
     import shapely
 
     from semsig_gis.database.city import open_city
@@ -152,7 +152,7 @@ def map_(
     opened = city.database
     known = known_identifiability(city) if identifiability or ambiguity else None
     if identifiability and known is None:
-        msg = f"{database} does not tell where a query can be placed; run semsig identify first."
+        msg = f"{database} has no columns of semsig identify; run semsig identify first."
         raise InputError(msg)
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_city(drift)

@@ -36,15 +36,15 @@ Explain = Annotated[
     bool,
     typer.Option(
         "--explain",
-        help="Tell which objects of the query are which street objects, which were missed, and "
-        "which look false.",
+        help="Show which objects of the view match which street objects, which were missed "
+        "and which look false.",
     ),
 ]
 NorthText = Literal["grid", "true", "magnetic"]
 NorthName = Annotated[
     NorthText,
     typer.Option(
-        "--north", help="Count the bearings from this north, of the database's grid by default."
+        "--north", help="North that bearings count from; default: that of the database's grid."
     ),
 ]
 Day = Annotated[
@@ -91,7 +91,7 @@ OnGrid = Annotated[
     bool,
     typer.Option(
         "--on-grid",
-        help="Take queries as seen from the middle of a cell, as in the paper's experiment, not "
+        help="Assume that queries are seen from the centre of a cell, as in the paper, not "
         "from anywhere in it.",
     ),
 ]
@@ -99,7 +99,7 @@ Refine = Annotated[
     bool | None,
     typer.Option(
         "--refine/--no-refine",
-        help="Look for the place between the middles of cells, too.  [default: where there are "
+        help="Also search between the centres of cells.  [default: where there are "
         "street objects and bearings]",
         show_default=False,
     ),
@@ -110,8 +110,8 @@ Smooth = Annotated[
         "--smooth",
         min=1,
         max=100_000,
-        help="Count queries within so many metres in the field of an evaluation, the nearer the "
-        "more; by default 250, or more where queries are few.",
+        help="Radius in metres over which an evaluation is smoothed.  [default: 250, or more "
+        "where queries are few]",
         show_default=False,
     ),
 ]
@@ -155,7 +155,10 @@ def seen_north(city: City, north: NorthText, date: str | None) -> North:
         msg = f"--date was given as {date!r}; give a day as 2024-05-31."
         raise InputError(msg) from error
     if day is not None and north != "magnetic":
-        msg = f"--date was given with --north {north}, which stays; leave it out."
+        msg = (
+            f"--date was given with --north {north}, but only magnetic north changes with "
+            "time; leave it out."
+        )
         raise InputError(msg)
     return GRID_NORTH if north == "grid" else North.of(north, city.dataset, date=day)
 
@@ -195,9 +198,7 @@ class QueryOptions:
     ] = None
     sectors: Annotated[
         str | None,
-        typer.Option(
-            help="What was looked at, if not all round: bearings clockwise, as 20-90,180-250."
-        ),
+        typer.Option(help="Sectors that were looked at, if not all round, such as 20-90,180-250."),
     ] = None
     north: NorthName = "grid"
     date: Day = None
@@ -223,7 +224,10 @@ class QueryOptions:
             raise InputError(msg)
         if sentence := self._parts[0]:
             if self.types is not None:
-                msg = f"{self.seen!r} was given with --types; tell what was seen in one way."
+                msg = (
+                    f"{self.seen!r} was given with --types; describe what was seen in one "
+                    "of these ways."
+                )
                 raise InputError(msg)
             told |= said_row(sentence, taxonomy)
         return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
@@ -237,17 +241,12 @@ class QueryOptions:
 
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase
-    ) -> tuple[list[int], list[int]]:
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Return the class codes of what was seen in no known direction, and was not seen."""
-        _, seen, absent = self._parts
-        if not seen and not absent:
-            return [], []
-        from semsig_gis.objects.keywords import class_code
+        from semsig_gis.database.observation import unplaced_codes
 
-        def codes(words: list[str]) -> list[int]:
-            return [class_code(word, dataset.taxonomy) for word in words]
-
-        return codes(seen), codes(absent)
+        _, seen, absent = unplaced_codes(self.seen or "", dataset.taxonomy)
+        return seen, absent
 
     @property
     def _parts(self) -> tuple[str, list[str], list[str]]:
@@ -263,7 +262,7 @@ class SearchOptions:
 
     require: Annotated[
         str | None,
-        typer.Option(help="What a cell must see: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
+        typer.Option(help="What must be in sight: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
     ] = None
     noise: Annotated[
         str | None,
@@ -287,10 +286,13 @@ class SearchOptions:
     ] = None
     area: Annotated[
         Path | None,
-        typer.Option(help="WEST,SOUTH,EAST,NORTH in degrees, or polygons: the place lies in it."),
+        typer.Option(
+            help="Area that the place lies in: WEST,SOUTH,EAST,NORTH in degrees, or polygons."
+        ),
     ] = None
     popularity: Annotated[
-        Path | None, typer.Option(help="Raster of how likely each place is, such as of people.")
+        Path | None,
+        typer.Option(help="Raster that says how likely each place is, such as of population."),
     ] = None
     rule: Annotated[
         Path | None,
@@ -323,8 +325,8 @@ class SearchOptions:
 
         if self.on_grid and self.refine:
             msg = (
-                "--on-grid and --refine were given; a place on the grid is not to be refined, so "
-                "leave out one of them."
+                "--on-grid and --refine were given, which exclude each other; leave out one "
+                "of them."
             )
             raise InputError(msg)
         refined = False if self.on_grid else self.refine
@@ -332,7 +334,8 @@ class SearchOptions:
         if self.objects is not None and not needs_objects:
             option = "--on-grid" if self.on_grid else "--no-refine"
             msg = (
-                f"--objects and {option} were given, so that nothing looks at them; leave out one."
+                f"--objects and {option} were given, but street objects are not used then; "
+                "leave out one."
             )
             raise InputError(msg)
         sigma = _north_sigma(self.heading)

@@ -38,7 +38,7 @@ class ViewOptions:
         typer.Argument(
             help="Views in their order: a CSV or JSON lines file, or - for JSON lines from "
             "standard input. Each after the first has dx,dy or distance,bearing (metres, degrees) "
-            "from the one before, and its sigma; or --track has."
+            "from the one before, and its sigma; or use --track."
         ),
     ]
     track: Annotated[
@@ -78,7 +78,7 @@ class RouteOptions(SearchOptions, ViewOptions):
 
 @command(RouteOptions)
 def route(options: RouteOptions) -> None:
-    """Tell where the views of a route were seen from, each given all."""
+    """Find where the views of a route were seen from."""
     from semsig_gis.database.city import open_city
 
     city = open_city(options.database)

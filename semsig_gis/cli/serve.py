@@ -10,7 +10,7 @@ import typer
 
 from semsig_gis.cli.console import Database, app, remark, say
 from semsig_gis.cli.options import NoiseName, Objects, object_store, read_noise
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import extra
 
 MOST_PORT = 65535
 
@@ -28,20 +28,12 @@ def serve(
     noise: NoiseName = "by-hand",
     objects: Objects = None,
 ) -> None:
-    """Open a page in the browser to ask with photos, on this machine alone.
+    """Locate photos in a page of the browser, on this machine only.
 
-    Nothing leaves the machine. The page is closed to others: its address holds a secret.
+    No data leaves the machine. Others cannot open the page: its address contains a secret.
     """
-    try:
+    with extra("serve", "the workbench"):
         from semsig_gis.serve import server
-    except ModuleNotFoundError as error:
-        if error.name not in {"anyio", "starlette", "uvicorn"}:
-            raise
-        msg = (
-            f"the workbench needs {error.name}, which is not installed; install it with pip "
-            "install 'semsig_gis[serve]'."
-        )
-        raise InputError(msg) from error
     from semsig_gis.database.city import open_city
     from semsig_gis.likelihood.noise.model import NOISES
     from semsig_gis.serve.workbench import Workbench

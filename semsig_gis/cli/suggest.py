@@ -19,7 +19,7 @@ class SuggestOptions(SearchOptions, QueryOptions):
 
 @command(SuggestOptions)
 def suggest(options: SuggestOptions) -> None:
-    """Suggest what to look for next, what tells most first."""
+    """Suggest what to look for next, most useful first."""
     from semsig_gis.database.city import open_city
     from semsig_gis.likelihood.questions import next_questions, with_unplaced
 

@@ -34,7 +34,7 @@ def view(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="What a detector wrote: COCO, Label Studio or Mapillary JSON, CVAT XML, YOLO "
+            help="Detections: COCO, Label Studio or Mapillary JSON, CVAT XML, YOLO "
             ".txt with data.yaml; or a folder."
         ),
     ],
@@ -50,7 +50,8 @@ def view(
     database: Annotated[
         Path | None,
         typer.Option(
-            help="Signature database to be asked, whose classes are meant.  [default: those of "
+            help="Signature database that the views are for, which has the classes.  "
+            "[default: those of "
             "all built-in catalogues]"
         ),
     ] = None,
@@ -64,7 +65,7 @@ def view(
     photos: Annotated[
         Path | None,
         typer.Option(
-            help="What is known of single pictures: a CSV or JSON lines file with image and any of "
+            help="Camera data of single pictures: a CSV or JSON lines file with image and any of "
             "camera, fov, heading, heading_error, pitch, roll and place."
         ),
     ] = None,
@@ -90,7 +91,7 @@ def view(
         str | None,
         typer.Option(
             help="Standard deviation of the heading in degrees, or unknown.  [default: 10 for "
-            "EXIF; else what semsig localize is told]"
+            "EXIF; else that of semsig localize]"
         ),
     ] = None,
     pitch: Annotated[
@@ -98,24 +99,24 @@ def view(
     ] = None,
     roll: Annotated[
         float | None,
-        typer.Option(min=-180, max=180, help="Degrees that it is turned clockwise."),
+        typer.Option(min=-180, max=180, help="Degrees that the camera is rolled clockwise."),
     ] = None,
     size: Annotated[
-        str | None, typer.Option(help="Size of pictures that nobody says, as 1920x1080 pixels.")
+        str | None, typer.Option(help="Size of pictures where it is unknown, such as 1920x1080.")
     ] = None,
     place: Annotated[
         Literal["each", "gps", "all"],
         typer.Option(
-            help="Which pictures are one view: none, those of one GPS place (5 m), or all; a place "
-            "in --photos goes first."
+            help="Which pictures form one view: none, those of one GPS place (5 m), or all; a "
+            "place in --photos takes precedence."
         ),
     ] = "each",
     min_score: Annotated[
-        float, typer.Option(min=0, max=1, help="Leave out what the detector is less sure of.")
+        float, typer.Option(min=0, max=1, help="Leave out boxes with a lower score.")
     ] = 0.3,
     as_json: AsJson = False,
 ) -> None:
-    """Turn the boxes of a detector, and its camera, into views to localize."""
+    """Turn the boxes of an object detector into views to localize."""
     from semsig_gis.queries.detections.formats import read_pictures
     from semsig_gis.queries.detections.labels import LabelMap
     from semsig_gis.queries.detections.pictures import Shot
@@ -125,7 +126,10 @@ def view(
     keep_inputs(out, read=(*files, *(labels or ()), database, photos))
     require_suffix(".jsonl", out)
     if images is not None and not images.is_dir():
-        msg = f"--images was given as {images}, which is no folder; give that of the pictures."
+        msg = (
+            f"--images was given as {images}, which is not a folder; give the folder of the "
+            "pictures."
+        )
         raise InputError(msg)
     taxonomy = _taxonomy(database)
     known = Shot(
@@ -193,10 +197,10 @@ def _tell(tally: Tally) -> None:
         remark(f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score")
     if tally.no_boxes:
         shapes = _many(tally.no_boxes, "shape")
-        remark(f"left out: {shapes} with no box or outline of one object")
+        remark(f"left out: {shapes} without a box or an outline of one object")
     for what, labels in (
-        ("of labels that no map knows", tally.unknown),
-        ("of what is no street object", tally.no_objects),
+        ("with labels that are in no label map", tally.unknown),
+        ("of things that are not street objects", tally.no_objects),
         ("of classes that the city does not have", tally.not_in_city),
     ):
         if labels:
@@ -204,7 +208,7 @@ def _tell(tally: Tally) -> None:
             remark(f"left out: {boxes} {what}: {_listed(labels)}")
     if tally.unknown_heading:
         pictures = _many(tally.unknown_heading, "picture")
-        remark(f"no heading is known of {pictures}; bearings count from where the camera looks")
+        remark(f"the heading is not known of {pictures}; bearings count from the viewing direction")
     for north, count in tally.north.items():
         headings = _many(count, "heading")
         remark(f"counted from {north} north: {headings}; localize with --north {north}")

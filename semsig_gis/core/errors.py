@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 
 class SemsigError(Exception):
@@ -56,3 +57,22 @@ def nearest_name(name: str, known: Iterable[str]) -> str:
     lowered = {candidate.lower(): candidate for candidate in known}
     close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.5)
     return f"; the nearest is {lowered[close[0]]!r}" if close else ""
+
+
+@contextlib.contextmanager
+def extra(name: str, what: str) -> Iterator[None]:
+    """Import packages of an extra in the block; InputError says how to install one that is missing.
+
+    `what` needs them, such as "the workbench".
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = str(error.name).partition(".")[0]
+        if package == __name__.partition(".")[0]:
+            raise
+        msg = (
+            f"{what} needs {package}, which is not installed; install it with pip install "
+            f"'semsig_gis[{name}]'."
+        )
+        raise InputError(msg) from error

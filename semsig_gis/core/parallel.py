@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core.errors import InputError, SemsigError, extra
 from semsig_gis.core.ranges import MOST_WORKERS, require_number
 from semsig_gis.core.scratch import own_folder
 
@@ -79,7 +79,8 @@ def run_tasks(
         for task in tasks:
             yield _attempt(work, task)
         return
-    from distributed import KilledWorker, as_completed  # noqa: PLC0415 - only where it is used
+    with extra("cluster", "work in several processes"):
+        from distributed import KilledWorker, as_completed  # noqa: PLC0415 - only where it is used
 
     with _answering(scheduler), _client(workers, scheduler) as client:
         _require_same_view(client, files)

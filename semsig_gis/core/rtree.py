@@ -58,15 +58,12 @@ class ObjectIndex:
 class PackedIndex:
     """An R-tree over points that is packed once and asked by very many viewpoints.
 
-    Positions are in metres, shape (n, 2); `points` are the same as shapely points, where they are
-    made already. InputError if there is none, or one is not finite.
+    Positions are in metres, shape (n, 2). InputError if there is none, or one is not finite.
     """
 
-    def __init__(self, xy: NDArray[np.float64], points: NDArray[np.object_] | None = None) -> None:
+    def __init__(self, xy: NDArray[np.float64]) -> None:
         self._xy = checked_points(xy)
-        if points is None:
-            points = np.asarray(shapely.points(self._xy))
-        self._tree = shapely.STRtree(points)
+        self._tree = shapely.STRtree(np.asarray(shapely.points(self._xy)))
 
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float

@@ -11,13 +11,9 @@ import hashlib
 import os
 import platform
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-if sys.platform != "win32":
-    import fcntl
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -95,13 +91,12 @@ def _freed(folder: Path) -> int | None:
 
 def locked(file: int, *, wait: bool) -> bool:
     """Lock an open file or folder until it is closed; False where that is impossible."""
-    if sys.platform == "win32":
-        return False
+    from filelock import lock_descriptor  # noqa: PLC0415 - a query alone writes nothing
+
     try:
-        fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return lock_descriptor(file, blocking=wait)
     except OSError:
         return False
-    return True
 
 
 def _claimed(parent: Path) -> tuple[Path, int]:

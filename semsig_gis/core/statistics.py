@@ -142,11 +142,11 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
     curve over the examples is that of the shares.
     """
     given = np.asarray(features, dtype=np.float64)
-    wanted = np.asarray(shares, dtype=np.float64)
-    if given.ndim != 2 or len(given) != len(wanted) or not len(wanted):  # noqa: PLR2004
-        msg = f"{given.shape} features and {wanted.shape} shares were given; give a row for each."
+    targets = np.asarray(shares, dtype=np.float64)
+    if given.ndim != 2 or len(given) != len(targets) or not len(targets):  # noqa: PLR2004
+        msg = f"{given.shape} features and {targets.shape} shares were given; give a row for each."
         raise InputError(msg)
-    if not (np.isfinite(given).all() and ((wanted >= 0) & (wanted <= 1)).all()):
+    if not (np.isfinite(given).all() and ((targets >= 0) & (targets <= 1)).all()):
         msg = "a feature is not finite or a share is not from 0 to 1; leave such examples out."
         raise InputError(msg)
     kinds = given.shape[1]
@@ -162,7 +162,7 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
         middle=middle,
         spread=spread,
         powers=powers,
-        weights=_newton(terms, wanted),
+        weights=_newton(terms, targets),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import threading
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -38,6 +39,27 @@ if hasattr(os, "register_at_fork"):  # the threads stay behind
 _here = threading.local()
 
 
+class NotWantedError(Exception):
+    """What was worked on is not wanted any more."""
+
+
+@contextlib.contextmanager
+def while_wanted(wanted: Callable[[], bool]) -> Iterator[None]:
+    """Raise `NotWantedError` here, and in `share_rows` of this thread, once it is not `wanted`."""
+    _here.wanted = wanted
+    try:
+        _go_on()
+        yield
+    finally:
+        del _here.wanted
+
+
+def _go_on() -> None:
+    wanted = getattr(_here, "wanted", None)
+    if wanted is not None and not wanted():
+        raise NotWantedError
+
+
 def share_rows(
     work: Callable[[NDArray[np.int64]], object], rows: int, *, least: int = ROWS_A_PART
 ) -> None:
@@ -45,6 +67,7 @@ def share_rows(
 
     A part has at least so many rows. What is shared within a part is done by its own thread.
     """
+    _go_on()
     parts = min(2 * cores(), rows // least)
     if parts <= 1 or cores() == 1 or getattr(_here, "sharing", False):
         work(np.array([0, rows]))

@@ -215,14 +215,14 @@ def check_top(top: int) -> None:
 def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tuple[str, ...]:
     """Return what to say of a query to a database that sees the classes `present` alone."""
     if not len(query):
-        return ("the query saw nothing, which tells little of the place.",)
+        return ("nothing was seen, which says little about the place.",)
     notes = _outside_notes(query, taxonomy) if isinstance(query, View) else ()
     codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
     if not codes:
         return notes
     lacking = map(taxonomy.by_code, dict.fromkeys(codes))
     legend = ", ".join(f"{item.symbol} ({item.title.lower()})" for item in lacking)
-    note = f"no cell of the database sees {legend}, so that this counts as a false detection."
+    note = f"no cell of the database sees {legend}, so it counts as a false detection."
     return (note, *notes)
 
 

@@ -89,11 +89,10 @@ def remove_companions(
 def _found(city: City) -> Iterator[tuple[Path, str]]:
     """Give all that lies beside a database, and what it is."""
     file = Path(os.path.realpath(city.path))
-    if not file.is_dir():
-        current = city.store_path
-        for place in (store_path(file), waiting_store(file)):
-            if place.is_dir():
-                yield place, STORE if place == current else LEFT_STORE
+    current = city.store_path
+    for place in (current,) if file.is_dir() else (store_path(file), waiting_store(file)):
+        if place.is_dir():
+            yield place, STORE if place == current else LEFT_STORE
     for name in sorted({str(city.path.absolute()), str(file)}):  # a link had its own
         for index in sorted(glob.glob(f"{glob.escape(name)}.*.likelihood")):  # noqa: PTH207
             yield Path(index), INDEX

@@ -118,7 +118,7 @@ def build_database(
     if len(database) == 0:
         msg = (
             f"no cell sees any of the {len(objects):,} objects; make the step ({grid.step:g} m) "
-            f"smaller or the visibility range ({spec.radius:g} m) larger, or look at the area, "
+            f"smaller or the visibility range ({spec.radius:g} m) larger, or check the area, "
             "the streets and the buildings."
         )
         raise EmptyResultError(msg)
@@ -178,7 +178,7 @@ def build_cells(
         rows,
         objects.xy,
         grid=grid,
-        index=PackedIndex(objects.xy, objects.table.geometry.to_numpy()),
+        index=PackedIndex(objects.xy),
         ranges=ranges[codes],
         footprints=buildings,
     ):

@@ -1,8 +1,9 @@
 """A city: a signature database with what lies beside its file, opened as one thing.
 
 A database does not say which objects its cells see, where these stand exactly, or what they are
-called in their source. The object store does: ``city.objects`` beside ``city.parquet``. An update
-needs it, and so does whatever looks at objects from a place off the grid.
+called in their source. The object store does: ``city.objects`` beside ``city.parquet``, and in a
+folder of parts the copies of what it was built from. An update needs it, and so does whatever looks
+at objects from a place off the grid.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -23,6 +25,7 @@ from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, NAME, crs_label
 from semsig_gis.database.file import (
+    INPUTS,
     KIND,
     Manifest,
     damaged_files,
@@ -213,9 +216,9 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     Parameters
     ----------
     database : str or Path
-        File of the database.
+        File of the database, or folder of its parts.
     folder : str or Path, optional
-        The store, where it does not lie beside the database.
+        The store, where it does not lie beside the database; one in parts has it in its folder.
 
     Returns
     -------
@@ -241,11 +244,10 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     give a signature database file.
     """
     if is_folder(database):
-        msg = (
-            f"{database} is a folder, and only a database in one file has an object store; give a "
-            "signature database file."
-        )
-        raise DatabaseError(msg)
+        if folder is not None:
+            msg = f"{database} is a folder with an object store in it; give no other store."
+            raise DatabaseError(msg)
+        return _read_inputs(Path(database))
     require_file(database)
     file = Path(database)
     while True:
@@ -326,6 +328,32 @@ def _read(folder: Path, database: Path) -> ObjectStore:
         footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
         streets=_table(folder / STREETS) if STREETS in names else None,
     )
+
+
+def stored_inputs(folder: Path) -> dict[str, Path]:
+    """Return the files of objects, buildings and streets that a database in parts was built from.
+
+    DatabaseError if they are not there.
+    """
+    files = {path.stem: path for path in sorted((folder / INPUTS).glob("*.parquet"))}
+    if "objects" not in files:
+        read_manifest(folder)  # another folder is told as such
+        msg = f"{folder} has no street objects in {INPUTS}; build the database again."
+        raise DatabaseError(msg)
+    return files
+
+
+def _read_inputs(folder: Path) -> ObjectStore:
+    from semsig_gis.objects.surroundings import read_surroundings  # noqa: PLC0415 - it loads slowly
+
+    files = stored_inputs(folder)
+    objects = open_objects(files["objects"])
+
+    def read(role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame | None:
+        path = files.get(role)
+        return None if path is None else read_surroundings(path, role=role, crs=objects.crs)
+
+    return ObjectStore.of(objects, footprints=read("buildings"), streets=read("streets"))
 
 
 def _table(path: Path) -> gpd.GeoDataFrame:
@@ -467,9 +495,9 @@ class City(Displayed):
 
     @property
     def bytes(self) -> int:
-        """Size of the file, or of all files in the folder."""
+        """Size of the file, or of the manifest and the parts."""
         files = self.path.iterdir() if self.path.is_dir() else [self.path]
-        return sum(file.stat().st_size for file in files)
+        return sum(file.stat().st_size for file in files if file.is_file())
 
     @property
     def digest(self) -> str:
@@ -480,11 +508,11 @@ class City(Displayed):
     @property
     def store_path(self) -> Path:
         """The folder of the object store, whether it is there or not."""
-        return _current(self.path)
+        return self.path / INPUTS if self.path.is_dir() else _current(self.path)
 
     @property
     def has_store(self) -> bool:
-        """Whether an object store lies beside the database."""
+        """Whether the database has an object store."""
         return self.store_path.is_dir()
 
     @cached_property
@@ -530,7 +558,7 @@ class City(Displayed):
         if not any(entries):
             return None
         if any(entry != entries[0] for entry in entries):
-            msg = f"the parts of {self.path} do not agree on their {name}; work it out again."
+            msg = f"the parts of {self.path} do not agree on their {name}; compute it again."
             raise DatabaseError(msg)
         names = ["cell_id", *entries[0]["columns"]]
         tables = [read_geoparquet(file, kind=KIND, columns=names)[0] for file in files]
@@ -559,6 +587,8 @@ class City(Displayed):
                 _extend(file, new, columns, cell_ids, added)
                 parts.append(replace(part, bytes=new.stat().st_size, sha256=digest(new)))
             Manifest(manifest.recipe, tuple(parts)).write(partial)
+            if self.has_store:
+                shutil.copytree(self.store_path, partial / INPUTS)
 
 
 def open_city(path: str | Path) -> City:

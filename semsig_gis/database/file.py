@@ -42,6 +42,8 @@ KIND = "signature database"
 FORMAT = 2
 # Readers of Parquet folders, such as pyarrow, leave out what begins so.
 MANIFEST = "_manifest.json"
+# Copies of the objects, buildings and streets that a database in parts was built from.
+INPUTS = "_inputs"
 PARTS_KIND = "signature database in parts"
 CHUNK = 1 << 20
 

@@ -59,13 +59,13 @@ def merge_databases(
     out: str | Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> MergeReport:
-    """Merge two databases in one file each, and the object stores beside them.
+    """Merge two databases, in one file or in tiles, and their object stores.
 
     Parameters
     ----------
     first, second : str or Path
-        Files of the databases: of one CRS, grid, range, viewpoints and classes, and both with
-        buildings or both without.
+        Files of the databases, or folders of their tiles: of one CRS, grid, range, viewpoints and
+        classes, and both with buildings or both without.
     out : str or Path
         File to write; its object store is put beside it.
     progress : callable, optional

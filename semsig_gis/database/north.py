@@ -72,7 +72,10 @@ class North:
             msg = f"north {name!r} is unknown{nearest_name(name, NORTHS)}; give one of {NORTHS}."
             raise UnknownNameError(msg)
         if date is not None and name != "magnetic":
-            msg = f"a date was given for {name} north, which stays; give it for magnetic north."
+            msg = (
+                f"a date was given for {name} north, but only magnetic north changes with "
+                "time; leave it out."
+            )
             raise InputError(msg)
         if name == "grid":
             return cls()

@@ -111,7 +111,10 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
     columns = [name for name in COLUMNS if name in told]
     photos = ["photos"] if "photos" in told else []
     if len(lists) > 1 or (lists and columns + photos):
-        msg = f"{' and '.join(lists + photos + columns)} were given; tell what was seen in one way."
+        msg = (
+            f"{' and '.join(lists + photos + columns)} were given; describe what was seen "
+            "in one of these ways."
+        )
         raise InputError(msg)
     if photos and not columns:
         return _joined_view(told, taxonomy, radius)
@@ -254,6 +257,15 @@ def unplaced_parts(text: str) -> tuple[str, list[str], list[str]]:
     if not placed:
         return ", ".join(seen), [], absent
     return ", ".join(placed), [part for part in seen if part not in placed], absent
+
+
+def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
+    """Return what `unplaced_parts` does, with class codes in the place of words."""
+    from semsig_gis.objects.keywords import class_code  # noqa: PLC0415 - it loads slowly
+
+    sentence, *others = unplaced_parts(text)
+    seen, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
+    return sentence, seen, absent
 
 
 def _parts(text: str) -> list[str]:

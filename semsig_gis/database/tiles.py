@@ -47,6 +47,7 @@ from semsig_gis.database.build import (
     require_room,
 )
 from semsig_gis.database.file import (
+    INPUTS,
     MANIFEST,
     Manifest,
     Part,
@@ -70,13 +71,16 @@ from semsig_gis.storage.runs import (
     read_json,
     write_json,
 )
+from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import geopandas as gpd
+    from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.objects.table import StreetObjects
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
@@ -90,8 +94,6 @@ MOST_TILES = 1_000_000
 TILE_S = 0.05  # that a tile takes at least
 
 RECIPE = "_recipe.json"
-# Copies of inputs that can be read by box.
-INPUTS = "_inputs"
 EMPTY = ".empty"
 RUN = RunKind(
     content="unfinished run",
@@ -164,8 +166,7 @@ def build_tiles(
     grid, spec, viewpoints : optional
         As in `build_database`.
     buildings, streets : str, Path or GeoDataFrame, optional
-        Files that `read_surroundings` reads, or tables. Those that cannot be read by box are copied
-        into such a file first.
+        Files that `read_surroundings` reads, or tables.
     workers : int, default 0
         How many processes of this machine build tiles; 0 builds them here, without dask.
     scheduler : str, optional
@@ -195,10 +196,11 @@ def build_tiles(
 
     Notes
     -----
-    The files are the same byte for byte whatever the number of workers. An interrupted run leaves
-    its tiles in ``OUT.partial``, and the same command goes on from there, if the specs are the same
-    and the input files have the same content (by SHA-256). A script that gives `workers` needs the
-    guard ``if __name__ == "__main__":``, because the workers import it.
+    The files are the same byte for byte whatever the number of workers. The folder keeps copies of
+    the objects, buildings and streets, so that `update_tiles` knows what was there. An interrupted
+    run leaves its tiles in ``OUT.partial``, and the same command goes on from there, if the specs
+    are the same and the input files have the same content (by SHA-256). A script that gives
+    `workers` needs the guard ``if __name__ == "__main__":``, because the workers import it.
 
     Examples
     --------
@@ -218,11 +220,18 @@ def build_tiles(
             grid=grid or GridSpec(),
             spec=spec or SignatureSpec(),
             viewpoints=viewpoints or ViewpointSpec(),
+            buildings=surroundings.get("buildings"),
+            streets=surroundings.get("streets"),
             tell=tell,
-            **surroundings,
         )
         parts = build_parts(
-            plan, objects, workers=workers, scheduler=scheduler, progress=progress, tell=tell
+            plan,
+            objects,
+            work=partial(build_tile, plan),
+            workers=workers,
+            scheduler=scheduler,
+            progress=progress,
+            tell=tell,
         )
         return publish(plan.folder, parts)
 
@@ -252,22 +261,45 @@ def in_files(
         yield files
 
 
+@contextlib.contextmanager
+def in_file(objects: StreetObjects | Path, out: Path) -> Iterator[Path]:
+    """Give the file of street objects; those in memory are written to one beside the result."""
+    if isinstance(objects, Path):
+        yield objects
+        return
+    parent = Path(os.path.realpath(out)).parent
+    parent.mkdir(parents=True, exist_ok=True)
+    with own_folder(parent) as folder:
+        save_objects(objects, folder / "objects.parquet")
+        yield folder / "objects.parquet"
+
+
 def build_parts(
     plan: TilePlan,
     objects: str | Path,
     *,
+    work: Callable[[Tile], Part | None],
+    known: dict[Tile, Part] | None = None,
+    share: float = 1.0,
     workers: int,
     scheduler: str | None,
     progress: Callable[[int, int], None] | None,
     tell: Callable[[str], None] | None,
 ) -> list[Part]:
-    """Build the tiles of a plan that are not there yet, and return all parts, ordered by tile."""
+    """Build the tiles of a plan that are not there yet, and return all parts, ordered by tile.
+
+    `work` builds one; `known` parts lie in the folder already, and of the others about this `share`
+    of the cells is computed.
+    """
+    known = known or {}
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
-        done = finished_tiles(plan.folder, tiles)
-        _look_ahead(plan, tiles, left=len(tiles) - len(done), workers=workers, scheduler=scheduler)
+        left = [tile for tile in tiles if tile not in known]
+        done: dict[Tile, Part | None] = {**known, **finished_tiles(plan.folder, left)}
+        left = [tile for tile in left if tile not in done]
+        _look_ahead(plan, tiles, left=share * len(left), workers=workers, scheduler=scheduler)
         if done and tell is not None:
-            tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; it goes on")
+            tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; resuming it")
 
         def note_part(tile: Tile, part: Part | None) -> None:
             done[tile] = part
@@ -275,8 +307,8 @@ def build_parts(
                 progress(len(done), len(tiles))
 
         failed = finish_tasks(
-            partial(build_tile, plan),
-            [one for one in tiles if one not in done],
+            work,
+            left,
             done=note_part,
             workers=workers,
             scheduler=scheduler,
@@ -289,8 +321,8 @@ def build_parts(
         others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         msg = (
             f"{part_name(first)}{others} could not be built ({failed[first]}); the {len(done):,} "
-            f"tiles that are done are kept in {plan.folder}, so mend that and run the same command "
-            "again."
+            f"tiles that are done are kept in {plan.folder}, so fix the cause and run the "
+            "same command again."
         )
         raise DatabaseError(msg)
     parts = sorted(part for part in done.values() if part is not None)
@@ -298,7 +330,7 @@ def build_parts(
         shutil.rmtree(plan.folder, ignore_errors=True)
         msg = (
             f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
-            f"the visibility range ({plan.spec.radius:g} m) larger, or look at the area, the "
+            f"the visibility range ({plan.spec.radius:g} m) larger, or check the area, the "
             "streets and the buildings."
         )
         raise EmptyResultError(msg)
@@ -306,7 +338,7 @@ def build_parts(
 
 
 def _look_ahead(
-    plan: TilePlan, tiles: Sequence[Tile], *, left: int, workers: int, scheduler: str | None
+    plan: TilePlan, tiles: Sequence[Tile], *, left: float, workers: int, scheduler: str | None
 ) -> None:
     """Refuse tiles that the memory does not hold, and tell when all will take long.
 
@@ -366,12 +398,13 @@ def plan_tiles(
     viewpoints: ViewpointSpec,
     buildings: str | Path | None = None,
     streets: str | Path | None = None,
+    digests: Mapping[str, str] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> TilePlan:
     """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
 
-    Streets are needed by the viewpoints ``"streets"`` and left aside by others. `tell` takes
-    remarks on the files of buildings and streets.
+    Streets are needed by the viewpoints ``"streets"`` and left aside by others. `digests` are those
+    of inputs of which a copy is given. `tell` takes remarks on the files of buildings and streets.
     """
     along = streets if viewpoints.mode == "streets" else None
     places: dict[Input, str | Path | None]
@@ -388,7 +421,7 @@ def plan_tiles(
         "viewpoints": viewpoints.to_dict(),
         "occlusion": TOLERANCE_M if "buildings" in paths else None,
         "tile": {"cells": tile.cells(grid)},
-        "inputs": {name: fingerprint(path) for name, path in paths.items()},
+        "inputs": {name: fingerprint(path) for name, path in paths.items()} | dict(digests or {}),
     }
     folder = begin(out, recipe)
     try:
@@ -431,13 +464,14 @@ def fingerprint(path: Path) -> str:
 def _by_box(
     name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
 ) -> Path:
-    """Return an input that can be read by box in a CRS: its file, or else a copy."""
+    """Return a copy of an input that can be read by box in a CRS."""
     copy = folder / INPUTS / f"{name}.parquet"
-    if _covered(path, crs):
-        return path
     if copy.exists():
         return copy
-    if name == "objects":  # those of before have no bounds
+    if _covered(path, crs):
+        with whole_file(copy) as whole, Path(path).open("rb") as own, whole.open("wb") as copied:
+            shutil.copyfileobj(own, copied)
+    elif name == "objects":  # those of before have no bounds
         save_objects(open_objects(path), copy)
     else:
         save_surroundings(read_surroundings(path, role=name, crs=crs, tell=tell), copy)
@@ -501,7 +535,14 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
 
 
 def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
-    """Build and save the part of one tile; return None where none of its cells sees anything.
+    """Build and save the part of one tile; return None where none of its cells sees anything."""
+    return save_tile(plan, tile, tile_cells(plan, tile))
+
+
+def tile_cells(
+    plan: TilePlan, tile: Tile, *, only: NDArray[np.int64] | None = None
+) -> SignatureDatabase | None:
+    """Return the cells of one tile, or `only` those of some ids; None far from any object.
 
     What decides about a cell lies within the largest range of it: objects, and buildings together
     with their neighbours; a street lies within its own width. So only that is read, and the cells
@@ -512,30 +553,38 @@ def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
         raise InputError(msg)
     around = plan.box(tile, plan.reach + MARGIN_M)
     objects = open_objects(plan.objects, box=around)
-    if len(objects):
-        crs = objects.crs
+    if not len(objects):
+        return None
+    if only is None:
         columns, rows = cells_near(objects.xy, grid=plan.grid, radius=plan.reach)
         inside = (columns // plan.side == tile[0]) & (rows // plan.side == tile[1])
-        along = plan.box(tile, plan.street_reach + MARGIN_M)
-        database = build_cells(
-            objects,
-            columns[inside],
-            rows[inside],
-            grid=plan.grid,
-            spec=plan.spec,
-            viewpoints=plan.viewpoints,
-            footprints=None if plan.buildings is None else _footprints(plan.buildings, around, crs),
-            streets=None
-            if plan.streets is None
-            else read_surroundings(plan.streets, role="streets", crs=crs, box=along),
-            partial=True,
-        )
-        if len(database):
-            path = plan.folder / part_name(tile)
-            save_database(database, path)
-            return describe(tile, database, path)
-    (plan.folder / part_name(tile)).with_suffix(EMPTY).touch()
-    return None
+        columns, rows = columns[inside], rows[inside]
+    else:
+        columns, rows = split_ids(only)
+    crs, along = objects.crs, plan.box(tile, plan.street_reach + MARGIN_M)
+    return build_cells(
+        objects,
+        columns,
+        rows,
+        grid=plan.grid,
+        spec=plan.spec,
+        viewpoints=plan.viewpoints,
+        footprints=None if plan.buildings is None else _footprints(plan.buildings, around, crs),
+        streets=None
+        if plan.streets is None
+        else read_surroundings(plan.streets, role="streets", crs=crs, box=along),
+        partial=True,
+    )
+
+
+def save_tile(plan: TilePlan, tile: Tile, database: SignatureDatabase | None) -> Part | None:
+    """Save the part of one tile, or note that it has none."""
+    path = plan.folder / part_name(tile)
+    if database is None or not len(database):
+        path.with_suffix(EMPTY).touch()
+        return None
+    save_database(database, path)
+    return describe(tile, database, path)
 
 
 def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:
@@ -575,7 +624,7 @@ def _require_replaceable(target: Path) -> None:
         return
     others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
     if MANIFEST in others:
-        others -= {MANIFEST, RECIPE, *(part.file for part in read_manifest(target).parts)}
+        others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:
         msg = (
             f"{target} holds {min(others)!r}, which is no part of a signature database; give the "
@@ -612,6 +661,7 @@ def publish(folder: Path, parts: Sequence[Part]) -> Manifest:
     manifest = Manifest(read_json(folder / RECIPE), tuple(parts))
     _require_replaceable(folder.with_name(folder.name.removesuffix(PARTIAL)))
     manifest.write(folder)
-    target = finish(folder, keep={MANIFEST, RECIPE, *(part.file for part in manifest.parts)})
+    names = {MANIFEST, RECIPE, INPUTS, *(part.file for part in manifest.parts)}
+    target = finish(folder, keep=names)
     (target / RECIPE).unlink()
     return manifest

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections import Counter
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,46 +14,45 @@ import numpy as np
 from semsig_gis import __version__
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import SOURCE, cell_ids, cells_near
+from semsig_gis.core.geometry import ROW_SPAN, SOURCE, cell_ids, cells_near, split_ids
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.core.ranges import MOST_METRES
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.terminal import percent
 from semsig_gis.database.build import build_cells
-from semsig_gis.database.city import open_city, save_with_store
+from semsig_gis.database.city import open_city, save_with_store, stored_inputs
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
 from semsig_gis.database.file import (
+    INPUTS,
     database_specs,
     open_database,
     part_files,
     part_name,
     read_manifest,
-    save_database,
 )
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.tiles import (
-    EMPTY,
     TileSpec,
     build_parts,
-    fingerprint,
-    in_files,
+    in_file,
     plan_tiles,
     publish,
-    touched_tiles,
+    save_tile,
+    tile_cells,
 )
 from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
 from semsig_gis.objects.table import licenses_of, open_objects
+from semsig_gis.storage.runs import read_json, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
-    import geopandas as gpd
     from numpy.typing import NDArray
 
     from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import Manifest, Part
+    from semsig_gis.database.file import Part
     from semsig_gis.database.tiles import Tile, TilePlan
     from semsig_gis.objects.changes import ClassChange, ObjectChanges
     from semsig_gis.objects.table import StreetObjects
@@ -271,7 +271,7 @@ def update_database(
     fresh = _recomputed(new, after, places, cells, progress=progress)
     updated = join_databases([new.select(~stale), fresh])
     if len(updated) == 0:
-        msg = f"no cell would see any of the {len(merged):,} objects; look at the new objects."
+        msg = f"no cell would see any of the {len(merged):,} objects; check the new objects."
         raise EmptyResultError(msg)
     layers = _layers(store.objects) | _layers(merged)
     drifted = compare_cells(database.select(stale), fresh)
@@ -294,28 +294,21 @@ def update_tiles(
     path: str | Path,
     objects: str | Path,
     *,
-    before: str | Path,
     out: str | Path | None = None,
-    buildings: str | Path | gpd.GeoDataFrame | None = None,
-    streets: str | Path | gpd.GeoDataFrame | None = None,
     workers: int = 0,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> UpdateReport:
-    """Update a database in tiles: those that see a change are built again, the others are kept.
+    """Update a database in tiles: in each, the cells that a change is seen from.
 
     Parameters
     ----------
     path : str or Path
         Folder of the database.
     objects : str or Path
-        The street objects as they are now, all layers, as `save_objects` wrote them.
-    before : str or Path
-        The street objects that the database was built from; it holds no copy of them.
+        The layers that were loaded anew, whole, as `save_objects` wrote them.
     out : str or Path, optional
         Another folder to write to; `path` itself by default.
-    buildings, streets : str, Path or GeoDataFrame, optional
-        Those that the database was built with.
     workers, scheduler : optional
         As in `build_tiles`.
     progress : callable, optional
@@ -330,12 +323,12 @@ def update_tiles(
     Raises
     ------
     InputError
-        If a file is not the one that the database was built from, the new objects lack a layer, use
-        a class code for something else or are seen from another longest distance.
+        If the new objects use a class code for something else or are seen from another longest
+        distance.
     CrsError
         If the new objects are in another CRS.
     DatabaseError, EmptyResultError
-        As `build_tiles` does; the database is as it was then.
+        As `build_tiles` does, or if the database holds no street objects; it is as it was then.
 
     Examples
     --------
@@ -347,126 +340,163 @@ def update_tiles(
     ...     save_objects(demo_objects, old)
     ...     save_objects(fewer, new)
     ...     tiles = build_tiles(old, town)
-    ...     report = update_tiles(town, new, before=old)
+    ...     report = update_tiles(town, new)
     >>> sum(item.removed for item in report.classes), 0 < report.share < 0.5
     (1, True)
     """
     check_workers(workers, scheduler)
-    manifest, folder = read_manifest(path), Path(path)
+    folder, manifest = Path(path), read_manifest(path)
     files = dict(zip((part.tile for part in manifest.parts), part_files(path), strict=True))
     first = open_database(next(iter(files.values()))).select(slice(0))
-    old, new = open_objects(before), open_objects(objects)
-    joined, kept, _ = replace_layers(old, new)
-    if kept:
-        msg = (
-            f"{objects} lacks the layers {', '.join(kept)} of {before}; load all layers of a "
-            "database in tiles into one file."
-        )
-        raise InputError(msg)
+    inputs = stored_inputs(folder)
+    old, new = open_objects(inputs.pop("objects")), open_objects(objects)
+    joined, kept, notes = replace_layers(old, new)
+    now = joined if kept else new
     facts: dict[str, Any] = {
-        "taxonomy": new.taxonomy,
-        "licenses": (*map(str, new.licenses), *first.licenses[len(old.licenses) :]),
+        "taxonomy": now.taxonomy,
+        "licenses": (*map(str, now.licenses), *first.licenses[len(old.licenses) :]),
         "version": __version__,
-        "notes": new.notes,
+        "notes": now.notes,
     }
-    now = replace(first, **facts)
-    if now.reach != first.reach:  # the unit in which all distances are stored
+    after = replace(first, **facts)
+    if after.reach != first.reach:  # the unit in which all distances are stored
         msg = (
-            f"the longest visibility range of {objects} is {now.reach:g} m and that of {path} "
+            f"the longest visibility range of {objects} is {after.reach:g} m and that of {path} "
             f"{first.reach:g} m, which concerns every cell; build the database again."
         )
         raise InputError(msg)
     changes = compare_objects(old, joined)
     places, codes = _changed_places(old, joined, changes)
-    cells = _cells_in_range(replace(now, taxonomy=joined.taxonomy), places, codes)
-    target = path if out is None else out
-    with in_files(objects, target, buildings=buildings, streets=streets) as surroundings:
-        _require_inputs(folder, manifest, {"objects": Path(before), **surroundings})
-        side = int(manifest.recipe["tile"]["cells"])
+    cells = _cells_in_range(replace(after, taxonomy=joined.taxonomy), places, codes)
+    side = int(manifest.recipe["tile"]["cells"])
+    numbers = np.unique(np.stack([cells[0] // side, cells[1] // side], axis=1), axis=0)
+    stale: set[Tile] = {(column, row) for column, row in numbers.tolist()}
+    target = Path(path if out is None else out)
+    with in_file(joined if kept else Path(objects), target) as source:
         plan = plan_tiles(
-            objects,
+            source,
             target,
             tile=TileSpec(min(max(side * first.grid.step, 1.0), MOST_METRES)),
             grid=first.grid,
             spec=first.spec,
             viewpoints=first.viewpoints,
-            tell=None,
-            **surroundings,
+            buildings=inputs.get("buildings"),
+            streets=inputs.get("streets"),
+            digests={name: manifest.recipe["inputs"][name] for name in inputs},
         )
-        numbers = np.unique(np.stack([cells[0] // side, cells[1] // side], axis=1), axis=0)
-        stale: set[Tile] = {(column, row) for column, row in numbers.tolist()}
-        same = database_specs(now) == database_specs(first) and not open_city(path).has_columns
-        _keep_tiles(plan, files, stale, facts={} if same else facts)
+        known: dict[Tile, Part] = {}
+        if database_specs(after) == database_specs(first) and not open_city(path).has_columns:
+            known = {part.tile: part for part in manifest.parts if part.tile not in stale}
+        for tile, part in known.items():
+            shutil.copyfile(files[tile], plan.folder / part.file)
+        old_tiles = _OldTiles(folder, plan.folder / INPUTS / "stale.npy", facts)
+        np.save(old_tiles.stale, cell_ids(*cells))
         parts = build_parts(
-            plan, objects, workers=workers, scheduler=scheduler, progress=progress, tell=None
+            plan,
+            source,
+            work=partial(update_tile, plan, old_tiles),
+            known=known,
+            share=len(cells[0]) / manifest.cells,
+            workers=workers,
+            scheduler=scheduler,
+            progress=progress,
+            tell=None,
         )
-        drift = _drift(plan, files, stale, parts)
+        drift = _drift(plan, old_tiles, stale)
+        old_tiles.stale.unlink()
         publish(plan.folder, parts)
     return UpdateReport(
         classes=changes.classes,
-        replaced=tuple(sorted(_layers(old) | _layers(new))),
-        kept=(),
+        replaced=tuple(sorted((_layers(old) | _layers(new)) - set(kept))),
+        kept=kept,
         cells_before=manifest.cells,
         cells=sum(part.cells for part in parts),
         recomputed=len(cells[0]),
         changed=drift["changed"],
         appeared=drift["appeared"],
         vanished=drift["vanished"],
+        notes=notes,
     )
 
 
-def _require_inputs(folder: Path, manifest: Manifest, given: dict[str, Path]) -> None:
-    """Refuse files that are not those that a database in tiles was built from."""
-    built: dict[str, str] = manifest.recipe["inputs"]
-    for name in sorted({*built, *given}):
-        if name not in given:
-            msg = f"{folder} was built with {name}; give the same {name} again."
-        elif name not in built:
-            msg = f"{folder} was built without {name}; give none, or build the database again."
-        elif fingerprint(given[name]) != built[name]:
-            msg = (
-                f"{given[name]} does not hold the {name} that {folder} was built from; give the "
-                "file that does, or build the database again."
-            )
-        else:
-            continue
-        raise InputError(msg)
+@dataclass(frozen=True, slots=True)
+class _OldTiles:
+    """The tiles that an update begins with.
 
-
-def _keep_tiles(
-    plan: TilePlan, files: dict[Tile, Path], stale: set[Tile], *, facts: dict[str, Any]
-) -> None:
-    """Put the tiles that see no change into the folder of a run, as if it had built them.
-
-    `facts` are those that the whole database has anew, none where it has the same.
+    `stale` is the file of the numbers of the cells that a change is seen from, in their order, and
+    `facts` are what is said of the whole database from now on.
     """
-    tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
-    for tile in set(tiles) - stale:
-        kept = plan.folder / part_name(tile)
-        if tile not in files:
-            kept.with_suffix(EMPTY).touch()
-        elif not facts:
-            shutil.copyfile(files[tile], kept)
-        else:
-            save_database(replace(open_database(files[tile]), **facts), kept)
+
+    folder: Path
+    stale: Path
+    facts: dict[str, Any]
+
+    def database(self, tile: Tile) -> SignatureDatabase | None:
+        """Return the cells of a tile, None if it had none."""
+        path = self.folder / part_name(tile)
+        return open_database(path) if path.exists() else None
+
+    def stale_in(self, tile: Tile, side: int) -> NDArray[np.int64]:
+        """Return the numbers of the cells of a tile that a change is seen from."""
+        ids = np.load(self.stale, mmap_mode="r")
+        ends = cell_ids(np.array([tile[0], tile[0] + 1]) * side, np.full(2, -ROW_SPAN // 2))
+        first, last = np.searchsorted(ids, ends)
+        inside: NDArray[np.int64] = np.array(ids[first:last])
+        rows = split_ids(inside)[1]
+        mine: NDArray[np.int64] = inside[rows // side == tile[1]]
+        return mine
 
 
-def _drift(
-    plan: TilePlan, files: dict[Tile, Path], stale: set[Tile], parts: Iterable[Part]
-) -> Counter[str]:
-    """Count the cells that changed, appeared and vanished in the tiles that were built again."""
-    fresh = {part.tile: plan.folder / part.file for part in parts}
+def update_tile(plan: TilePlan, old: _OldTiles, tile: Tile) -> Part | None:
+    """Build the part of a tile from that of before and the cells that a change is seen from."""
+    stale, before = old.stale_in(tile, plan.side), old.database(tile)
+    fresh = tile_cells(plan, tile, only=stale) if len(stale) else None
+    parts = [] if fresh is None else [fresh]
+    was = None
+    if before is not None:
+        changes = np.isin(before.cell_ids, stale)
+        was = before.select(changes)
+        parts.append(replace(before.select(~changes), **old.facts))
+    if len(stale):
+        write_json(_drift_path(plan, tile), _cell_drift(was, fresh))
+    joined = replace(join_databases(parts), **old.facts) if parts else None
+    return save_tile(plan, tile, joined)
+
+
+def _drift_path(plan: TilePlan, tile: Tile) -> Path:
+    return (plan.folder / part_name(tile)).with_suffix(".drift")
+
+
+def _cell_drift(
+    before: SignatureDatabase | None, after: SignatureDatabase | None
+) -> dict[str, int]:
+    """Count the cells that changed, appeared and vanished."""
+    if before is None or after is None:
+        return {
+            "appeared": 0 if after is None else len(after),
+            "vanished": 0 if before is None else len(before),
+        }
+    cells = compare_cells(before, after)
+    return {
+        "changed": len(cells.changed),
+        "appeared": len(cells.appeared),
+        "vanished": len(cells.vanished),
+    }
+
+
+def _drift(plan: TilePlan, old: _OldTiles, stale: set[Tile]) -> Counter[str]:
+    """Count the cells that changed, appeared and vanished in all tiles.
+
+    Those that an interrupted build has left, and those without any object now, are compared here.
+    """
     drift: Counter[str] = Counter()
-    for tile in stale & (files.keys() | fresh.keys()):
-        if tile in files and tile in fresh:
-            cells = compare_cells(open_database(files[tile]), open_database(fresh[tile]))
-            drift["changed"] += len(cells.changed)
-            drift["appeared"] += len(cells.appeared)
-            drift["vanished"] += len(cells.vanished)
-        elif tile in fresh:
-            drift["appeared"] += len(open_database(fresh[tile]))
+    for tile in stale:
+        noted, part = _drift_path(plan, tile), plan.folder / part_name(tile)
+        if noted.exists():
+            drift.update(read_json(noted))
         else:
-            drift["vanished"] += len(open_database(files[tile]))
+            now = open_database(part) if part.exists() else None
+            drift.update(_cell_drift(old.database(tile), now))
     return drift
 
 

@@ -142,7 +142,7 @@ def error_field(
     least = max(2.0 * across / MOST_PIXELS, database.grid.step)
     if radius is not None and not (math.isfinite(radius) and radius >= least):
         msg = (
-            f"queries within {radius:g} m were to be put together; give metres, {least:,.0f} or "
+            f"queries within {radius:g} m were to be combined; give metres, {least:,.0f} or "
             "more in this city."
         )
         raise InputError(msg)

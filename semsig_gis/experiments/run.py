@@ -544,7 +544,7 @@ def _answer(
         (out, _), reason = next(iter(failed.items()))
         msg = (
             f"{len(failed)} of the {len(sizes)} parts of the work failed ({reason}); what is done "
-            f"is kept in {running[out][1]}, so mend that and run the same command again."
+            f"is kept in {running[out][1]}, so fix the cause and run the same command again."
         )
         raise DatabaseError(msg)
 

@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
+from semsig_gis.core.errors import (
+    EmptyResultError,
+    InputError,
+    UnknownNameError,
+    extra,
+    nearest_name,
+)
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import require_same_place
@@ -359,16 +365,8 @@ def export_item(
     ('city.parquet', 'EPSG:32631')
     """
     _suffix(path, {ITEM})
-    try:
+    with extra("stac", "a STAC item"):
         from semsig_gis.exports.stac import write_item  # noqa: PLC0415 - an extra
-    except ModuleNotFoundError as error:
-        if str(error.name).partition(".")[0] != "pystac":
-            raise
-        msg = (
-            "a STAC item needs pystac, which is not installed; install it with pip install "
-            "'semsig_gis[stac]'."
-        )
-        raise InputError(msg) from error
     city = open_city(database)
     if objects is not None:
         _require_one_city(path, city.database, open_objects(objects), None)

@@ -14,7 +14,6 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.signs import CELL_CHANCES, ERROR_BREAKS, FAILURES
 from semsig_gis.core.terminal import percent
 from semsig_gis.exports.styles import AMBIGUITY, IDENTIFIABILITY
-from semsig_gis.storage.raster import write_cells
 from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
@@ -116,6 +115,8 @@ def export_geotiff(
     if numbers.shape != (len(database),):
         msg = f"{numbers.size} numbers were given for {len(database)} cells; give one a cell."
         raise InputError(msg)
+    from semsig_gis.storage.raster import write_cells  # noqa: PLC0415 - an extra
+
     write_cells(
         path,
         {name: (numbers, unit)},
@@ -147,6 +148,8 @@ def export_field(field: ErrorField, database: SignatureDatabase, path: str | Pat
     columns, rows = np.nonzero(np.isfinite(field.failed.T))
     unit = {"failed": "", "error": "m", "queries": "queries"}
     bands = zip(unit, (field.failed, field.errors, field.speaking), strict=True)
+    from semsig_gis.storage.raster import write_cells  # noqa: PLC0415 - an extra
+
     write_cells(
         path,
         {name: (values[rows, columns], unit[name]) for name, values in bands},

@@ -299,7 +299,7 @@ def associate_pairs(
 
     Returns the chance that each pair is one thing, and the logarithm of the sum of each problem.
     """
-    from semsig_gis.likelihood.kernels import associate  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.likelihood.alignment import associate  # noqa: PLC0415 - numba loads slowly
 
     chances = np.empty(len(weights))
     log_sums = np.empty(len(pairs.starts) - 1)
@@ -319,7 +319,8 @@ def associate_pairs(
 RERANKED = 500
 """How many cells are re-ranked unless said otherwise."""
 FIRST = 100  # cells that are re-ranked whatever comes out; then as many again, twice as many, ...
-SAMPLE = 2304  # places in the others, of which a sample is looked at
+# Places in the others, of which a sample is looked at, and where time is short.
+SAMPLE, QUICK_SAMPLE = 2304, 768
 # Cells that are looked at from aside before, the first of them whatever comes out.
 ASIDE, FIRST_ASIDE, SAMPLE_ASIDE = 8192, 2048, 1024
 HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from which the rest are not
@@ -358,11 +359,12 @@ def rerank(
     log_prior: NDArray[np.float64] | None = None,
     count: int = RERANKED,
     aside: bool = True,
+    sample: int = SAMPLE,
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
     Up to `count` cells are re-ranked, until some hundred hold next to nothing of the chance.
-    Of the others, a sample is looked at, too, and each is moved by as much as those of the sample
+    Of the others, a `sample` is looked at, too, and each is moved by as much as those of the sample
     with scores like its own, so that all masses fit each other. `log_prior` helps to choose the
     cells and is not part of the result. Without bearings the scores are returned as they are.
     Where queries are from anywhere, places `aside` of the middles are looked at, too: four in each
@@ -391,7 +393,7 @@ def rerank(
         log_prior,
         count=count,
         first=FIRST,
-        sample=SAMPLE // (len(index.stands[1]) if aside else 1),
+        sample=sample // (len(index.stands[1]) if aside else 1),
     )
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):

@@ -107,12 +107,14 @@ def cell_estimate(
     *,
     radius: float,
     north_sigma: float = 0.0,
+    turned: bool = True,
 ) -> PlaceEstimate:
     """Return the mean place within `radius` metres of a cell, from the chances of the cells.
 
     For a place in two streets at once the mean lies between them, as it has the least mean squared
     error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma`
-    is in degrees. Headings are tried every two degrees all round, cell by cell.
+    is in degrees. Headings are tried every two degrees all round, cell by cell, if the query may be
+    `turned`.
     """
     database, chances = posterior.database, posterior.chances
     # The cells are ordered by column: those of the next columns are one run.
@@ -126,7 +128,7 @@ def cell_estimate(
     view = View.of(query)
     photo = view.split()[0]
     north_sigma = own_sigma(photo, north_sigma)
-    turned = north_sigma > 0 and view.bearings is not None and len(view) > 0
+    turned = turned and north_sigma > 0 and view.bearings is not None and len(view) > 0
     if turned:
         turns = np.arange(-180.0, 180.0, TURN)
         each = np.broadcast_to(turns, (len(inside), len(turns)))

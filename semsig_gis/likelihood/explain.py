@@ -161,7 +161,7 @@ def explain(
     x, y = map(float, xy)
     place = np.array([[x, y]])
     view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
-    codes = np.unique(objects.codes)
+    codes = np.flatnonzero(np.bincount(objects.codes)).astype(np.uint8)
     scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
     return scene.explanation(query, noise, heading)
 
@@ -329,11 +329,11 @@ class _Scene:
             place = float(x + distance * np.sin(angle)), float(y + distance * np.cos(angle))
             return facts | {"place": place}
         row = int(view.objects[entry])
-        street_object = self.objects.table.iloc[row]
+        table = self.objects.table
         return facts | {
             "object": row,
-            "source": str(street_object[SOURCE]),
-            "source_id": str(street_object[SOURCE_ID]),
+            "source": str(table[SOURCE].iloc[row]),
+            "source_id": str(table[SOURCE_ID].iloc[row]),
             "place": tuple(self.objects.xy[row].tolist()),
         }
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.likelihood.memo import TurnMemo
     from semsig_gis.likelihood.noise.model import Noise
     from semsig_gis.likelihood.noise.table import NoiseTable
 
@@ -47,7 +48,7 @@ LEVELS = 64
 TURNS = 64
 """Turns of a photo whose north is uncertain: steps of 5.625 degrees."""
 
-VERSION = 4  # raised whenever the same database and noise give other likelihoods
+VERSION = 5  # raised whenever the same database and noise give other likelihoods
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 STANDS = 3  # places a side of a cell, at which the best cells are compared
 LEAST_DENSITY = 1e-12
@@ -70,6 +71,14 @@ class CellScores:
     def heading(self) -> NDArray[np.float32] | None:
         """The headings of the first photo."""
         return self.headings[0]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TurnScores:
+    """The likelihood of a photo in every cell by turn: `shares`, times e to the power of `logs`."""
+
+    logs: NDArray[np.float32]
+    shares: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -146,14 +155,16 @@ class LikelihoodIndex(Displayed):
         bins = bin_of[database.bearing_units]
         return self._levels.entries(database.offsets, database.codes, bins, database.distance_units)
 
-    def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
+    def scores(
+        self, query: Signature, *, north_sigma: float = 0.0, memo: TurnMemo | None = None
+    ) -> CellScores:
         """Return the log-likelihood of a view in every cell, and the likeliest turns of its photos.
 
         Types may be unknown, all or those of code 0; bearings may be unknown, and then the order of
         the types plays no part. `north_sigma` is the standard deviation in degrees of the north of
         photos that do not tell their own, infinite where it is not known at all; the likelihood is
-        summed over turns of 5.6 degrees. Raises `InputError` if the view has a class that no cell
-        sees, or `north_sigma` is out of range.
+        summed over turns of 5.6 degrees. A `memo` goes on from what was seen before. Raises
+        `InputError` if the view has a class that no cell sees, or `north_sigma` is out of range.
         """
         check_north(north_sigma)
         view = View.of(query)
@@ -165,10 +176,20 @@ class LikelihoodIndex(Displayed):
         headings = []
         for photo in view.split():
             sigma = own_sigma(photo, north_sigma)
-            own, heading = _scorer(photo, self._levels, sigma)(self._entries)
+            if memo is not None and sigma != 0.0:
+                own, heading = memo.scores(self, photo, sigma)
+            else:
+                own, heading = _scorer(photo, self._levels, sigma)(self._entries)
             loglik += own
             headings.append(heading)
         return CellScores(loglik=loglik, headings=tuple(headings))
+
+    def turned(
+        self, photo: View, sigma: float, *, before: TurnScores | None, after: TurnScores
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return the scores and turns of a photo, which go on from `before`, and fill `after`."""
+        score = _scorer(photo, self._levels, sigma, before=before, after=after)
+        return score(self._entries)
 
     def scorer_aside(
         self, view: View, *, north_sigma: float
@@ -223,7 +244,20 @@ class LikelihoodIndex(Displayed):
         return distinct[types.inverse]
 
 
-def _scorer(photo: View, levels: _Levels, north_sigma: float) -> _Scorer:
+def turn_scores(cells: int, north_sigma: float) -> TurnScores:
+    """Return room for the likelihood of a photo by turn."""
+    turns = len(_turns(north_sigma)[1])
+    return TurnScores(np.empty(cells, np.float32), np.empty((cells, turns), np.float32))
+
+
+def _scorer(
+    photo: View,
+    levels: _Levels,
+    north_sigma: float,
+    *,
+    before: TurnScores | None = None,
+    after: TurnScores | None = None,
+) -> _Scorer:
     """Return what gives the log-likelihood of a photo in every place, and its likeliest turns."""
     from semsig_gis.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - slow to load
 
@@ -237,8 +271,10 @@ def _scorer(photo: View, levels: _Levels, north_sigma: float) -> _Scorer:
         "width": asked.width,
         "chances": levels.chances,
         "leaving": levels.leaving,
-        "base": float(np.log(density).sum() - table.clutter.sum() * asked.width),
+        "base": float(np.log(density).sum()),
     }
+    if before is None:
+        what["base"] -= float(table.clutter.sum() * asked.width)
     turned = north_sigma != 0.0
     if turned:
         by_detection = np.moveaxis(rows, 4, 1).reshape(-1, *rows.shape[1:4])[: len(density)]
@@ -251,6 +287,10 @@ def _scorer(photo: View, levels: _Levels, north_sigma: float) -> _Scorer:
             "first": first,
             "priors": priors,
         }
+        nothing = TurnScores(np.empty(0, np.float32), np.empty((0, len(priors)), np.float32))
+        old, new = before or nothing, after or nothing
+        what |= {"before_logs": old.logs, "before": old.shares}
+        what |= {"logs": new.logs, "after": new.shares}
     else:
         what |= {
             "rows": rows,
@@ -430,7 +470,7 @@ class _Levels:
 
     def masses(self, asked: PhotoTable) -> NDArray[np.float32]:
         """Return the chance that an object is in the sectors, by group, level and bearing."""
-        from semsig_gis.likelihood.kernels import mass_rows  # noqa: PLC0415
+        from semsig_gis.likelihood.alignment import mass_rows  # noqa: PLC0415
 
         levels = LEVELS if len(asked.sectors) else 0
         masses = np.empty((len(self.sigma), levels, BINS), np.float32)

@@ -27,7 +27,7 @@ from semsig_gis.database.answer import (
     query_notes,
 )
 from semsig_gis.database.north import GRID_NORTH
-from semsig_gis.likelihood.association import rerank
+from semsig_gis.likelihood.association import QUICK_SAMPLE, SAMPLE, rerank
 from semsig_gis.likelihood.estimate import cell_estimate, refined_estimate
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.estimate import PlaceEstimate
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.likelihood.memo import TurnMemo
     from semsig_gis.likelihood.posterior import Refinement
     from semsig_gis.likelihood.route import Leg
     from semsig_gis.likelihood.rule import AnswerRule, Decision
@@ -208,8 +209,9 @@ class Location(Answer):
 class LikelihoodLocator:
     """An index, and how queries to it are answered; `locate` describes the fields.
 
-    A place is refined, too, where `refined` is None and there are a store and bearings. The best
-    cells are looked at from `aside` of their middles, too, unless time is short.
+    A place is refined, too, where `refined` is None and there are a store and bearings. A `quick`
+    answer looks at cells from their middles alone, at fewer of them closely, and tells no heading
+    of the place. A `memo` is for views of which more is told from query to query.
     """
 
     index: LikelihoodIndex
@@ -222,7 +224,8 @@ class LikelihoodLocator:
     explained: int = 0
     known: Mapping[str, Any] = field(default_factory=dict)
     north: North = GRID_NORTH
-    aside: bool = True
+    quick: bool = False
+    memo: TurnMemo | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -231,14 +234,20 @@ class LikelihoodLocator:
             raise InputError(msg)
 
     def locate(
-        self, query: Signature, *, top: int | None = None, scores: CellScores | None = None
+        self,
+        query: Signature,
+        *,
+        top: int | None = None,
+        scores: CellScores | None = None,
+        scanned: CellScores | None = None,
     ) -> Location:
-        """Find where a query was seen from, by its `scores` if these are known already."""
-        scores = scores or self.scores(query, self.log_prior)
+        """Find where a query was seen from, by its `scores` or `scanned` if known already."""
+        scores = scores or self.scores(query, self.log_prior, scanned=scanned)
         chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
         store, ratio = self._store_for([query]), None
         if self.log_prior is not None:
-            ratio = prior_ratio(self.scores(query).loglik, self.log_prior)
+            alone = self.scores(query, scanned=scanned)
+            ratio = prior_ratio(alone.loglik, self.log_prior)
         top = top or self.top
         return self._location(query, scores, chances, top=top, store=store, ratio=ratio)
 
@@ -248,10 +257,11 @@ class LikelihoodLocator:
         legs: Sequence[Leg],
         *,
         scores: Sequence[CellScores] | None = None,
+        scanned: CellScores | None = None,
     ) -> tuple[Location, ...]:
         """Find where the views of a route were seen from; any of them may have no objects.
 
-        Their `scores` are worked out unless they are known already.
+        Their `scores`, and of the first what was `scanned`, are worked out unless they are known.
         """
         if scores is None:
             first = [self.scores(query, self.log_prior) for query in queries[:1]]
@@ -261,7 +271,7 @@ class LikelihoodLocator:
         chances = route_posteriors(database, logliks, legs, log_prior=log_prior)
         store, ratio = self._store_for(queries), None
         if log_prior is not None:
-            logliks[0] = self.scores(queries[0]).loglik
+            logliks[0] = self.scores(queries[0], scanned=scanned).loglik
             start = route_posteriors(database, logliks, legs)[0].chances
             ratio = prior_ratio(np.log(np.maximum(start, TINY)), log_prior)
         return tuple(
@@ -305,7 +315,8 @@ class LikelihoodLocator:
 
     def scan(self, query: Signature) -> CellScores:
         """Return the scores of all cells by the sum over detections, one by one."""
-        return self.index.scores(self._known(query), north_sigma=self.north_sigma)
+        known = self._known(query)
+        return self.index.scores(known, north_sigma=self.north_sigma, memo=self.memo)
 
     def scores(
         self,
@@ -321,7 +332,8 @@ class LikelihoodLocator:
             scanned or self.scan(query),
             north_sigma=self.north_sigma,
             log_prior=log_prior,
-            aside=self.aside,
+            aside=not self.quick,
+            sample=QUICK_SAMPLE if self.quick else SAMPLE,
         )
 
     def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
@@ -354,7 +366,13 @@ class LikelihoodLocator:
             estimate = refined_estimate(parts, xy, radius=radius, turned=scores.heading is not None)
         if estimate is None:
             estimate = cell_estimate(
-                known, noise, posterior, answer.cell, radius=radius, north_sigma=sigma
+                known,
+                noise,
+                posterior,
+                answer.cell,
+                radius=radius,
+                north_sigma=sigma,
+                turned=not self.quick,
             )
         columns = _columns(scores, posterior, min(top, len(scores.loglik)))
         first = columns["cell"].tolist()[: self.explained if len(known) else 0]

@@ -47,7 +47,7 @@ class LikelihoodMethod:
     def __post_init__(self) -> None:  # noqa: D105
         check_north(self.north_sigma)
         if self.refined and self.on_grid:
-            msg = "a place on the grid is not to be refined; leave out refined or on_grid."
+            msg = "refined and on_grid exclude each other; leave out one of them."
             raise InputError(msg)
 
     @classmethod

@@ -119,7 +119,7 @@ def photo_loglik(
 
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
     """
-    from semsig_gis.likelihood.kernels import align  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.likelihood.alignment import align  # noqa: PLC0415 - numba loads slowly
 
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)

@@ -80,6 +80,11 @@ class Posterior(Displayed):
         level = LEAST_MASS / len(self.chances)
         return _likeliest_first(self.chances, np.flatnonzero(self.chances >= level))
 
+    @cached_property
+    def _held(self) -> NDArray[np.float64]:
+        """The chance of the first of these, of the first two, ..."""
+        return np.cumsum(self.chances[self._likely])
+
     def likeliest(self, count: int) -> NDArray[np.int64]:
         """Return the row numbers of so many cells, likeliest first, or all if there are fewer."""
         if count <= len(self._likely):
@@ -104,9 +109,10 @@ class Posterior(Displayed):
         if not 0 < share <= 1:
             msg = f"a region of a share of {share} was asked for; give a number above 0, at most 1."
             raise InputError(msg)
-        cells = self._likely if share <= 1.0 - LEAST_MASS else self.likeliest(len(self.chances))
-        cells = cells[self.chances[cells] > 0]
-        total = np.cumsum(self.chances[cells])
+        cells, total = self._likely, self._held
+        if share > 1.0 - LEAST_MASS:
+            cells = self.likeliest(int((self.chances > 0).sum()))
+            total = np.cumsum(self.chances[cells])
         # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
         return cells[: int(np.searchsorted(total, share * (1.0 - 1e-12))) + 1]
 

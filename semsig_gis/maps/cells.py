@@ -124,7 +124,7 @@ class Cells(Drawing):
 
 def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:
     """Add a layer that tells of a cell when clicked; one that the map has of them tells more."""
-    name = "Tell of a cell when clicked"
+    name = "Describe a cell when clicked"
     children = layers_of(map_)
     for key, child in list(children.items()):
         if not isinstance(child, Cells) or child.layer_name != name:

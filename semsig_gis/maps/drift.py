@@ -67,7 +67,7 @@ def drift_map(
     before, after : SignatureDatabase
         Databases of one city at two dates, made in the same way.
     objects_before, objects_after : StreetObjects, optional
-        The street objects that they were built from, in the same CRS; give both or none.
+        The street objects that they were built from, in the same CRS; give both or neither.
     map_, tiles : optional
         As in `evaluation_map`.
 

@@ -321,7 +321,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
         f"{class_bar(list(FAILURES.values()), limits)}"
-        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries speak</p>'
+        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries count</p>'
     )
     return (
         "<summary>Localization errors</summary>"

@@ -1,7 +1,8 @@
 """Leaflet and its companions, put into a page so that a map opens without any request.
 
 They are brought into the folder ``assets`` when the package is built (``hatch_build.py``, which
-needs ``npm``). Where they were not, `available` is false and a map keeps its links.
+needs ``npm`` and puts their licences and a bill of materials into the metadata). Where they were
+not, `available` is false and a map keeps its links.
 """
 
 from __future__ import annotations
@@ -157,7 +158,7 @@ def _required(asset: Asset) -> bytes:
     content = _content(asset)
     if content is None:
         msg = (
-            f"This installation does not carry {asset.name} of {asset.package} {asset.version}; "
+            f"This installation does not contain {asset.name} of {asset.package} {asset.version}; "
             "make a map that links it, or install semsig_gis again where npm is available."
         )
         raise InputError(msg)
@@ -180,7 +181,7 @@ def _default_icon() -> str:
 
 @dataclass(frozen=True, slots=True)
 class MapFrame:
-    """A map as a notebook shows it: its HTML page, in a frame ``height`` pixels high."""
+    """A map as a notebook and the site show it: its page, in a frame ``height`` pixels high."""
 
     page: str = field(repr=False)
     height: int

@@ -315,10 +315,10 @@ def _some(
     method: Method,
     query_levels: NDArray[np.uint8],
     angles: SequenceTable,
-    wanted: NDArray[np.int64],
+    rows: NDArray[np.int64],
 ) -> NDArray[np.float32]:
-    """Measure only the distinct angle sequences that are wanted, each once."""
-    only, place = np.unique(wanted, return_inverse=True)
+    """Measure only the distinct angle sequences of some rows, each once."""
+    only, place = np.unique(rows, return_inverse=True)
     distances = _distances(method, ANGLES, [query_levels], angles, only=only)[0]
     return np.asarray(distances[place])
 

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
+from shapely.geometry.base import BaseGeometry
 
 from semsig_gis.core.errors import (
     CatalogError,
@@ -48,7 +49,7 @@ VECTOR = "vector_file"
 # Any plane will do to look at coordinates as they are.
 PLANE = "EPSG:3857"
 # Files that may be a plain table of records, which GDAL takes for nothing or for rows of text.
-TABLE_SUFFIXES = frozenset({".csv", ".json", ".parquet"})
+TABLE_SUFFIXES = frozenset({".csv", ".gml", ".json", ".parquet"})
 # Marks what a person must check.
 EDIT = "EDIT"
 SAMPLE_ROWS = 100_000
@@ -110,16 +111,23 @@ def _samples(path: Path) -> tuple[Sample, ...]:
 def _table(path: Path) -> Sample:
     table = open_table(path)
     records = (item for item in table.records(table.fields) if isinstance(item, Record))
-    rows = tuple(record.values for record in itertools.islice(records, SAMPLE_ROWS))
+    first = tuple(itertools.islice(records, SAMPLE_ROWS))
+    rows = tuple(record.values for record in first)
+    shapes = {
+        record.geometry.geom_type.removeprefix("Multi")
+        for record in first
+        if isinstance(record.geometry, BaseGeometry)  # as of GML
+    }
     info = LayerInfo(
         name=path.stem,
-        geometry="Point",
-        crs="EPSG:4326",
+        geometry=" or ".join(sorted(shapes)) or "Point",
+        crs="EPSG:4326" if table.crs is None else table.crs.to_string(),
         rows=len(rows) + sum(1 for _ in records),
-        fields=tuple((field, "") for field in table.fields),
+        fields=tuple(table.fields),
     )
     named = {fold(field) for field in table.fields} & {fold(SHAPE), fold(POINT)}
-    return Sample("opendatasoft", info, rows, placed=table.has_geometry or bool(named))
+    kind = "wfs" if path.suffix.lower() == ".gml" else "opendatasoft"
+    return Sample(kind, info, rows, placed=table.has_geometry or bool(named))
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +198,7 @@ def _value_of(value: object) -> float:
 def columns_of(sample: Sample) -> tuple[Column, ...]:
     """Return the fields of a sample in their order, without those of lists, mappings or bytes."""
     columns = []
-    for name, _ in sample.info.fields:
+    for name in sample.info.fields:
         values = [row.get(name) for row in sample.rows]
         there = [value for value in values if value is not None and value != ""]
         if all(isinstance(value, str | int | float) for value in there):
@@ -275,7 +283,7 @@ def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dic
 
 def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]:
     """Return the field of a table that holds ``lat, lon``, or those of x and y, or nothing."""
-    for name, _ in sample.info.fields:
+    for name in sample.info.fields:
         values = [row[name] for row in sample.rows if row.get(name) not in {None, ""}]
         points = sum(isinstance(value, str) and bool(LAT_LON.fullmatch(value)) for value in values)
         if values and 2 * points >= len(values):
@@ -315,7 +323,7 @@ class _Draft:
     crs_reason: str = ""
 
 
-def suggest_catalog(path: str | Path, *, crs: str | None = None) -> str:
+def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     r"""Draft a catalogue for a file from its names, its fields and its values.
 
     Parameters
@@ -345,7 +353,7 @@ def suggest_catalog(path: str | Path, *, crs: str | None = None) -> str:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "town_benches.csv")
     ...     _ = path.write_text("id;lon;lat;wood\n7;3.88;43.61;yes\n8;3.89;43.61;no\n")
-    ...     draft = suggest_catalog(path)
+    ...     draft = draft_catalog(path)
     >>> print(draft[draft.index("[[layers]]"):], end="")
     [[layers]]
     name = "town_benches"
@@ -356,7 +364,7 @@ def suggest_catalog(path: str | Path, *, crs: str | None = None) -> str:
     x_field = "lon"
     y_field = "lat"
     crs = "EPSG:4326"  # EDIT: the file does not say; its coordinates could be degrees
-    rows = [1, 4]  # now 2; a load tells when they are fewer or more
+    rows = [1, 4]  # now 2; loading reports when there are fewer or more
     # Fields: id, lon, lat, wood
     """
     path = Path(path)
@@ -522,15 +530,18 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
         yield f"# geometry is of several kinds ({info.geometry}); centroids are taken."
     yield from _place(draft)
     least, most = (info.rows + 1) // 2, info.rows * 2
-    yield f"rows = [{least}, {most}]  # now {info.rows:,}; a load tells when they are fewer or more"
+    yield (
+        f"rows = [{least}, {most}]  # now {info.rows:,}; loading reports when there are "
+        "fewer or more"
+    )
     yield from _filters(draft)
-    yield f"# Fields: {', '.join(_plain(field) for field, _ in info.fields) or 'none'}"
+    yield f"# Fields: {', '.join(_plain(field) for field in info.fields) or 'none'}"
 
 
 def _class(guess: ClassGuess) -> str:
     if not guess.reason:
         return (
-            f"class = {_text(guess.name)}  # {EDIT}: nothing tells what this is; write a class (or "
+            f"class = {_text(guess.name)}  # {EDIT}: unknown; write a class (or "
             'role = "buildings" or "streets" instead), or remove the layer'
         )
     line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
@@ -552,8 +563,8 @@ def _identifier(draft: _Draft) -> Iterator[str]:
             yield f"id_field = {_text(column.name)}  # a value of its own in {some}{warning}"
             return
     yield (
-        f"# No field that is named like an identifier has a value of its own in {some}; rows are "
-        "told by their number."
+        f"# No field that is named like an identifier has a value of its own in {some}; rows "
+        "are identified by their number."
     )
     best = max(named, key=lambda column: len(column.counts), default=None)
     if best is not None and best.counts and len(best.counts) * FEW_PER_ID >= rows:
@@ -599,7 +610,7 @@ def _filters(draft: _Draft) -> Iterator[str]:
             f"{_key(_exactly(str(value)))} = {_text(classes.get(value, draft.guess.name))}"
             for value, _ in counts.most_common()
         )
-        yield f"# If {_plain(field)} tells the class of a row, by all of its values{seen}:"
+        yield f"# If {_plain(field)} gives the class of a row, by all of its values{seen}:"
         yield f"# class_by = {{ field = {_text(field)}, values = {{ {values} }} }}"
     few = [column for column in draft.columns if column.few]
     few.sort(key=lambda column: not column.meant_for("filter"))  # the others keep their order

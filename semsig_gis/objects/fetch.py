@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from platformdirs import user_cache_path
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import mapillary, overture
@@ -138,8 +139,8 @@ def open_cache(
     Parameters
     ----------
     folder : str or Path, optional
-        Where it is; by default ``semsig`` in the user's cache folder (``XDG_CACHE_HOME``, or
-        ``.cache`` in the home folder).
+        Where it is; by default ``semsig`` in the user's cache folder, which on Linux is
+        ``XDG_CACHE_HOME`` or ``.cache`` in the home folder.
     offline : bool, default False
         Whether everything comes from the cache.
     deadline_s : float, default 600
@@ -158,8 +159,7 @@ def open_cache(
     >>> http.offline
     True
     """
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Cache(Path(folder or Path(base) / "semsig")), HttpSpec(
+    return Cache(Path(folder or user_cache_path("semsig", appauthor=False))), HttpSpec(
         offline=offline, deadline_s=deadline_s, tell=tell
     )
 

@@ -143,7 +143,7 @@ def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
     told = ", ".join(fields[:COLUMNS_TOLD]) + (", ..." if len(fields) > COLUMNS_TOLD else "")
     if sure and holds_tags(fields):
         msg = (
-            f"the table does not tell what its columns ({told}) are; give tags=True if they are "
+            f"the table does not say what its columns ({told}) are; give tags=True if they are "
             "tags of OpenStreetMap, or else class_column or catalog."
         )
     else:

@@ -37,7 +37,7 @@ def told_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[s
         silent = next((file for file in files if _reader(file) is None), None if files else path)
         if silent is not None:
             msg = (
-                f"{silent} does not tell what it holds; name its catalogue with --catalog "
+                f"{silent} does not say what it contains; name its catalogue with --catalog "
                 "(`semsig sources` lists them), or draft one with `semsig draft`."
             )
             raise InputError(msg)

@@ -10,7 +10,7 @@ import numpy as np
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.view import View
 from semsig_gis.database.north import GRID_NORTH
-from semsig_gis.database.observation import RADIUS_M, parse_view, require_seen
+from semsig_gis.database.observation import RADIUS_M, parse_view, require_seen, unplaced_codes
 from semsig_gis.likelihood.route import Leg
 from semsig_gis.queries.track import STEP_ERROR_M, parse_time
 from semsig_gis.storage.rows import (
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from semsig_gis.storage.rows import Row
 
 Route = tuple[list[tuple[str | int, View]], list[Leg]]
+Codes = tuple[int, ...]
 
 PLAIN_LEG = ("dx", "dy")
 TOWARDS = ("distance", "bearing")
@@ -42,12 +43,15 @@ TOWARDS = ("distance", "bearing")
 class QueryLine:
     """A line of a file of queries: a query, perhaps of nothing, or the error that it is none.
 
-    `name` is its ``id``, or else the number of the line.
+    `name` is its ``id``, or else the number of the line. `unplaced` and `absent` are the class
+    codes of what its sentence says was seen in no known direction, and was not seen.
     """
 
     line: int
     name: str | int
     query: View | InputError
+    unplaced: tuple[int, ...] = ()
+    absent: tuple[int, ...] = ()
 
 
 def read_queries(
@@ -72,12 +76,19 @@ def parse_queries(
 def _query_lines(
     rows: Iterable[tuple[int, Row | Exception]], source: str, taxonomy: Taxonomy, radius: float
 ) -> Iterator[QueryLine]:
-    def read(row: Row) -> View:
+    def read(row: Row) -> tuple[View, Codes, Codes]:
         require_seen(row)
-        return parse_view(row, taxonomy=taxonomy, radius=radius)
+        seen, unplaced, absent = unplaced_codes(str(row_value(row, "see") or ""), taxonomy)
+        view = parse_view({**row, "see": seen}, taxonomy=taxonomy, radius=radius)
+        return view, unplaced, absent
 
-    for line, row, query in scan_rows(rows, source, read, what="query"):
-        yield QueryLine(line=line, name=_name(row_value(row, "id"), line), query=query)
+    for line, row, found in scan_rows(rows, source, read, what="query"):
+        name = _name(row_value(row, "id"), line)
+        if isinstance(found, InputError):
+            yield QueryLine(line=line, name=name, query=found)
+        else:
+            query, unplaced, absent = found
+            yield QueryLine(line=line, name=name, query=query, unplaced=unplaced, absent=absent)
 
 
 def read_route(

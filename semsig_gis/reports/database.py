@@ -122,7 +122,7 @@ def _group_table(facts: Mapping[str, Any]) -> Table:
         ),
         (
             "The paper counts distinct patterns over its 10,000 queries, not over all cells. "
-            f"{facts['cell_bits']:.2f} bits would tell every cell."
+            f"{facts['cell_bits']:.2f} bits would identify every cell."
         ),
     )
 
@@ -147,7 +147,7 @@ def _class_table(facts: Mapping[str, Any]) -> Table:
             "Objects a km²": [f"{item['objects_per_km2']:,.1f}" for item in items],
             "Entropy, bits": [f"{item['entropy_bits']:.3f}" for item in items],
         },
-        f"{density} Entropy: what the number of objects of the class tells of the cell.",
+        f"{density} Entropy: how much the number of objects of the class says about the cell.",
     )
 
 

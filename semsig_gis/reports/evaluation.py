@@ -56,7 +56,7 @@ def evaluation_headline(evaluation: Evaluation) -> str:
         return f"{said}."
     answered, right = (float(means["value"][name]) for name in ("coverage", "precision"))
     if not answered:
-        return f"{said}; the method was sure enough of none to answer it."
+        return f"{said}; the method was not sure enough to answer any of them."
     return (
         f"{said}; the method was sure enough to answer {short_percent(answered)}, and "
         f"{short_percent(right)} of these answers were right."
@@ -338,7 +338,7 @@ def comparison_table(comparison: pd.DataFrame, title: str) -> Table:
             "95 %": [interval(*ends, "+.4f") for ends in zip(low, high, strict=True)],
             "Second has": verdicts.tolist(),
         },
-        "Queries are drawn again in pairs; where the interval holds 0, nothing is proven.",
+        "Intervals are bootstrapped over pairs; one that contains 0 shows no difference.",
     )
 
 

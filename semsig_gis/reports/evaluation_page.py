@@ -155,7 +155,10 @@ def _group_section(evaluation: Evaluation) -> Section:
         name="groups",
         title="Success by objects seen, and by cells that look the same",
         text=(
-            "Few objects tell little, and a street like a hundred others cannot be told from them.",
+            (
+                "Few objects say little, and a street that looks like a hundred others cannot be "
+                "told apart from them."
+            ),
         ),
         numbers=tuple(
             number for table, _, _, row in groups for number in _group_numbers(table, row)
@@ -223,9 +226,9 @@ def _chance_sections(evaluation: Evaluation) -> Iterator[Section]:
         text=(
             (
                 "The method says how likely its answer is within "
-                f"{evaluation.success_metres} m. On the dashed line, what it says comes true. "
-                "Whoever answers only from some chance on answers less often, and is right more "
-                f"often; by default that is {DEFAULT_RULE.threshold:g}."
+                f"{evaluation.success_metres} m. On the dashed line, stated chances come "
+                "true. Answering only above some chance gives fewer answers, more of which "
+                f"are right; by default that is {DEFAULT_RULE.threshold:g}."
             ),
         ),
         numbers=tuple(numbers),
@@ -253,8 +256,8 @@ def _failure_sections(evaluation: Evaluation, database: SignatureDatabase) -> It
             title="The worst failures",
             text=(
                 (
-                    "The true cell, and beside it the cell that it was taken for. Letters around "
-                    "the circle are what the spoiled query told."
+                    "The true cell, and beside it the cell that it was taken for. Letters "
+                    "around the circle are the distorted query."
                 ),
             ),
             pairs=pairs,

@@ -67,7 +67,7 @@ def identifiability_tables(
                 "" if gain is None else f"{100 * gain:+.3f} %" for gain in gains
             ],
         }
-    note = "To the mean cell: beyond what all other classes tell of it."
+    note = "For the mean cell, beyond what all other classes say about it."
     return whole, Table.of_columns("What each class adds", classes, note)
 
 
@@ -117,7 +117,7 @@ def identifiability_page(
         command=command,
         text=(
             (
-                "Before any query, every cell is told the chance that a "
+                "Before any query, every cell gets the chance that a "
                 f"{shot(facts['view_degrees'])} from it will be placed "
                 f"within {facts['radius_m']:g} m, by {facts['trials']:,} simulated queries and by "
                 f"how like the other cells are. {check.queries:,} fresh queries tell whether the "
@@ -184,7 +184,7 @@ def _class_section(facts: Mapping[str, Any]) -> Section:
     return Section(
         name="classes",
         title="What each class adds",
-        text=("To a query from the mean cell, beyond what all other classes tell.",),
+        text=("For a query from the mean cell, beyond what all other classes say.",),
         numbers=tuple(numbers),
     )
 
@@ -207,8 +207,8 @@ def _calibration_section(check: IdentifiabilityCheck) -> Section:
     )
     plot = Plot(
         name="identifiability-calibration",
-        title="Chance to be found: told and true",
-        x_label="chance told of the cell",
+        title="Chance to be found: predicted and observed",
+        x_label="predicted chance of the cell",
         y_label="share of the queries that were found",
         curves=(curve,),
         diagonal=True,

@@ -78,7 +78,10 @@ SETTINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture in two formats; ``description`` tells what is seen to those who cannot see it."""
+    """A picture in two formats; ``description`` tells what is seen to those who cannot see it.
+
+    The SVG carries it as its ``desc``, from which the documentation takes it.
+    """
 
     svg: bytes = field(repr=False)
     png: bytes = field(repr=False)

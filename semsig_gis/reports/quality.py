@@ -264,8 +264,8 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
                 for item in report.unread
             ),
             note=(
-                "Add one by --layer +NAME, or all by --all-layers. Counted are rows that would be "
-                "kept, before those of one place become one."
+                "Add one with --layer +NAME, or all with --all-layers. The counts are rows "
+                "that would be kept, before objects at one place are collapsed."
             ),
             labels=2,
         ),

@@ -130,7 +130,7 @@ def failure_pairs(
         pairs.append(
             Pair(
                 title=f"Query {number + 1:,}: off by {length(float(row['error_m']))}",
-                text=f"The spoiled query told: {_told(codes, database.taxonomy)}.{alike}",
+                text=f"The distorted query: {_told(codes, database.taxonomy)}.{alike}",
                 scenes=(true, other),
             )
         )
@@ -420,7 +420,7 @@ def _lines(scene: Scene) -> list[str]:
     types = label(scene.types, TYPE_LETTERS * TYPE_LINES)
     signature = textwrap.wrap(types, TYPE_LETTERS) or ["sees nothing"]
     place = f"{scene.lon:.6f}°, {scene.lat:.6f}°"
-    rim = ["around the circle: what the query told"] if scene.asked else []
+    rim = ["around the circle: the query"] if scene.asked else []
     return [*signature, *rim, " · ".join(part for part in (place, _error(scene)) if part)]
 
 

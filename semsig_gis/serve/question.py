@@ -46,8 +46,8 @@ class Question:
 
     `views` has one view for each place, `marks` which mark each of its objects is, and `legs` the
     ways between the places. `shown` is the place that is asked for. Of the classes that are
-    `absent`, by code, none was seen from the first place beside what is marked. A `quick` answer is
-    by cells alone.
+    `absent`, by code, none was seen from the first place beside what is marked; that place is
+    `near` another, as `semsig localize` takes it. A `quick` answer is by cells alone.
     """
 
     views: tuple[View, ...]
@@ -59,6 +59,7 @@ class Question:
     noise: object
     truth: tuple[float, float] | None
     absent: tuple[int, ...] = ()
+    near: str | None = None
     quick: bool = False
 
     @classmethod
@@ -99,6 +100,7 @@ class Question:
             noise=body.get("noise"),
             truth=None if truth is None else degrees(truth),
             absent=_codes(body.get("absent") or [], taxonomy),
+            near=_near(body.get("near")),
             quick=body.get("quick") is True,
         )
 
@@ -114,6 +116,7 @@ class Question:
         rows = self.rows(taxonomy)
         words = ["semsig", "localize" if len(rows) == 1 else "route", *options]
         words += ["--on-grid"] if self.seen_from == "cells" else []
+        words += [] if self.near is None else ["--near", self.near]
         words += ["--top", str(self.top)] if self.top != 10 else []  # noqa: PLR2004 - its default
         absent = ", ".join(f"no {taxonomy.by_code(code).title.lower()}" for code in self.absent)
         plain = _options(rows[0]) if len(rows) == 1 else None
@@ -130,6 +133,21 @@ def degrees(told: object) -> tuple[float, float]:
         msg = f"a place was given as {told!r}; give latitude and longitude."
         raise InputError(msg)
     return number(told[0], "a latitude", most=90.0), number(told[1], "a longitude", most=360.0)
+
+
+def _near(told: object) -> str | None:
+    """Return a known place, given as latitude, longitude and metres, in words."""
+    if told is None:
+        return None
+    if not (isinstance(told, list) and len(told) == POINT + 1):
+        msg = f"near was given as {told!r}; give latitude, longitude and metres."
+        raise InputError(msg)
+    lat, lon = degrees(told[:POINT])
+    metres = number(told[POINT], "the deviation of a place")
+    return (
+        f"{abs(lat):.10g}{'S' if lat < 0 else 'N'},{abs(lon):.10g}{'W' if lon < 0 else 'E'},"
+        f"{metres:g}"
+    )
 
 
 def number(told: object, what: str, *, most: float = math.inf) -> float:

@@ -11,6 +11,7 @@ import functools
 import hmac
 import secrets
 import socket
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import anyio.to_thread
@@ -21,6 +22,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core.threads import NotWantedError, while_wanted
 from semsig_gis.serve.ground import city_ground
 from semsig_gis.serve.page import policy, workbench_page
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
@@ -92,7 +94,7 @@ class _Api:
     def __init__(self, bench: Workbench) -> None:
         self.bench = bench
         self.alone = anyio.CapacityLimiter(1)
-        self.asked = 0
+        self.asked = Counter[str]()  # by page
 
     async def page(self, request: Request) -> Response:  # noqa: ARG002 - as routes are called
         nonce = secrets.token_urlsafe(16)
@@ -116,13 +118,12 @@ class _Api:
 
     async def answer(self, request: Request) -> Response:
         told = await _json(request)
-        self.asked += 1
-        number = self.asked
+        page = str(told.get("page"))
+        number = self.asked[page] = self.asked[page] + 1
 
         def answer() -> dict[str, Any]:
-            if number < self.asked:
-                raise HTTPException(409, "a newer question was asked meanwhile.")
-            return self.bench.answer(told)
+            with while_wanted(lambda: number == self.asked[page]):
+                return self.bench.answer(told)
 
         return await self._told(answer)
 
@@ -183,8 +184,12 @@ async def _refused(request: Request, error: Exception) -> Response:  # noqa: ARG
     return JSONResponse({"error": str(error)}, 422, headers=HEADERS)
 
 
+async def _outrun(request: Request, error: Exception) -> Response:  # noqa: ARG001
+    return JSONResponse({"error": "a newer question was asked meanwhile."}, 409, headers=HEADERS)
+
+
 async def _failed(request: Request, error: Exception) -> Response:
-    code, text = 500, "the answer failed by a fault of semsig, not of yours."
+    code, text = 500, "the answer failed because of a fault in semsig, not in your input."
     if isinstance(error, HTTPException):
         code, text = error.status_code, error.detail
         if code in {404, 405}:
@@ -204,7 +209,12 @@ def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     ]
     app = Starlette(
         routes=routes,
-        exception_handlers={SemsigError: _refused, HTTPException: _failed, Exception: _failed},
+        exception_handlers={
+            SemsigError: _refused,
+            NotWantedError: _outrun,
+            HTTPException: _failed,
+            Exception: _failed,
+        },
     )
     return _Guard(app, port=port, token=token)
 
@@ -222,8 +232,8 @@ def listening(port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         msg = (
-            f"port {port} of this machine cannot be had ({error.strerror}); give another --port, "
-            "or none for any that is free."
+            f"port {port} of this machine is not available ({error.strerror}); give another "
+            "--port, or leave it out to use any that is free."
         )
         raise InputError(msg) from error
     return listener

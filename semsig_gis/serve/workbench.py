@@ -23,7 +23,9 @@ from semsig_gis.database.views import views_at
 from semsig_gis.exports import export_answer
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
+from semsig_gis.likelihood.memo import TurnMemo
 from semsig_gis.likelihood.noise.model import NOISES, cell_noise
+from semsig_gis.likelihood.priors import KnownPosition, position_prior
 from semsig_gis.likelihood.questions import next_questions, with_unplaced
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
@@ -97,6 +99,7 @@ class Workbench:
     _indexes: dict[tuple[str, str], LikelihoodIndex] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
     _scores: dict[str, CellScores] = field(default_factory=dict)
+    _memo: TurnMemo = field(default_factory=TurnMemo)
 
     @property
     def database(self) -> SignatureDatabase:
@@ -327,37 +330,46 @@ class Workbench:
             refined=None if question.seen_from == "anywhere" else False,
             top=question.top,
             explained=question.top,
+            memo=self._memo,
         )
         if self._is_quick(question):
-            locator = replace(locator, refined=False, aside=False, explained=QUICKLY_EXPLAINED)
+            locator = replace(locator, refined=False, quick=True, explained=QUICKLY_EXPLAINED)
+        if question.near is not None:
+            place = KnownPosition.parse(question.near, self.database)
+            prior = position_prior(self.database, (place.x, place.y), sigma=place.sigma)
+            locator = replace(locator, log_prior=prior, known={"near": place.to_dict()})
         return with_unplaced(locator, question.views[0], absent=question.absent)
 
     def _is_quick(self, question: Question) -> bool:
         """Tell whether an answer leaves out what takes long, and there is something to leave."""
         return question.quick and question.seen_from == "anywhere"
 
-    def _located(self, told: object) -> tuple[Question, Location]:
+    def _located(self, asked: object) -> tuple[Question, Location]:
         """Return a question and its answer, which is found once."""
-        question = Question.parse(told, taxonomy=self.taxonomy, radius=self.database.spec.radius)
+        question = Question.parse(asked, taxonomy=self.taxonomy, radius=self.database.spec.radius)
         rows = question.rows(self.taxonomy)
         setting = self._noise(question), question.seen_from
-        key = rows, *setting, question.absent, question.top, self._is_quick(question)
+        known = question.absent, question.near
+        key = rows, *setting, *known, question.top, self._is_quick(question)
         if self._last is None or self._last[0] != key:
             locator = self._locator(question)
             # Views that did not change are not compared with the city again.
-            before, self._scores, scores = self._scores, {}, []
-            for number, view in enumerate(question.views):
-                absent, prior = ((), None) if number else (question.absent, locator.log_prior)
-                name = json.dumps([*setting, view.to_dict(self.taxonomy)])
-                scanned = before.get(name) or locator.scan(view)
-                ranked = json.dumps([name, absent, locator.aside])
-                best = before.get(ranked) or locator.scores(view, prior, scanned=scanned)
-                self._scores |= {name: scanned, ranked: best}
+            kept: dict[str, CellScores] = {}
+            scores: list[CellScores] = []
+            names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in question.views]
+            for number, (name, view) in enumerate(zip(names, question.views, strict=True)):
+                told, prior = ((), None) if number else (known, locator.log_prior)
+                scanned = self._scores.get(name) or locator.scan(view)
+                ranked = json.dumps([name, told, locator.quick])
+                best = self._scores.get(ranked) or locator.scores(view, prior, scanned=scanned)
+                kept |= {name: scanned, ranked: best}
                 scores.append(best)
+            self._scores = kept
+            views, first = question.views, kept[names[0]]
             if question.legs:
-                locations = locator.locate_route(question.views, question.legs, scores=scores)
+                locations = locator.locate_route(views, question.legs, scores=scores, scanned=first)
             else:
-                locations = (locator.locate(question.views[0], scores=scores[0]),)
+                locations = (locator.locate(views[0], scores=scores[0], scanned=first),)
             self._last = key, locations
         return question, self._last[1][question.shown]
 
@@ -388,7 +400,7 @@ class Workbench:
         place = to_metres((lat, lon), self.database.crs)
         cell = int(self.database.cells_at(place)[0])
         if cell < 0:
-            msg = "no cell of the city is there; choose a place in one that is shaded."
+            msg = "there is no cell at that place; choose one that is shaded."
             raise InputError(msg)
         return [lat, lon], place, cell
 
@@ -463,9 +475,9 @@ def _shot(photo: Mapping[str, Any]) -> Shot:
 def _left_out(tally: Tally) -> list[str]:
     """Return what there is to say of boxes that are no marks."""
     told = (
-        (tally.below_min_score, "that the detector is hardly sure of"),
-        (tally.unknown.total(), "of labels that no map knows"),
-        (tally.no_objects.total(), "of what is no street object"),
+        (tally.below_min_score, "with a low score"),
+        (tally.unknown.total(), "with labels that are in no label map"),
+        (tally.no_objects.total(), "of things that are not street objects"),
         (tally.not_in_city.total(), "of classes that the city does not have"),
     )
     return [f"Left out: {count:,} boxes {what}." for count, what in told if count]

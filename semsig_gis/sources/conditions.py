@@ -80,7 +80,7 @@ class Condition:
             return True
         if ANY_VALUE in self.values and not _is_blank(value) and as_text(value) != "no":
             return True
-        if any(matches(value, wanted) for wanted in self.values):
+        if any(matches(value, accepted) for accepted in self.values):
             return True
         if not self.comparisons:
             return False
@@ -132,7 +132,7 @@ def as_text(value: object) -> str:
     return str(value)
 
 
-def matches(value: object, wanted: Value) -> bool:
+def matches(value: object, accepted: Value) -> bool:
     """Tell whether a field value is the one a catalogue names.
 
     Text compares as text and numbers as numbers, so that 3 is found in a text field and "3" in a
@@ -140,24 +140,24 @@ def matches(value: object, wanted: Value) -> bool:
     """
     if value is None:
         return False
-    if isinstance(wanted, str):
-        pattern = pattern_of(wanted)
+    if isinstance(accepted, str):
+        pattern = pattern_of(accepted)
         text = as_text(value)
-        return text == wanted if pattern is None else pattern.fullmatch(text) is not None
-    if isinstance(wanted, bool) or isinstance(value, bool):
-        return as_text(value) == as_text(wanted)
+        return text == accepted if pattern is None else pattern.fullmatch(text) is not None
+    if isinstance(accepted, bool) or isinstance(value, bool):
+        return as_text(value) == as_text(accepted)
     try:
-        return float(value) == wanted  # type: ignore[arg-type]
+        return float(value) == accepted  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return False
 
 
 @functools.lru_cache
-def pattern_of(wanted: str) -> re.Pattern[str] | None:
+def pattern_of(accepted: str) -> re.Pattern[str] | None:
     """Return the pattern that a text between slashes is; CatalogError if it is not valid."""
-    inner = BETWEEN_SLASHES.fullmatch(wanted)
+    inner = BETWEEN_SLASHES.fullmatch(accepted)
     try:
         return re.compile(inner[1]) if inner else None
     except re.error as error:
-        msg = f"pattern {wanted} is not a regular expression ({error}); correct it."
+        msg = f"pattern {accepted} is not a regular expression ({error}); correct it."
         raise CatalogError(msg) from error

@@ -75,11 +75,11 @@ def read_layers(
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
     layers = [_FeatureLayer(spec, filters=filters, where=where) for spec in specs]
     for file in paths:
-        wanted = [layer for layer in layers if _may_hold(str(file), layer.spec)]
-        if wanted:
-            rules = [layer.spec for layer in wanted]
+        present = [layer for layer in layers if _may_hold(str(file), layer.spec)]
+        if present:
+            rules = [layer.spec for layer in present]
             for table in _slices(fs.LocalFileSystem(), str(file), rules, _boxes(area)):
-                _add(table, wanted)
+                _add(table, present)
     return tuple(layer.raw(crs) for layer in layers)
 
 
@@ -174,8 +174,8 @@ def _slices(
             columns = _columns(file.schema_arrow, specs, where=path)
             for number in _row_groups(file.metadata, boxes):
                 table = file.read_row_group(number, columns=columns).flatten()
-                wanted = pc.and_(_in_boxes(table, boxes), _may_have_tags(table, specs))
-                yield table.filter(wanted)
+                mask = pc.and_(_in_boxes(table, boxes), _may_have_tags(table, specs))
+                yield table.filter(mask)
     except (OSError, pa.ArrowException) as error:
         msg = f"{path} cannot be read as GeoParquet ({_cause(error)}); get it again."
         raise SourceError(msg) from error
@@ -238,7 +238,7 @@ def _in_boxes(table: pa.Table, boxes: Boxes | None) -> pa.ChunkedArray:
 
 def _may_have_tags(table: pa.Table, specs: Iterable[LayerSpec]) -> pa.Array:
     """Tell which rows may have the tags of a layer, by the columns that the tags are."""
-    wanted = np.zeros(len(table), bool)
+    mask = np.zeros(len(table), bool)
     for spec in specs:
         for tags in spec.tags:
             rows = np.ones(len(table), bool)
@@ -251,8 +251,8 @@ def _may_have_tags(table: pa.Table, specs: Iterable[LayerSpec]) -> pa.Array:
                         else pc.is_in(column, value_set=pa.array(accepted, column.type))
                     )
                     rows &= is_in.to_numpy()
-            wanted |= rows
-    return pa.array(wanted)
+            mask |= rows
+    return pa.array(mask)
 
 
 def _cause(error: BaseException) -> str:
@@ -282,14 +282,14 @@ def fetch_layers(
     file by file, so that a run that was interrupted goes on there. SourceError where that fails.
     """
     address, boxes = endpoints[0], _boxes(area)
-    wanted = [layer for layer in specs if layer.dataset is not None]
-    kinds = sorted({layer.dataset or "" for layer in wanted})
+    published = [layer for layer in specs if layer.dataset is not None]
+    kinds = sorted({layer.dataset or "" for layer in published})
     system, folder = _open_store(address, spec)
     release, files = _listing(system, folder, kinds, address=address, cache=cache, spec=spec)
     spec.tell(f"{address.partition('?')[0]}: release {release}, {len(files):,} files")
 
     def held(file: str) -> Path:
-        rules = [layer for layer in wanted if _may_hold(file, layer)]
+        rules = [layer for layer in published if _may_hold(file, layer)]
         what = [address, file, boxes, [[layer.name, layer.tags, layer.fields] for layer in rules]]
         key = _key(what)
         if (kept := cache.entry(key).copy()) is not None:  # a release does not change

@@ -55,15 +55,15 @@ def parse_crs(text: str) -> CRS:
 
 
 @functools.lru_cache(maxsize=64)  # looking for the code takes 0.2 s
-def usable_crs(wkt: str) -> CRS | None:
+def usable_crs(text: str) -> CRS | None:
     """Return the CRS that a file states, or None where it does not tie coordinates to the Earth.
 
     One that equals an EPSG definition becomes that, so that coordinates in it are not transformed.
     """
-    if not wkt.strip():
+    if not text.strip():
         return None
     try:
-        crs = CRS.from_wkt(wkt)
+        crs = CRS.from_user_input(text)
     except CRSError:
         return None
     geodetic = crs.geodetic_crs
@@ -166,6 +166,11 @@ class Rows:
         self.names.append(name)
         self.values.append(values)
         self.positions.append(position)
+
+    def lose(self, count: int, reason: str) -> None:
+        """Count the rows after the last one that was read, up to `count`, as unreadable."""
+        self.errors.update(dict.fromkeys(range(self.read + 1, count + 1), reason))
+        self.read = max(self.read, count)
 
 
 def raw_layer(

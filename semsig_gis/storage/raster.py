@@ -7,18 +7,20 @@ import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
-import rasterio
-import rasterio.shutil
-from rasterio._err import CPLE_BaseError
-from rasterio.enums import ColorInterp, Resampling
-from rasterio.errors import CRSError, NotGeoreferencedWarning, RasterioError
-from rasterio.transform import Affine
-from rasterio.vrt import WarpedVRT
-from rasterio.windows import Window
 
-from semsig_gis.core.errors import CrsError, InputError, SourceError
+from semsig_gis.core.errors import CrsError, InputError, SourceError, extra
 from semsig_gis.storage.text import require_regular
 from semsig_gis.storage.whole import whole_file
+
+with extra("raster", "a raster file"):
+    import rasterio
+    import rasterio.shutil
+    from rasterio._err import CPLE_BaseError
+    from rasterio.enums import ColorInterp, Resampling
+    from rasterio.errors import CRSError, NotGeoreferencedWarning, RasterioError
+    from rasterio.transform import Affine
+    from rasterio.vrt import WarpedVRT
+    from rasterio.windows import Window
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

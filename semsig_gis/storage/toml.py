@@ -63,7 +63,7 @@ def check_keys(
     for key, value in table.items():
         if key not in allowed:
             msg = (
-                f"{where} has the key {key!r}, which means nothing"
+                f"{where} has the key {key!r}, which is unknown"
                 f"{nearest_name(key, allowed)}; the keys are {', '.join(allowed)}."
             )
             raise CatalogError(msg)

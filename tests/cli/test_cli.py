@@ -12,7 +12,6 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import fiona
 import geopandas as gpd
 import pytest
 import shapely
@@ -98,7 +97,7 @@ def test_evaluate_map_and_export(done: Done) -> None:
     assert Path("map.html").stat().st_size > 1000
 
     done("export city.parquet --objects objects.parquet --out city.gpkg")
-    assert set(fiona.listlayers("city.gpkg")) >= {"cells", "objects"}
+    assert set(gpd.list_layers("city.gpkg")["name"]) >= {"cells", "objects"}
     assert set(gpd.read_file("city.gpkg", layer="cells").geom_type) == {"Polygon"}
     done("export city.parquet --geometry point --out points.gpkg")
     assert set(gpd.read_file("points.gpkg", layer="cells").geom_type) == {"Point"}
@@ -463,7 +462,7 @@ def test_every_line_of_a_batch_has_an_answer_or_an_error(city: Path, run: Run, m
     assert [answer["id"] for answer in answers] == [1, 2, "\ud800", 4]
     assert ["error" in answer for answer in answers] == [False, True, True, False]
     assert "X (crossing)" in answers[0]["notes"][0]
-    assert "saw nothing" in answers[3]["notes"][0]
+    assert "nothing was seen" in answers[3]["notes"][0]
     (city / "queries.jsonl").write_text(rows[1])
     code, out, err = run(*batch)
     assert (code, "line 1 of queries.jsonl is no query" in err) == (2, True)
@@ -475,7 +474,7 @@ def test_every_line_of_a_batch_has_an_answer_or_an_error(city: Path, run: Run, m
 @pytest.mark.usefixtures("city")
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
 @pytest.mark.parametrize(
-    ("seen", "note"), [("--types X", "X (crossing)"), ("--bearings=", "saw nothing")]
+    ("seen", "note"), [("--types X", "X (crossing)"), ("--bearings=", "nothing was seen")]
 )
 def test_what_no_cell_sees_and_nothing_are_answered(
     done: Done, method: str, seen: str, note: str
@@ -545,7 +544,7 @@ def test_a_warning_is_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> Non
         warnings.warn("the file is old", stacklevel=1)
         return "draft"
 
-    monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", suggest)
+    monkeypatch.setattr("semsig_gis.objects.draft.draft_catalog", suggest)
     with warnings.catch_warnings(action="always"):
         assert run("draft x.gpkg") == (0, "draft", "semsig: the file is old\n")
 

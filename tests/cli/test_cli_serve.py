@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import pytest
+from machine import PATIENCE_S
 from sentences import sentence
 from worlds import save_town
 
@@ -41,11 +42,11 @@ def test_the_workbench_opens_and_ends_with_the_interrupt_key(town: Path, carried
         line = process.stdout.readline()
         address = re.search(r"http://127\.0\.0\.1:(\d+)(/\?token=[\w-]{43})$", line.strip())
         assert address
-        server = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=60)
+        server = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=PATIENCE_S)
         server.request("GET", address[2])
         assert b"workbench" in server.getresponse().read()
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=PATIENCE_S)
         server.close()  # which the browser keeps open
     assert (process.returncode, out) == (130, "")
     assert err.splitlines() == ["semsig: it runs until you press Ctrl-C", "semsig: interrupted"]

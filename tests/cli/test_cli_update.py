@@ -1,4 +1,4 @@
-"""`semsig update` of a database in tiles, and what it says where that cannot be done."""
+"""`semsig update` of a database in tiles, and `semsig merge`."""
 
 from __future__ import annotations
 
@@ -10,19 +10,22 @@ if TYPE_CHECKING:
     from conftest import Run
 
 
-def test_tiles_are_updated_with_the_objects_of_before(town: Path, run: Run) -> None:
+def test_tiles_are_updated_by_the_objects_in_their_folder(town: Path, run: Run) -> None:
     tiles, objects = town / "tiles", town / "objects.parquet"
     assert run("build", objects, "--out", tiles, "--tile", 100)[0] == 0
-    before = {path.name: path.read_bytes() for path in tiles.iterdir()}
-    code, printed, _ = run("update", tiles, "--objects", objects, "--before", objects, "--json")
+    before = {path: path.read_bytes() for path in tiles.rglob("*.*")}
+    code, printed, _ = run("update", tiles, "--objects", objects, "--json")
     assert (code, '"recomputed": 0' in printed) == (0, True)
-    assert {path.name: path.read_bytes() for path in tiles.iterdir()} == before
-    for city, more, words in (
-        (tiles, (), "--before"),
-        (town / "city.parquet", ("--before", objects), "not in tiles"),
-    ):
-        code, _, told = run("update", city, "--objects", objects, *more)
-        assert (code, words in told) == (2, True)
+    assert {path: path.read_bytes() for path in tiles.rglob("*.*")} == before
+    assert run("build", objects, "--out", town / "city.parquet")[0] == 0
+    code, _, told = run("update", town / "city.parquet", "--objects", objects, "--workers", 2)
+    assert (code, "is not in tiles" in told) == (2, True)
+    # What needs the objects finds them in the folder, until they are cleaned away.
+    code, _, told = run("localize", tiles, "bench at 40, tree at 90")
+    assert (code, "no street objects" in told) == (0, False)
+    assert run("clean", tiles, "--objects")[0] == 0
+    code, _, told = run("update", tiles, "--objects", objects)
+    assert (code, "has no street objects" in told) == (2, True)
 
 
 def test_two_cities_become_a_region(town: Path, run: Run) -> None:
@@ -33,4 +36,4 @@ def test_two_cities_become_a_region(town: Path, run: Run) -> None:
     assert (code, "were computed again" in printed) == (0, True)
     assert region.read_bytes() == city.read_bytes()
     code, _, told = run("merge", city, city, "--out", city)
-    assert (code, "a name of its own" in told) == (2, True)
+    assert (code, "give another name" in told) == (2, True)

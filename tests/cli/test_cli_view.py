@@ -77,8 +77,8 @@ def test_boxes_become_views(coco: Path, run: Run) -> None:
     assert out == "v.jsonl: 1 view of 1 picture with 3 objects, 3 with a range.\n"
     assert err.splitlines() == [
         "semsig: left out: 1 box below --min-score",
-        "semsig: left out: 1 box of labels that no map knows: lion 1",
-        "semsig: left out: 1 box of what is no street object: person 1",
+        "semsig: left out: 1 box with labels that are in no label map: lion 1",
+        "semsig: left out: 1 box of things that are not street objects: person 1",
     ]
     name, view = written(coco.with_name("v.jsonl"))
     assert view.codes is not None
@@ -126,7 +126,7 @@ def test_the_photograph_tells_its_focal_length(coco: Path, run: Run) -> None:
         ("coco.json --fov 90 --out v.json", "the name must end in .jsonl"),
         ("coco.json --fov 90 --out v.jsonl --labels yolo", "label map 'yolo' is unknown"),
         ("coco.json --fov 90 --out v.jsonl --size 4000", "give width and height in pixels"),
-        ("coco.json --fov 90 --out v.jsonl --images no", "which is no folder"),
+        ("coco.json --fov 90 --out v.jsonl --images no", "which is not a folder"),
         ("coco.json --fov 90 --out v.jsonl --heading-error big", "give degrees or 'unknown'"),
         ("coco.json --fov 90 --out v.jsonl --heading 9 --heading-error 999", "to 360.0 degrees"),
         ("coco.json --fov 90 --out v.jsonl --photos no.csv", "no.csv cannot be read"),

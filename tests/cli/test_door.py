@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from machine import PATIENCE_S
 from sentences import sentence
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def failing(
         def suggest(*_: object, **__: object) -> str:
             raise error
 
-        monkeypatch.setattr("semsig_gis.objects.draft.suggest_catalog", suggest)
+        monkeypatch.setattr("semsig_gis.objects.draft.draft_catalog", suggest)
         return [*run("draft x.gpkg")]
 
     return call
@@ -48,7 +49,7 @@ def test_a_fault_of_ours_is_written_down(
     (log,) = tmp_path.iterdir()
     assert (code, out) == (1, "")
     assert err == (
-        "semsig: a fault of semsig, not of yours (KeyError: 'a\\nb'); please report it to the "
+        "semsig: a fault in semsig, not in your input (KeyError: 'a\\nb'); please report it to the "
         f"authors of semsig_gis, with {log}.\n"
     )
     assert "Traceback" in log.read_text(encoding="utf-8")
@@ -62,10 +63,10 @@ def test_a_fault_of_ours_is_written_down(
     [
         (KeyboardInterrupt(), 130, "semsig: interrupted\n"),
         (BrokenPipeError(errno.EPIPE, "Broken pipe"), 141, ""),
-        (MemoryError(), 2, "semsig: memory is short"),
-        (np.exceptions.DTypePromotionError("x"), 1, "semsig: a fault of semsig"),
+        (MemoryError(), 2, "semsig: this machine is short of memory"),
+        (np.exceptions.DTypePromotionError("x"), 1, "semsig: a fault in semsig"),
         (OSError(errno.ENAMETOOLONG, "File name too long", "x"), 2, "semsig: the system refuses"),
-        (OSError("no reason"), 1, "semsig: a fault of semsig"),
+        (OSError("no reason"), 1, "semsig: a fault in semsig"),
     ],
 )
 def test_each_end_has_a_code(
@@ -101,7 +102,7 @@ cli.main()
     ("error", "seconds", "code", "said"),
     [
         ("KeyboardInterrupt", 60, 130, "semsig: interrupted\n"),
-        ("ValueError('x')", 0, 0, "semsig: a library passed over an error (ValueError: x)\n"),
+        ("ValueError('x')", 0, 0, "semsig: a library ignored an error (ValueError: x)\n"),
     ],
 )
 def test_what_a_library_cannot_raise(error: str, seconds: int, code: int, said: str) -> None:
@@ -110,7 +111,7 @@ def test_what_a_library_cannot_raise(error: str, seconds: int, code: int, said: 
         capture_output=True,
         check=False,
         text=True,
-        timeout=300,
+        timeout=PATIENCE_S,
     )
     assert (done.returncode, done.stderr) == (code, said)
 
@@ -129,7 +130,11 @@ cli.main()
 
 def test_an_interrupt_after_the_work_is_done() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", TIDYING], capture_output=True, check=False, text=True, timeout=300
+        [sys.executable, "-c", TIDYING],
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=PATIENCE_S,
     )
     assert (done.returncode, done.stderr) == (0, "")
 

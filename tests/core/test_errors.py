@@ -1,10 +1,15 @@
 from __future__ import annotations
 
+import importlib
+import subprocess
+import sys
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from semsig_gis.core import errors
+from semsig_gis.core.errors import extra
 
 NAMES = st.text(st.characters(codec="utf-8"), max_size=12)
 
@@ -42,3 +47,30 @@ def test_what_is_offered_is_one_of_the_names(name: str, names: list[str]) -> Non
     assert not offer or offer in {f"; the nearest is {item!r}" for item in names}
     if name:  # which is nearest to itself
         assert errors.nearest_name(name, [*names, name]) == f"; the nearest is {name!r}"
+
+
+@pytest.mark.parametrize(
+    ("name", "package", "use"),
+    [
+        ("cluster", "distributed", "list(parallel.run_tasks(abs, [1], workers=2))"),
+        ("raster", "rasterio", "import semsig_gis.storage.raster"),
+    ],
+)
+def test_an_extra_that_is_missing_is_named(name: str, package: str, use: str) -> None:
+    script = (
+        f"import sys\nsys.modules[{package!r}] = None\n"
+        "from semsig_gis.core import parallel\n"
+        "from semsig_gis.core.errors import InputError\n"
+        f"try:\n    {use}\n"
+        "except InputError as error:\n    print(error)\n"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, check=True, text=True
+    ).stdout
+    assert f"needs {package}, which is not installed" in said
+    assert f"pip install 'semsig_gis[{name}]'." in said
+
+
+def test_a_fault_of_our_own_is_no_missing_extra() -> None:
+    with pytest.raises(ModuleNotFoundError), extra("serve", "the workbench"):
+        importlib.import_module("semsig_gis.nowhere")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
+from machine import PATIENCE_S
 
 from semsig_gis.core.jit import compiled
 
@@ -46,7 +47,7 @@ def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
             cwd=package,
             env={"NUMBA_CACHE_DIR": str(tmp_path), "PATH": ""},
             text=True,
-            timeout=120,
+            timeout=PATIENCE_S,
         ).stdout.split()
         for _ in range(2)
     ]

@@ -224,7 +224,7 @@ def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
     # The lamp stands deep in a building, and so does no viewpoint that would see it.
     world = World(((0.0, 0.0, CODES[0]),), radius=12.0)
     house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
-    with refused(EmptyResultError, "1 objects", "look at", "buildings"):
+    with refused(EmptyResultError, "1 objects", "check", "buildings"):
         build_database(world.street_objects, spec=SignatureSpec(12.0), footprints=house)
 
 

@@ -83,8 +83,10 @@ def test_a_city_in_parts_is_all_of_them(parts: Path, database: SignatureDatabase
     assert_same(city.database, database)
     assert isinstance(city.dataset, PartitionedDatabase)
     assert city.files == part_files(parts)
-    assert city.bytes == sum(file.stat().st_size for file in parts.iterdir())
+    assert city.bytes == sum(file.stat().st_size for file in parts.iterdir() if file.is_file())
     assert city.digest == digest(*city.files)
+    assert city.store_path == parts / "_inputs"
+    assert city.object_counts == open_store(parts).objects.class_counts
 
 
 def test_what_is_no_database_is_told(tmp_path: Path) -> None:
@@ -296,7 +298,7 @@ def test_a_store_that_is_missing_or_of_another_database_is_told(tmp_path: Path) 
     path = tmp_path / "city.parquet"
     with refused(DatabaseError, "does not exist"):
         open_store(path)
-    with refused(DatabaseError, "is a folder"):
+    with refused(DatabaseError, "is not a signature database in parts"):
         open_store(tmp_path)
     save_database(build_database(TOWN), path)
     with refused(DatabaseError, "no object store", "city.objects", "build the database again"):

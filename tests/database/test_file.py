@@ -18,6 +18,7 @@ from worlds import CODES, World, assert_same, brute_force, worlds
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import (
+    INPUTS,
     MANIFEST,
     Manifest,
     Part,
@@ -222,7 +223,8 @@ def test_the_manifest_tells_what_is_there_and_how_it_was_built(
     assert manifest.recipe["grid"] == {"step": 10.0, "origin": [0.0, 0.0]}
     assert manifest.recipe["tile"] == {"cells": 8}
     assert list(manifest.recipe["inputs"]) == ["objects"]
-    assert {part.file for part in manifest.parts} | {MANIFEST} == {p.name for p in parts.iterdir()}
+    files = {part.file for part in manifest.parts} | {MANIFEST, INPUTS}
+    assert files == {path.name for path in parts.iterdir()}
     assert manifest.cells == len(database)
     assert manifest.entries == len(database.codes)
     for part in manifest.parts:

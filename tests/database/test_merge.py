@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from sentences import refused
-from worlds import CODES, CORNER, TAXONOMY, objects_of, surroundings
+from worlds import CODES, CORNER, TAXONOMY, assert_same, objects_of, surroundings
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.core.geometry import GridSpec
@@ -19,8 +19,9 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.merge import merge_databases
+from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.database.views import ViewpointSpec
-from semsig_gis.objects.table import Licence
+from semsig_gis.objects.table import Licence, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,10 +84,12 @@ def city(
 @pytest.fixture
 def objects() -> StreetObjects:
     rng = np.random.default_rng(7)
-    places = np.round(rng.uniform((0, 0), (400, 160), (180, 2)) * 4) / 4 + CORNER
-    rows = zip(
-        *places.T, rng.choice(CODES[:6], 180), ["trees"] * 180, map(str, range(180)), strict=True
-    )
+    places = np.round(rng.uniform((0, 0), (400, 160), (180, 2)) * 4) / 4
+    codes = rng.choice(CODES[:6], 180)
+    # At the border of 200 m: seen from just 45 m, and nothing of the west lies nearer to it.
+    places[(places[:, 0] > 195) & (places[:, 0] < 200), 0] -= 5.0
+    places[:2], codes[:2] = [(195, 85), (200, 85)], CODES[0]
+    rows = zip(*(places + CORNER).T, codes, ["trees"] * 180, map(str, range(180)), strict=True)
     return objects_of(*rows, licenses=(Licence("A (CC0)", ("trees",)),), taxonomy=CLASSES)
 
 
@@ -116,6 +119,25 @@ def test_a_merger_is_built_from_both(
     if start == end:
         save_with_store(*_whole(objects, mode), tmp_path / "all.parquet")
         assert (tmp_path / "all.parquet").read_bytes() == region.read_bytes()
+
+
+def test_tiles_are_merged_into_a_file(objects: StreetObjects, tmp_path: Path) -> None:
+    west = city(objects, tmp_path / "west.parquet", "streets", 0, 200)
+    east = city(objects, tmp_path / "east.parquet", "streets", 200, 400)
+    store, tiles = open_store(east), tmp_path / "east"
+    save_objects(store.objects, tmp_path / "objects.parquet")
+    build_tiles(
+        tmp_path / "objects.parquet",
+        tiles,
+        tile=TileSpec(100.0),
+        viewpoints=ViewpointSpec(mode="streets"),
+        buildings=store.footprints,
+        streets=store.streets,
+    )
+    region, expected = tmp_path / "region.parquet", tmp_path / "expected.parquet"
+    report = merge_databases(west, tiles, out=region)
+    assert report == merge_databases(west, east, out=expected)
+    assert_same(open_database(region), open_database(expected))
 
 
 def _whole(objects: StreetObjects, mode: Mode) -> tuple[Any, ObjectStore]:

@@ -206,14 +206,18 @@ def plan(objects_file: Path, **options: Any) -> TilePlan:  # noqa: ANN401
     return plan_tiles(objects_file, out, tile=TileSpec(50.0), spec=SignatureSpec(), **options)
 
 
-def test_files_that_can_be_read_by_box_are_used_where_they_are(
+def test_files_that_can_be_read_by_box_are_copied_as_they_are(
     objects_file: Path, tmp_path: Path
 ) -> None:
     houses, streets = tmp_path / "houses.parquet", tmp_path / "streets.parquet"
     save_surroundings(HOUSES, houses)
     save_surroundings(STREETS, streets)
     found = plan(objects_file, buildings=houses, streets=streets, viewpoints=ALONG)
-    assert (found.objects, found.buildings, found.streets) == (objects_file, houses, streets)
+    inputs = tmp_path / "city.partial" / "_inputs"
+    assert found.objects.read_bytes() == objects_file.read_bytes()
+    for name, file in (("buildings", houses), ("streets", streets)):
+        assert getattr(found, name) == inputs / f"{name}.parquet"
+        assert getattr(found, name).read_bytes() == file.read_bytes()
     assert found.folder == tmp_path / "city.partial"
     assert (found.side, found.reach, found.street_reach) == (5, 30.0, 21.0)
     assert found.box((15, -2), 3.0) == (747.0, -103.0, 803.0, -47.0)
@@ -324,7 +328,8 @@ def test_a_database_appears_whole_and_replaces_what_was_there(
         (folder / "_inputs").mkdir()
         (folder / "_inputs" / "buildings.parquet").touch()
         assert publish(folder, parts).cells == len(cells)
-        assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0))}
+        names = {MANIFEST, "_inputs", part_name((0, 0))}
+        assert {path.name for path in target.iterdir()} == names
         assert len(open_database(target)) == len(cells)
         assert {path.name for path in tmp_path.iterdir()} == {"city", "latest"}
     assert link.is_symlink()

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -19,11 +20,17 @@ from worlds import CODES, CORNER, TAXONOMY, assert_index_fits, assert_same, surr
 
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.database.build import build_database
+from semsig_gis.database.build import build_cells, build_database
 from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.file import open_database
-from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles
-from semsig_gis.database.update import compare_cells, update_database, update_file, update_tiles
+from semsig_gis.database.tiles import TileSpec, build_tiles
+from semsig_gis.database.update import (
+    compare_cells,
+    update_database,
+    update_file,
+    update_tile,
+    update_tiles,
+)
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.objects.table import Licence, save_objects
@@ -333,11 +340,9 @@ def test_an_update_of_tiles_is_a_rebuild(*, seed: int, side: float, edits: int, 
         build_tiles(old, city, **specs, **options)
         save_objects(objects_of(edited(table, rng, edits)), new)
         before = open_database(city)
-        try:
-            report = update_tiles(city, new, before=old, **options)
-        except InputError as error:  # an edit took the last object of a layer
-            assert "lacks the layers" in str(error)  # noqa: PT017
-            return
+        report = update_tiles(city, new)
+        if report.kept:  # layers that lost their last object are not among the new ones
+            save_objects(open_store(city).objects, new)
         build_tiles(new, rebuilt, **specs, **options)
         assert folder_bytes(city) == folder_bytes(rebuilt)
         check_report(report, before, open_database(city))
@@ -345,7 +350,11 @@ def test_an_update_of_tiles_is_a_rebuild(*, seed: int, side: float, edits: int, 
 
 
 def folder_bytes(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 @pytest.fixture
@@ -355,50 +364,92 @@ def tiled(table: pd.DataFrame, tmp_path: Path) -> Path:
     return tmp_path / "tiles"
 
 
-def test_tiles_far_from_a_change_are_kept_with_what_is_said_of_all(
+def test_only_the_cells_of_tiles_that_see_a_change_are_computed(
     tiled: Path, table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    old, new, later = (tmp_path / f"{name}.parquet" for name in ("old", "new", "later"))
+    new, later = tmp_path / "new.parquet", tmp_path / "later.parquet"
     moved = table.copy()
     moved.loc[0, ["x", "y"]] = at(50.0, 50.0)
     objects = objects_of(moved)
     objects = dataclasses.replace(objects, licenses=(Licence("B (ODbL)", ()),), notes=("new",))
     save_objects(objects_of(moved), new)
     save_objects(objects, later)
-    built: list[Any] = []
+    computed: list[int] = []
 
-    def noted(*given: Any) -> Any:  # noqa: ANN401
-        built.append(given[1])
-        return build_tile(*given)
+    def noted(objects: StreetObjects, columns: Any, *given: Any, **options: Any) -> Any:  # noqa: ANN401
+        computed.append(len(columns))
+        return build_cells(objects, columns, *given, **options)
 
-    monkeypatch.setattr("semsig_gis.database.tiles.build_tile", noted)
-    update_tiles(tiled, new, before=old)
-    assert 0 < len(built) < len(list(tiled.glob("tile_*")))
-    built.clear()
-    update_tiles(tiled, later, before=new)
-    assert not built
+    monkeypatch.setattr("semsig_gis.database.tiles.build_cells", noted)
+    report = update_tiles(tiled, new)
+    assert sum(computed) == report.recomputed > 0
+    assert len(computed) < len(list(tiled.glob("tile_*")))
+    computed.clear()
+    update_tiles(tiled, later)
+    assert not computed
     build_tiles(later, tmp_path / "rebuilt", tile=TileSpec(100.0))
     assert folder_bytes(tiled) == folder_bytes(tmp_path / "rebuilt")
+
+
+def test_an_update_of_tiles_goes_on_where_it_was_interrupted(
+    tiled: Path, table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new, before, tiles = tmp_path / "new.parquet", open_database(tiled), iter(range(4))
+    moved = table.copy()
+    moved[["x", "y"]] += 1.25
+    save_objects(objects_of(moved), new)
+
+    def interrupted(*given: Any) -> Any:  # noqa: ANN401
+        if next(tiles, None) is None:
+            raise KeyboardInterrupt
+        return update_tile(*given)
+
+    monkeypatch.setattr("semsig_gis.database.update.update_tile", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        update_tiles(tiled, new)
+    monkeypatch.undo()
+    assert len(list(tiled.with_name("tiles.partial").glob("tile_*.parquet"))) == 4
+    check_report(update_tiles(tiled, new), before, open_database(tiled))
+    build_tiles(new, tmp_path / "rebuilt", tile=TileSpec(100.0))
+    assert folder_bytes(tiled) == folder_bytes(tmp_path / "rebuilt")
+
+
+def test_tiles_have_a_store(tiled: Path, table: pd.DataFrame, tmp_path: Path) -> None:
+    houses = tmp_path / "houses.gpkg"
+    HOUSES.to_file(houses)
+    options: dict[str, Any] = {"viewpoints": ViewpointSpec(mode="streets"), "streets": STREETS}
+    build_tiles(tmp_path / "old.parquet", tiled, buildings=houses, **options)
+    houses.unlink()  # none of the files is needed any more
+    (tmp_path / "old.parquet").unlink()
+    store = open_store(tiled)
+    assert sorted(store.objects.table["source_id"]) == sorted(table["source_id"])
+    assert store.footprints is not None
+    assert store.streets is not None
+    assert (len(store.footprints), len(store.streets)) == (len(HOUSES), len(STREETS))
+    content = folder_bytes(tiled)
+    new = tmp_path / "new.parquet"
+    save_objects(objects_of(table[table["source"] == "trees"][3:]), new)
+    report = update_tiles(tiled, new)
+    assert (report.replaced, report.kept) == (("trees",), ("lamps", "signs"))
+    save_objects(objects_of(table), new)
+    update_tiles(tiled, new)
+    assert folder_bytes(tiled) == content
 
 
 def test_what_does_not_fit_tiles_is_refused(
     tiled: Path, table: pd.DataFrame, tmp_path: Path
 ) -> None:
-    old, new, far = (tmp_path / f"{name}.parquet" for name in ("old", "new", "far"))
+    far = tmp_path / "far.parquet"
     content = folder_bytes(tiled)
-    save_objects(objects_of(table[table["source"] != "trees"]), new)
     tower = CLASSES.extended([ObjectClass(250, "9", "tower", "Tower", 90.0)])
     save_objects(objects_of(table, tower), far)
-    with refused(InputError, "lacks the layers trees", "into one file"):
-        update_tiles(tiled, new, before=old)
     with refused(InputError, "90 m", "45 m", "build the database again"):
-        update_tiles(tiled, far, before=old)
-    with refused(InputError, "far.parquet", "does not hold the objects"):
-        update_tiles(tiled, old, before=far)
-    with refused(InputError, "built without buildings"):
-        update_tiles(tiled, old, before=old, buildings=HOUSES)
+        update_tiles(tiled, far)
     assert folder_bytes(tiled) == content
     assert not tiled.with_name("tiles.partial").exists()
+    shutil.rmtree(tiled / "_inputs")
+    with refused(DatabaseError, "no street objects", "build the database again"):
+        update_tiles(tiled, far)
 
 
 def test_cells_of_different_ranges_are_not_compared(database: SignatureDatabase) -> None:

@@ -172,8 +172,7 @@ def test_a_run_that_was_killed_ends_with_the_same_bytes(
         [*command, tmp_path / "out"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     ) as run:
         parts = tmp_path / "out.partial" / "_parts"
-        end = time.monotonic() + 120
-        while run.poll() is None and time.monotonic() < end:
+        while run.poll() is None:
             if any(parts.glob("*.parquet")):
                 run.send_signal(signal.SIGKILL)
                 break

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import rasterio
+from machine import PATIENCE_S
 from rio_cogeo.cogeo import cog_validate
 from sentences import refused
 from small_city import chances_of, small_city, small_evaluation, small_location
@@ -116,7 +117,7 @@ def test_qgis_draws_rasters_as_the_maps_do(
     program = Path(__file__).parents[1] / "qgis_pixels.py"
     said = subprocess.run(
         [qgis_python, program, *(tmp_path / f"{name}.tif" for name in STYLES)],
-        check=True, capture_output=True, timeout=120, env=qgis_environment,
+        check=True, capture_output=True, timeout=PATIENCE_S, env=qgis_environment,
     )  # fmt: skip
     for (name, classes), told in zip(STYLES.items(), json.loads(said.stdout), strict=True):
         assert told["labels"] == [label for label, _ in classes.values()]

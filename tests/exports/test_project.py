@@ -17,7 +17,7 @@ from xml.etree import ElementTree as ET
 
 import pyogrio
 import pytest
-from machine import qgis_variables
+from machine import PATIENCE_S, qgis_variables
 from map_pages import HOSTILE
 from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
 
@@ -74,7 +74,7 @@ def opened(qgis_python: str, tmp_path_factory: pytest.TempPathFactory) -> dict[s
         check=False,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         env=qgis_variables(folder),
     )
     assert done.returncode == 0, done.stdout + done.stderr

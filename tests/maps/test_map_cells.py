@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import shapely
 from folium.raster_layers import ImageOverlay
+from machine import PATIENCE_S
 from map_pages import IMAGES, LEGEND
+from selenium.webdriver.support.wait import WebDriverWait
 from small_city import chances_of
 from worlds import CODES, TAXONOMY, random_town
 
@@ -104,7 +105,9 @@ def test_three_lookalikes_are_told_of_with_their_places(page: MapPage) -> None:
     for cell in (LARGEST, *np.flatnonzero(CITY.type_group_sizes == 1)[:3].tolist()):
         page.click(CITY, cell)
         told = choices(page)
-        assert len(told) == len(page.all(".semsig-number")) == 3
+        assert len(told) == 3
+        wait = WebDriverWait(page.browser, PATIENCE_S)  # the numbers of the cell before fade away
+        wait.until(lambda _: len(page.all(".semsig-number")) == 3)
         for line in told:
             latlon = [float(one) for one in line.split("; ")[-1].split(", ")]
             away = np.hypot(*(to_latlon(CITY.xy, CITY.crs) - latlon).T)
@@ -149,8 +152,8 @@ def test_a_sign_is_a_jump_away_and_layers_are_switched(page: MapPage) -> None:
     assert [one.get_attribute("src") == types for one in page.all(IMAGES)] == [False]
     page.switch("Nothing")
     assert page.all(IMAGES) == []
-    page.switch("Tell of a cell when clicked")
-    time.sleep(0.5)
+    page.switch("Describe a cell when clicked")
+    page.rest()
     assert page.circles(SAME_TYPES) == 0
     page.ask("map.fire('click', {latlng: map.getCenter()})")
     assert page.told()["title"] == "A place on the map"
@@ -203,9 +206,8 @@ def test_a_lookalike_is_a_jump_away(page: MapPage) -> None:
     other = int(TOLD.lookalikes[cell, 1])
     assert page.told()["Cell"] == str(CITY.cell_ids[other])
     assert page.ask("return map.getBounds().contains(toldPlace())")
-    page.switch("Tell of a cell when clicked")
-    time.sleep(0.5)
-    assert page.all(".semsig-number") == []
+    page.switch("Describe a cell when clicked")
+    page.until_gone(".semsig-number")
 
 
 BEFORE = random_town().street_objects

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING
 
 import folium
@@ -86,8 +85,7 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
         page.switch(layer)
         assert (page.circles(VERDICTS["matched"]), len(page.all(IMAGES))) == (matched, images)
     page.switch("Candidates")
-    time.sleep(0.5)  # numbers fade away
-    assert page.all(".semsig-number") == []
+    page.until_gone(".semsig-number")
     page.switch("Best place")
     assert page.circles(ANSWERS["given"].colour) == 0
 

@@ -12,9 +12,11 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
+from machine import PATIENCE_S
 from map_pages import HOSTILE, LEGEND, MapPage, assert_quiet
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
 from worlds import random_town
 
 from semsig_gis.core.signs import class_signs
@@ -101,7 +103,6 @@ def test_a_click_tells_of_the_nearest_object(page: MapPage) -> None:
 
 def test_the_script_has_every_object_where_it_is(page: MapPage) -> None:
     page.open(objects_map(OBJECTS))
-    page.browser.set_script_timeout(30)
     places = page.ask_later("placesOfObjects(...arguments)", 40)
     expected = np.array([place_of(number) for number in range(40)])
     assert np.abs(np.array(places) - expected).max() < 4e-6  # a quarter of a metre
@@ -343,7 +344,10 @@ def test_streets_are_found_by_their_names(page: MapPage) -> None:
     marked = page.ask("return lines((one) => one.options.weight === 6)[0].getLatLngs().length")
     assert marked == 2
     page.browser.get_log("performance")
+    wait = WebDriverWait(page.browser, PATIENCE_S)
+    wait.until(lambda _: "told=" in page.browser.current_url)
     page.browser.refresh()  # with the street in the address
+    wait.until(lambda _: "Rue de" in page.panel())
     assert page.told()["title"] == "Rue de l'Église"
     page.ask("semsig.openers.street(map, arguments[0])", HOSTILE)
     page.panel()

@@ -112,12 +112,12 @@ def test_without_the_files(damage: str, tmp_path: Path, monkeypatch: pytest.Monk
         (tmp_path / "leaflet.js").write_text("alert(1)", encoding="utf-8")
     monkeypatch.setattr(map_page, "_folder", lambda: tmp_path)
     assert not map_page.available()
-    with pytest.raises(InputError, match=r"does not carry leaflet\.js of leaflet 1\.9\.3; make"):
+    with pytest.raises(InputError, match=r"does not contain leaflet\.js of leaflet 1\.9\.3; make"):
         asset_text("leaflet.js")
     assert external_files(framed_page(a_map()))
     assert not save_map(a_map(), tmp_path / "map.html")
     before = (tmp_path / "map.html").read_bytes()
-    with pytest.raises(InputError, match="does not carry"):
+    with pytest.raises(InputError, match="does not contain"):
         save_map(a_map(), tmp_path / "map.html", self_contained=True)
     assert (tmp_path / "map.html").read_bytes() == before
 

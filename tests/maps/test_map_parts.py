@@ -122,7 +122,7 @@ def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> No
     assert draw(map_=own) is own
     names = [getattr(child, "layer_name", "") for child in layers_of(own).values()]
     assert layers | {f"{layer}, 2" for layer in layers} <= set(names)
-    for once in ("Objects seen from a cell", "Tell of a cell when clicked"):
+    for once in ("Objects seen from a cell", "Describe a cell when clicked"):
         assert names.count(once) <= 1
     body = own.get_root().render().partition("</head>")[2]
     # No legend brings a view along.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from machine import PATIENCE_S
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_location
@@ -40,7 +41,7 @@ def wait_for(page: MapPage, **parts: str | None) -> None:
     def told(_: object) -> bool:
         return all(state(page).get(key) == text for key, text in parts.items())
 
-    WebDriverWait(page.browser, 10.0).until(told)
+    WebDriverWait(page.browser, PATIENCE_S).until(told)
 
 
 def follow(page: MapPage, address: str) -> None:
@@ -57,8 +58,8 @@ def follow(page: MapPage, address: str) -> None:
 def test_a_link_shows_what_was_seen_when_it_was_copied(alike: MapPage) -> None:
     assert state(alike) == {}
     alike.switch("Same types and angle levels")
-    alike.switch("Tell of a cell when clicked")
-    changed = "~Same-types,Same-types-and-angle-levels,~Tell-of-a-cell-when-clicked"
+    alike.switch("Describe a cell when clicked")
+    changed = "~Same-types,Same-types-and-angle-levels,~Describe-a-cell-when-clicked"
     wait_for(alike, layers=changed)
     alike.ask("map.setView([43.5, 3.25], 15.25, {animate: false})")
     alike.one(".semsig-colours").click()
@@ -68,7 +69,7 @@ def test_a_link_shows_what_was_seen_when_it_was_copied(alike: MapPage) -> None:
     follow(alike, link)
     assert alike.ask(SEEN) == seen
     alike.switch("Same types")
-    alike.switch("Tell of a cell when clicked")
+    alike.switch("Describe a cell when clicked")
     wait_for(alike, layers=None)
 
 
@@ -106,7 +107,7 @@ def test_a_link_that_tells_nothing_of_the_map_shows_it_as_it_is(alike: MapPage) 
 
 def test_another_part_of_the_same_page_is_shown_by_its_address(alike: MapPage) -> None:
     alike.ask("location.hash = 'place=43,3,14&colours=dark&other=kept'")
-    WebDriverWait(alike.browser, 10.0).until(lambda _: alike.ask(SEEN)[2] == 14)
+    WebDriverWait(alike.browser, PATIENCE_S).until(lambda _: alike.ask(SEEN)[2] == 14)
     assert alike.ask(SEEN)[:4] == pytest.approx([43, 3, 14, True])
     wait_for(alike, other="kept", place="43.00000,3.00000,14")
 
@@ -122,5 +123,7 @@ def test_what_was_told_is_told_again(alike: MapPage) -> None:
         "semsig.openers.query = (one, rest) => { window.asked = [one === map, rest]; return true; }"
     )
     alike.ask("location.hash = arguments[0]", urlsplit(told[0]).fragment)
-    asked = WebDriverWait(alike.browser, 10.0).until(lambda _: alike.ask("return window.asked"))
+    asked = WebDriverWait(alike.browser, PATIENCE_S).until(
+        lambda _: alike.ask("return window.asked")
+    )
     assert asked == [True, "17:b"]

@@ -94,7 +94,7 @@ def test_text_that_is_no_method(text: str) -> None:
         ("likelihood:light:heading", InputError, "cannot be read; give 'likelihood:NOISE'"),
         ("likelihood:light:heading=north", InputError, "cannot be read; give 'likelihood:NOISE'"),
         ("likelihood:light:heading=-4", InputError, "is -4.0; give a number from 0.001 to 360"),
-        ("likelihood:light:on_grid:refined", InputError, "leave out refined or on_grid"),
+        ("likelihood:light:on_grid:refined", InputError, "refined and on_grid exclude"),
     ],
 )
 def test_values_that_no_method_has(text: str, error: type[SemsigError], words: str) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from semsig_gis.objects.changes import ObjectChanges
     from semsig_gis.objects.table import StreetObjects
 
-TREE, FOUNTAIN, LAMP = CODES[:3]
+TREE, _, LAMP = CODES[:3]
 KINDS = ("same", "moved", "changed", "removed", "added")
 
 

@@ -25,10 +25,10 @@ from semsig_gis.objects.draft import (
     Column,
     Sample,
     columns_of,
+    draft_catalog,
     guess_class,
     guess_class_by,
     guess_position,
-    suggest_catalog,
 )
 from semsig_gis.objects.keywords import Keywords, Match, keywords, words_of
 from semsig_gis.objects.load import assemble, read_files
@@ -72,7 +72,7 @@ def write(path: Path, fields: Mapping[str, Sequence[object]]) -> Path:
 
 def check(file: Path, snapshot: Callable[[str, str], None]) -> None:
     """Compare a draft, and what is read by it when all that it offers is taken."""
-    text = draft = suggest_catalog(file, crs="EPSG:2154" if "lambert" in file.name else None)
+    text = draft = draft_catalog(file, crs="EPSG:2154" if "lambert" in file.name else None)
     assert all(layer.counts.kept == layer.counts.read for layer in read(draft, file, file.parent))
     for layer in read(OFFERED.sub("", draft), file, file.parent):
         text += f"\n# {layer.spec.name}: {layer.counts.kept} of {layer.counts.read} rows\n"
@@ -129,15 +129,15 @@ def test_a_draft_is_read_by(
 def test_what_nothing_is_known_of_is_a_class_of_its_own(
     tmp_path: Path, stem: str, name: str
 ) -> None:
-    draft = suggest_catalog(write(tmp_path / f"{stem}.gpkg", {"a": [1, 2]}))
-    assert f'class = "{name}"  # EDIT: nothing tells' in draft
+    draft = draft_catalog(write(tmp_path / f"{stem}.gpkg", {"a": [1, 2]}))
+    assert f'class = "{name}"  # EDIT: unknown' in draft
     assert load(draft, tmp_path).layers[0].class_name == name
 
 
 def test_classes_that_the_paper_has_not_keep_their_code_or_get_a_free_one(tmp_path: Path) -> None:
     def drafted(file: str, name: str) -> ObjectClass:
         path = write(tmp_path / file, {"a": [1]})
-        return load(suggest_catalog(path), tmp_path).taxonomy.by_name(name)
+        return load(draft_catalog(path), tmp_path).taxonomy.by_name(name)
 
     montpellier = load_catalog("montpellier").taxonomy
     assert drafted("horodateurs.gpkg", "parking_meter") == montpellier.by_name("parking_meter")
@@ -170,7 +170,7 @@ def test_strange_names_and_values_stay_within_their_quotes(tmp_path: Path) -> No
             "classe": ["/.*/", "a", "b"] * 4,
         },
     )
-    draft = suggest_catalog(file)
+    draft = draft_catalog(file)
     offered = [line for line in draft.splitlines() if line.startswith("# where")]
     assert len(offered) == 4
     assert r'"//\\.\\*//"' in draft  # the pattern of a value that looks like one
@@ -208,7 +208,7 @@ def test_what_cannot_be_drafted_is_an_error(
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with refused((CrsError, SourceError), *words):
-        suggest_catalog(tmp_path / name)
+        draft_catalog(tmp_path / name)
 
 
 STEMS = ("bancs", "stuff", "arbres & bancs", "日本 [1]", "Batiments", "rues", "2024", "a'b;c")
@@ -282,13 +282,37 @@ def test_every_file_loads_by_its_draft(
     def loads(stem: str, content: bytes) -> None:
         file = tmp_path / f"{stem}{suffix}"
         file.write_bytes(content)
-        catalog = load(suggest_catalog(file), tmp_path)
+        catalog = load(draft_catalog(file), tmp_path)
         layers, absent = read_files(catalog.layers, [file])
         assert not absent
         if layers[0].spec.role == "objects":
             assert len(assemble(layers, catalog).objects.table) >= 1
 
     loads()
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "shape", "said"),
+    [
+        ("trees", "Point", "<gml:pos>391000 5820000</gml:pos>", 'geometry = "point"'),
+        ("streets", "LineString", "<gml:posList>0 0 9 9</gml:posList>", 'role = "streets"'),
+    ],
+)
+def test_gml_is_drafted_and_read_by_its_draft(
+    tmp_path: Path, name: str, kind: str, shape: str, said: str
+) -> None:
+    place = f'<gml:{kind} srsName="urn:ogc:def:crs:EPSG::25833">{shape}</gml:{kind}>'
+    member = f"<wfs:member><a><n>7</n><geom>{place}</geom></a></wfs:member>"
+    file = tmp_path / f"{name}.gml"
+    file.write_text(
+        '<wfs:FeatureCollection xmlns:wfs="http://www.opengis.net/wfs/2.0" '
+        f'xmlns:gml="http://www.opengis.net/gml/3.2">{member * 3}</wfs:FeatureCollection>'
+    )
+    text = draft_catalog(file)
+    assert said in text
+    assert 'metric_crs = "EPSG:25833"' in text
+    (layer,), absent = read_files(load(text, tmp_path).layers, [file])
+    assert (len(layer.table), absent) == (3, ())
 
 
 @pytest.mark.parametrize("folder", ["montpellier", "paris"])
@@ -299,7 +323,7 @@ def test_published_files_are_drafted_and_read_by_their_drafts(
     for file in sorted((geodata / folder).iterdir()):
         if file.suffix == ".txt":
             continue
-        draft = suggest_catalog(file, crs="EPSG:2154" if folder == "montpellier" else None)
+        draft = draft_catalog(file, crs="EPSG:2154" if folder == "montpellier" else None)
         (stanza,) = tomllib.loads(draft)["layers"]
         guesses.append(f"{file.name}: {stanza.get('class', stanza.get('role'))}\n")
         (layer,) = read(draft, file, tmp_path)
@@ -319,7 +343,7 @@ def test_the_filters_of_the_montpellier_catalogue_are_offered(geodata: Path) -> 
         ("ParkingOuv", "TYPARK_C_2", "Superstructure"),
         ("PlacesReserv", "F01_TYPE_D", "Livraison"),
     ):
-        draft = suggest_catalog(geodata / "montpellier" / f"VilleMTP_MTP_{name}.zip")
+        draft = draft_catalog(geodata / "montpellier" / f"VilleMTP_MTP_{name}.zip")
         (line,) = (line for line in draft.splitlines() if f"where = {{ {field} =" in line)
         assert f'"{value}"' in line
 
@@ -402,7 +426,7 @@ def test_the_classes_are_those_of_the_catalogues() -> None:
 
 
 def sample(*rows: dict[str, Any]) -> Sample:
-    fields = tuple((name, "") for name in dict.fromkeys(name for row in rows for name in row))
+    fields = tuple(dict.fromkeys(name for row in rows for name in row))
     return Sample("opendatasoft", LayerInfo("x", "Point", None, len(rows), fields), rows)
 
 

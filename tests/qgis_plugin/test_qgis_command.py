@@ -14,6 +14,7 @@ import pytest
 import typer
 from hypothesis import given
 from hypothesis import strategies as st
+from machine import PATIENCE_S
 from semsig import answers, arguments
 from semsig.answers import answer_lines, candidate_rows, parse_answer, place_row, ring
 from semsig.arguments import check_output, command_line, require_likelihood
@@ -203,15 +204,13 @@ def test_a_command_that_does_not_end_is_ended_with_all_it_started(
     script = tmp_path / "deaf"
     script.write_text(
         "#!/bin/sh\n"
-        f"sleep 100 & echo $! > {tmp_path}/child\n"
+        f"sleep 86400 & echo $! > {tmp_path}/child\n"
         f"echo $$ > {tmp_path}/parent\n"
         "echo 'semsig progress 0% sleeping' >&2\nwait\n"
     )
     script.chmod(0o755)
-    begin = time.monotonic()
     with pytest.raises(Cancelled):
         Log(cancelling=True).run(script)
-    assert time.monotonic() - begin < 20
     for name in ("parent", "child"):
         assert_ended(int((tmp_path / name).read_text()))
 
@@ -219,7 +218,8 @@ def test_a_command_that_does_not_end_is_ended_with_all_it_started(
 def assert_ended(process: int) -> None:
     """Check that a process has ended; one that nobody waited for may be left as a zombie."""
     status = Path(f"/proc/{process}/stat")
-    for _ in range(100):
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
         try:
             os.kill(process, 0)
         except ProcessLookupError:

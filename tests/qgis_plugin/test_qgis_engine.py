@@ -82,7 +82,7 @@ def test_an_engine_is_installed_and_installed_again(engine: Engine, tmp_path: Pa
     }
     told = (tmp_path / "py" / "log").read_text()
     assert "--constraint=" in told
-    assert told.splitlines()[0].endswith("semsig_gis[serve]==1.0")
+    assert told.splitlines()[0].endswith("semsig_gis[raster,serve]==1.0")
     assert "HTTPS_PROXY=http://proxy:3128" in told
     assert "of QGIS" not in told
     first = engine.command

@@ -73,11 +73,11 @@ def test_a_map_of_ones_own_goes_before_the_next(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "error", "words"),
     [
-        ("lables = 3", CatalogError, "'lables', which means nothing; the nearest is 'labels'"),
+        ("lables = 3", CatalogError, "'lables', which is unknown; the nearest is 'labels'"),
         ("left_out = 3", CatalogError, "write a list"),
         ('[labels]\na = "lamp"', CatalogError, "label 'a' has the class 'lamp', which is unknown"),
         ("[labels]\na = 3", CatalogError, "label 'a' has class = 3; write the name"),
-        ("[labels]\na = { bench = 1 }", CatalogError, "'bench', which means nothing"),
+        ("[labels]\na = { bench = 1 }", CatalogError, "'bench', which is unknown"),
         ("[labels]\na = { part = true }", CatalogError, "lacks the key 'class'"),
         ("[labels]\na = { class = {} }", CatalogError, "write the name of a class"),
         (

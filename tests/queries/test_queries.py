@@ -231,6 +231,20 @@ def test_json_lines_and_csv_say_the_same(
         assert bearings.tolist() == sorted(b for _, b in row)
 
 
+def test_sentences_tell_of_what_has_no_direction_and_of_what_is_not_there() -> None:
+    lines = [
+        json.dumps({"see": text})
+        for text in ("bench at 40, bus stop, lamp at 80", "no tree", "lamp, bench", "no lampe")
+    ]
+    mixed, none, plain, slip = parse_queries(lines, "x", taxonomy=TAXONOMY)
+    assert parts_of(signature_of(mixed))[1].tolist() == [40.0, 80.0]
+    bus_stop, tree = (TAXONOMY.encode(symbol).tolist() for symbol in "MB")
+    assert ([*mixed.unplaced], mixed.absent) == (bus_stop, ())
+    assert (len(signature_of(none)), none.unplaced, [*none.absent]) == (0, (), tree)
+    assert (signature_of(plain).bearings, plain.unplaced) == (None, ())
+    assert isinstance(slip.query, InputError)
+
+
 def test_a_part_may_be_missing_and_lines_are_numbered() -> None:
     lines = ["", '{"types": "DB"}', '{"bearings": [5, 6]}', '{"types": ""}', '{"bearings": []}']
     found = list(parse_queries(lines, "x", taxonomy=TAXONOMY))

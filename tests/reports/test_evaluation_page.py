@@ -47,7 +47,7 @@ def sections(evaluation: object) -> dict[str, Section]:
         (0.083, None, 1, "8.3 % of 60 queries were placed within 50 m (95 %: 3.6 to 18 %)."),
         (1.0, None, 5, "100 % of 60 queries were placed within 50 m by the best of 5 candidates "),
         (0.5, 0.95, 1, "; the method was sure enough to answer 100 %, and 75 % of these answers "),
-        (0.5, 0.1, 1, "; the method was sure enough of none to answer it."),
+        (0.5, 0.1, 1, "; the method was not sure enough to answer any of them."),
     ],
 )
 def test_the_headline(near: float, chance: float | None, top: int, said: str) -> None:

@@ -86,7 +86,7 @@ def test_what_a_query_told_stands_around_the_circle() -> None:
     made = draw_scene(scene(objects=0, asked=((3, 90.0), (3, 180.0), (1, 0.0))))
     shown = texts(made.svg)
     assert (shown.count("D"), shown.count("B")) == (2, 1)
-    assert "around the circle: what the query told" in shown
+    assert "around the circle: the query" in shown
     assert "The query told DDB." in made.description
 
 

@@ -218,6 +218,7 @@ def asked_in_several_ways(bench: Workbench) -> dict[str, dict[str, Any]]:
         "photo": {"views": [{"photos": [one]}]},
         "heading unknown": {"views": [{"photos": [{**one, "heading": None}]}], "noise": "light"},
         "rough": {"views": [{"photos": [vague]}], "top": 5},
+        "near": {"views": [{"photos": [one]}], "near": [*latlon(bench, cell // 2), 40.0]},
         "two photos": {"views": [{"photos": [one, photo(bench, cell, 200.0)]}]},
         "compass": {"views": [{"compass": compass, "heading_error": 10}], "seen_from": "cells"},
         "route": {
@@ -227,7 +228,7 @@ def asked_in_several_ways(bench: Workbench) -> dict[str, dict[str, Any]]:
 
 
 @pytest.mark.parametrize(
-    "way", ["photo", "heading unknown", "rough", "two photos", "compass", "route"]
+    "way", ["photo", "heading unknown", "rough", "near", "two photos", "compass", "route"]
 )
 def test_the_command_line_gives_the_same_answer(
     page: Page, way: str, done: Done, monkeypatch: pytest.MonkeyPatch
@@ -244,6 +245,25 @@ def test_the_command_line_gives_the_same_answer(
     assert listed == [(cell, pytest.approx(chance)) for cell, chance in shown]
     place = [result["place"]["lat"], result["place"]["lon"]]
     assert told["estimate"]["place"] == pytest.approx(place, abs=1e-6)
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_a_place_that_is_known_makes_it_likely(page: Page, *, quick: bool) -> None:
+    bench = page.bench
+    cell = longest(bench)
+    other = int(np.hypot(*(bench.database.xy - bench.database.xy[cell]).T).argmax())
+    lamp = {"class": "street_light", "bearing": 10.0, "range": None}
+    views = [{"compass": [lamp], "heading_error": "unknown"}]
+    for place in (cell, other):
+        near = [*latlon(bench, place), 5.0]
+        told = page.ask("/api/answer", {"views": views, "near": near, "quick": quick})
+        found = told["candidates"][0]["place"]
+        assert found == pytest.approx(near[:2], abs=2e-4)
+        assert f"--near {near[0]:.10g}N,{near[1]:.10g}E,5" in told["command"]
+    # One that fits what was seen badly is told of.
+    seen = {"photos": [photo(bench, cell, 80.0)]}
+    told = page.ask("/api/answer", {"views": [seen], "near": [*latlon(bench, other), 5.0]})
+    assert "disagree" in told["notes"][0]
 
 
 def test_a_box_of_known_height_tells_a_range(page: Page) -> None:

@@ -7,10 +7,12 @@ import threading
 from typing import TYPE_CHECKING, Any, cast
 
 import pytest
+from machine import PATIENCE_S
 from sentences import refused
 from workbench import serving
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.threads import share_rows
 from semsig_gis.serve import server
 
 if TYPE_CHECKING:
@@ -122,7 +124,12 @@ def test_a_port_that_another_program_has_is_told() -> None:
         server.listening(taken.getsockname()[1])
 
 
-def test_a_newer_question_makes_waiting_ones_obsolete(monkeypatch: pytest.MonkeyPatch) -> None:
+OTHER = 2
+
+
+def test_a_newer_question_of_a_page_makes_its_others_obsolete(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     begun, go_on, answered = threading.Event(), threading.Event(), list[int]()
     arrived, read = threading.Semaphore(0), server._json
 
@@ -130,7 +137,8 @@ def test_a_newer_question_makes_waiting_ones_obsolete(monkeypatch: pytest.Monkey
         def answer(self, told: dict[str, int]) -> dict[str, int]:
             answered.append(told["number"])
             begun.set()
-            assert go_on.wait(30)
+            assert go_on.wait(PATIENCE_S)
+            share_rows(len, 1)  # as all that takes long
             return told
 
     async def reading(request: Request) -> Any:  # noqa: ANN401 - any JSON
@@ -142,16 +150,17 @@ def test_a_newer_question_makes_waiting_ones_obsolete(monkeypatch: pytest.Monkey
     codes: dict[int, int] = {}
 
     def ask(number: int) -> None:
-        codes[number] = page.send("/api/answer", json.dumps({"number": number}).encode())[0]
+        told = {"number": number, "page": "other" if number == OTHER else "own"}
+        codes[number] = page.send("/api/answer", json.dumps(told).encode())[0]
 
     with serving(cast("Workbench", Slow())) as page:
-        threads = [threading.Thread(target=ask, args=[number]) for number in range(4)]
+        threads = [threading.Thread(target=ask, args=[number]) for number in range(5)]
         for number, thread in enumerate(threads):
             thread.start()
-            assert arrived.acquire(timeout=30)
-            assert number or begun.wait(30)
+            assert arrived.acquire(timeout=PATIENCE_S)
+            assert number or begun.wait(PATIENCE_S)
         go_on.set()
         for thread in threads:
             thread.join()
-    assert codes == {0: 200, 1: 409, 2: 409, 3: 200}
-    assert answered == [0, 3]
+    assert codes == {0: 409, 1: 409, OTHER: 200, 3: 409, 4: 200}
+    assert answered == [0, OTHER, 4]

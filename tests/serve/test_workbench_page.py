@@ -212,8 +212,21 @@ def test_what_a_photo_says_of_itself_is_taken(
     assert "as the photo says" in shown.text("#camera legend")
     there = "const {lat, lng} = semsig.map.getCenter(); return [lat, lng]"
     assert shown.ask(there) == pytest.approx(place.tolist(), abs=1e-4)
-    # Another one some steps on is another place of the same question.
     shown.mark(photos[0], 0)
+    # Its place can be believed.
+    assert "--near" not in shown.ask("return semsig.session.answer.command")
+    left = shown.ask("return semsig.session.answer.places_left")
+    shown.press("#near")
+    shown.settle()
+    assert shown.ask("return semsig.session.body().near") == [*photo["place"], 50]
+    assert shown.ask("return semsig.session.answer.places_left") < left
+    shown.one("#near-metres").send_keys(Keys.CONTROL, "a")
+    shown.type("20", Keys.ENTER)
+    command = shown.ask("return semsig.session.answer.command")
+    told = command.split("--near ")[1].split()[0]
+    assert told == f"{photo['place'][0]:.10g}N,{photo['place'][1]:.10g}E,20"
+    assert shown.ask("return semsig.session.saved().near") == [*photo["place"], 20]
+    # Another one some steps on is another place of the same question.
     shown.give("#photo-on", photos[1].file)
     shown.mark(photos[1], 0)
     assert [len(view["photos"]) for view in shown.ask("return semsig.session.body().views")] == [

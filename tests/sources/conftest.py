@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
+from machine import PATIENCE_S
 from servers import Server
 
 from semsig_gis.sources.http.cache import Cache
@@ -34,4 +35,4 @@ def slept() -> list[float]:
 @pytest.fixture
 def quick(slept: list[float]) -> HttpSpec:
     """Return a specification that does not sleep, but says in `slept` how long it would."""
-    return HttpSpec(timeout=(2.0, 2.0), attempts=3, backoff_s=1.0, sleep=slept.append)
+    return HttpSpec(timeout=(PATIENCE_S, PATIENCE_S), attempts=3, backoff_s=1.0, sleep=slept.append)

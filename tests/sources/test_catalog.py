@@ -26,7 +26,7 @@ from semsig_gis.sources.catalog import (
     load_catalog,
     paper_taxonomy,
 )
-from semsig_gis.sources.vector import DRIVERS
+from semsig_gis.sources.vector.member import DRIVERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

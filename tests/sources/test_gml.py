@@ -10,6 +10,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.sources.catalog import LayerSpec
+from semsig_gis.sources.services.gml import parse_xml
 from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:
@@ -112,3 +113,10 @@ def test_the_name_of_a_crs_says_which_axis_is_first(
 def test_what_is_no_gml(path: Path, text: str, error: type[Exception], words: list[str]) -> None:
     with refused(error, *words):
         read(path, text)
+
+
+def test_a_document_type_is_refused_in_any_encoding() -> None:
+    text = '<?xml version="1.0" encoding="UTF-16"?>{}<a>1</a>'
+    assert parse_xml(text.format("").encode("utf-16")).text == "1"
+    with pytest.raises(ValueError, match="document type"):
+        parse_xml(text.format('<!DOCTYPE a [<!ENTITY b "c">]>').encode("utf-16"))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from unittest.mock import Mock
 
 import pytest
+from machine import PATIENCE_S
 from requests.exceptions import SSLError
 from sentences import assert_sentence, refused
 from servers import Answer, published, zipped
@@ -335,7 +336,7 @@ def test_a_slow_drip_is_tried_once_more_and_told(
 ) -> None:
     server.on("/trees", answer)
     told: list[str] = []
-    failure_of(get, words, "2 times", timeout=(1.0, 0.2), attempts=5, tell=told.append)
+    failure_of(get, words, "2 times", timeout=(PATIENCE_S, 0.5), attempts=5, tell=told.append)
     assert len(server.seen) == 2
     (line,) = told
     assert words in line
@@ -367,7 +368,7 @@ def test_a_server_that_says_nothing_is_not_waited_for() -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"http://127.0.0.1:{silent.getsockname()[1]}/"
         with refused(HttpError, "did not answer in time"):
-            read_text(address, spec=HttpSpec(timeout=(1.0, 0.1)))
+            read_text(address, spec=HttpSpec(timeout=(PATIENCE_S, 0.1)))
     with refused(HttpError, "could not be reached"):
         read_text(address)
 

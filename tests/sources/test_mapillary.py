@@ -112,7 +112,7 @@ def test_a_full_box_is_asked_for_in_quarters(
 ) -> None:
     server.on("/map_features", Service(crowd))
     told: list[str] = []
-    spec = HttpSpec(timeout=(2, 2), sleep=slept.append, tell=told.append, secret=Secret(TOKEN))
+    spec = HttpSpec(sleep=slept.append, tell=told.append, secret=Secret(TOKEN))
     benches = [CATALOG.layer("benches"), CATALOG.layer("signs")]
     options: Any = {"endpoints": [server.url], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
@@ -136,7 +136,7 @@ def test_a_full_box_is_asked_for_in_quarters(
 
 def test_a_refused_token_is_not_told(server: Server, cache: Cache) -> None:
     server.on("/map_features", Service([]))
-    spec = HttpSpec(timeout=(2, 2), attempts=1, secret=Secret("MLY|1|other"))
+    spec = HttpSpec(attempts=1, secret=Secret("MLY|1|other"))
     words = ("401", "Invalid token OAuth (token)", "access token still holds")
     with refused(HttpError, *words):
         fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
@@ -147,7 +147,7 @@ def test_a_connection_that_is_cut_leaves_no_token(server: Server, cache: Cache) 
     body = json.dumps({"data": [], "next": TOKEN}).encode()
     server.on("/map_features", Answer(body, headers={"ETag": '"1"'}, cut=len(body) - 8),
               Answer(body))  # fmt: skip
-    spec = HttpSpec(timeout=(2, 2), sleep=lambda _: None, secret=Secret(TOKEN))
+    spec = HttpSpec(sleep=lambda _: None, secret=Secret(TOKEN))
     fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
     assert "range" not in server.seen[1].headers
     assert not any("0123456789" in text for text in texts(cache.folder))

@@ -360,10 +360,6 @@ _AMOUNT = _Number(f"a number from 0 to {MOST:,}", lambda value: 0 <= value <= MO
 _DEGREES = _Number("degrees above 0 and up to 180", lambda value: 0 < value <= HALF_TURN)
 
 
-def _is_error(value: float) -> bool:
-    return 0 < value <= MOST_ERROR
-
-
 _NUMBERS = MappingProxyType(
     {
         "detection": _CHANCE,

@@ -75,8 +75,9 @@ class NoiseTable:
         """
         if self.position_sigma == 0:
             return np.ones((len(self.codes), DISTANCE_UNITS + 1))
-        beyond = (self.distances - self.ranges[:, None]) / (self.position_sigma * math.sqrt(2.0))
-        return np.asarray(0.5 * np.vectorize(math.erfc, otypes=[np.float64])(beyond))
+        ranges, row_of = np.unique(self.ranges, return_inverse=True)  # most classes have the same
+        beyond = (self.distances - ranges[:, None]) / (self.position_sigma * math.sqrt(2.0))
+        return np.asarray(0.5 * np.vectorize(math.erfc, otypes=[np.float64])(beyond))[row_of]
 
     @cached_property
     def seen(self) -> NDArray[np.float64]:

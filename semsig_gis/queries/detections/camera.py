@@ -22,7 +22,6 @@ Projection = Literal["pinhole", "equirectangular", "cylindrical", "fisheye"]
 USUAL_FOV: dict[str, float] = {"equirectangular": 360.0, "cylindrical": 360.0, "fisheye": 180.0}
 """Of pictures whose field of view nobody says; a pinhole's is never known."""
 
-QUARTER_TURN = 90.0
 MOST_PIXELS = 1_000_000
 MOST_FOV = {"pinhole": 175.0}  # a flat picture cannot hold half a turn
 

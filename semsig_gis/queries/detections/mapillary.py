@@ -165,7 +165,7 @@ def _varint(data: bytes, place: int) -> tuple[int, int]:
             return number, place
 
 
-def _values(message: Any, wanted: int) -> Iterator[Any]:  # noqa: ANN401 - bytes or a number
+def _values(message: Any, field: int) -> Iterator[Any]:  # noqa: ANN401 - bytes or a number
     """Give the values of one field of a protocol buffer message."""
     place = 0
     while place < len(message):
@@ -185,5 +185,5 @@ def _values(message: Any, wanted: int) -> Iterator[Any]:  # noqa: ANN401 - bytes
         else:
             msg = f"{kind} is no kind of value"
             raise ValueError(msg)
-        if key >> 3 == wanted:
+        if key >> 3 == field:
             yield value

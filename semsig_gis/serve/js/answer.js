@@ -138,6 +138,11 @@ semsig.Answer = class {
       L.circleMarker(scene.place, {radius: 9, color: dark, weight: 3, dashArray: "3 4", fill: false})
         .bindTooltip(`where the file of ${scene.name} has it`).addTo(drawn);
     }
+    if (session.near) {
+      const [lat, lng, radius] = session.near;
+      L.circle([lat, lng], {radius, color: dark, weight: 2, dashArray: "3 4", fill: false,
+        interactive: false}).addTo(drawn);
+    }
     if (session.truth) {
       L.circleMarker(session.truth, {
         radius: 15, color: semsig.pointed, weight: 4, fill: false, interactive: false,

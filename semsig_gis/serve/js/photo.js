@@ -227,6 +227,22 @@ semsig.camera = (session, photo) => {
     slider(line("Heading"), "heading", [0, 359], "°");
     slider(line("Give or take"), "heading_error", [1, 90], "°");
   }
+  // What is known of the place counts where the first photo was taken.
+  if (photo.place && session.viewOf(photo) === session.views[0]) {
+    const near = session.isNear(photo);
+    const label = L.DomUtil.create("label", "", box);
+    const tick = L.DomUtil.create("input", "", label);
+    Object.assign(tick, {type: "checkbox", id: "near", checked: near});
+    semsig.text(label, "span", "Use the photo's place");
+    const use = (metres) => {
+      session.near = tick.checked ? [...photo.place, metres] : null;
+      session.changed();
+    };
+    const error = semsig.number(line("give or take (metres)"), near ? session.near[2] : 50,
+      [1, 10000], use);
+    error.id = "near-metres";
+    tick.addEventListener("change", () => use(Number(error.value)));
+  }
   for (const note of photo.notes || []) semsig.text(box, "p", note);
   return box;
 };

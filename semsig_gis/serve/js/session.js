@@ -1,5 +1,5 @@
 // What was seen, and the answer to it: the state of the workbench, and its talk with the server.
-semsig.api = async (path, body) => {
+semsig.api = async (path, body, signal) => {
   const token = new URLSearchParams(location.search).get("token");
   const plain = body === undefined || body instanceof Blob;
   let response;
@@ -8,6 +8,7 @@ semsig.api = async (path, body) => {
       method: body === undefined ? "GET" : "POST",
       headers: {"X-Semsig-Token": token, ...(plain ? {} : {"Content-Type": "application/json"})},
       body: plain ? body : JSON.stringify(body),
+      signal,
     });
   } catch {
     throw new Error("The server does not answer; is semsig serve still running?");
@@ -20,14 +21,15 @@ semsig.api = async (path, body) => {
 semsig.Session = class extends EventTarget {
   constructor(city) {
     super();
-    Object.assign(this, {city, noise: null, seenFrom: "anywhere", brush: "?", asking: false});
+    Object.assign(this, {city, noise: null, seenFrom: "anywhere", brush: "?", asking: false,
+      page: crypto.randomUUID(), closer: null});
     this.clear();
   }
   // A view is of one place: of photos, or a compass. A scene is one of either.
   clear() {
     Object.assign(this, {
       views: [], scene: null, mark: null, answer: null, truth: null, chosen: 0, changedAt: 0,
-      absent: []});
+      absent: [], near: null});
   }
   get scenes() {
     return this.views.flatMap((view) => view.photos || [view]);
@@ -60,8 +62,13 @@ semsig.Session = class extends EventTarget {
     if (!view.photos?.length) this.views.splice(this.views.indexOf(view), 1);
     if (this.views.length) this.views[0].step = null;
     this.truth = null;
+    if (this.isNear(scene)) this.near = null;
     this.show(this.scenes.at(-1) ?? null);
     this.changed();
+  }
+  // Whether the first place is taken to be near that of a photo.
+  isNear({place}) {
+    return Boolean(place && this.near) && place.every((part, one) => part === this.near[one]);
   }
   tell(what) {
     this.dispatchEvent(new Event(what));
@@ -72,6 +79,7 @@ semsig.Session = class extends EventTarget {
   }
   askAgain() {
     this.changedAt = performance.now();
+    this.closer?.abort();
     this.ask();
   }
   body() {
@@ -83,9 +91,10 @@ semsig.Session = class extends EventTarget {
       : null;
     return {
       views, view, top: 10, seen_from: this.seenFrom, noise: this.noise, truth: this.truth,
-      absent: this.absent};
+      absent: this.absent, near: this.near};
   }
-  // One request at a time; what changes meanwhile is asked next, so that the last one wins.
+  // One request at a time; what changes meanwhile is asked next, so that the last one wins. Only
+  // an answer from close to, which takes long, is given up for it, by the server as well.
   async ask() {
     if (this.asking) return;
     this.asking = true;
@@ -97,17 +106,19 @@ semsig.Session = class extends EventTarget {
       const quick = asked !== this.changedAt;
       asked = this.changedAt;
       const question = this.views;
+      this.closer = quick ? null : new AbortController();
       let answer = {};
       try {
         if (this.scenes.some((scene) => (scene.marks || scene.compass).length)) {
-          answer = await (await semsig.api("answer", {...this.body(), quick})).json();
+          const body = {...this.body(), quick, page: this.page};
+          answer = await (await semsig.api("answer", body, this.closer?.signal)).json();
         }
       } catch (error) {
-        // Another page of this server asked meanwhile.
-        if (error.status === 409) asked = null;
+        if (this.closer?.signal.aborted) asked = null;
         answer = {error: error.message};
       }
       if (this.views !== question || asked === null) continue;
+      this.closer = null;
       Object.assign(this, {answer, chosen: 0, answeredAt: asked, first: quick});
       this.tell("answer");
     }
@@ -136,7 +147,7 @@ semsig.Session = class extends EventTarget {
     this.clear();
     Object.assign(this, {
       views: saved.views, truth: saved.truth, noise: saved.noise, seenFrom: saved.seen_from,
-      absent: saved.absent || []});
+      absent: saved.absent || [], near: saved.near ?? null});
     this.show(this.scenes[0] ?? null);
     this.changed();
   }

@@ -13,20 +13,16 @@ import contextlib
 import dataclasses
 import hashlib
 import json
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
+
+from filelock import lock_descriptor
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import whole_file
-
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -119,7 +115,7 @@ class Cache:
             )
             raise InputError(msg) from error
         with lock:
-            _wait_for(lock)  # closing releases it
+            lock_descriptor(lock.fileno())  # closing releases it
             yield self.entry(key)
 
 
@@ -204,15 +200,3 @@ def checksum(path: Path) -> str:
     """Return the SHA-256 of a file in hexadecimal digits."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _wait_for(lock: IO[bytes]) -> None:
-    """Wait until this open file holds the lock of its path."""
-    if sys.platform == "win32":
-        while True:
-            with contextlib.suppress(OSError):  # which msvcrt raises after ten seconds of trying
-                lock.seek(0)
-                msvcrt.locking(lock.fileno(), msvcrt.LK_LOCK, 1)
-                return
-    else:
-        fcntl.flock(lock, fcntl.LOCK_EX)

@@ -26,7 +26,8 @@ from semsig_gis.sources.conditions import as_text
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, feature_shape
 from semsig_gis.sources.parquet import column_names, read_parquet
 from semsig_gis.sources.raw_layer import WGS84, BadFeatureError, built_geometries, parse_crs
-from semsig_gis.sources.vector import DRIVERS, layer_fields, read_tables
+from semsig_gis.sources.vector import layer_fields, read_tables
+from semsig_gis.sources.vector.member import DRIVERS
 from semsig_gis.storage.toml import parse_toml
 
 if TYPE_CHECKING:
@@ -115,15 +116,15 @@ def table_layers(
         if unread:
             notes.append(f"{unread:,} rows have tags that cannot be read")
         for row, found in enumerate(tags):
-            wanted = index.layers(found)
-            if not wanted:
+            matches = index.layers(found)
+            if not matches:
                 continue
             position = table.positions[row]
             kind, number = names[row]
             kind = kind or _kind(position)
             name = f"{kind}/{number}" if number else ""
             full = _completed(found, kind, position, all_tags=all_tags)
-            for layer in wanted:
+            for layer in matches:
                 if name and (layer, name) in seen:
                     continue
                 seen.add((layer, name))
@@ -198,15 +199,17 @@ def _index() -> TagIndex:
 
 def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Iterator[FeatureTable]:
     """Yield the tables of a file, with the columns that matter."""
-    wanted = {*_keys(specs), *MAPS, *NAMES, WAY_NUMBER, CLASS, CODE}
-    wanted.update(name for pair in KINDS_AND_NUMBERS for name in pair)
+    column_set = {*_keys(specs), *MAPS, *NAMES, WAY_NUMBER, CLASS, CODE}
+    column_set.update(name for pair in KINDS_AND_NUMBERS for name in pair)
     if path.suffix.lower() in parquet.SUFFIXES:
-        frame = read_parquet(path, kind="features", columns=wanted)
+        frame = read_parquet(path, kind="features", columns=column_set)
         if frame.crs is None and crs is not None:
             frame = frame.set_crs(parse_crs(crs))
         yield frame_table(frame)
         return
-    for table in read_tables(path, lambda fields: wanted if holds_tags(fields) else (), crs=crs):
+    for table in read_tables(
+        path, lambda fields: column_set if holds_tags(fields) else (), crs=crs
+    ):
         rows = table.rows
         values = zip(*rows.values, strict=True) if rows.values else [()] * len(table.fields)
         columns = {

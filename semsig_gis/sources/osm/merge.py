@@ -46,13 +46,13 @@ def merge_extracts(
     that lacks the tags, or is deleted, the element does not count; of copies of one version, that
     with more nodes or members, as a file may be clipped; then that of the file given first.
     """
-    wanted = _wanted(files, index)
+    closure = _closure(files, index)
     best: dict[Name, tuple[int, int, int]] = {}
     for number, (path, file) in enumerate(files.items()):
         with readable(path):
             for element in _elements(file):
                 name = _name(element)
-                if name in wanted:
+                if name in closure:
                     rank = (element.version, _size(element), -number)
                     best[name] = max(rank, best.get(name, rank))
     # As text, because pyosmium's own writers end the process where a disk is full.
@@ -86,21 +86,21 @@ def _plain(text: str) -> str:
     return NOT_PLAIN.sub(lambda match: f"%{ord(match[0]):x}%", text)
 
 
-def _wanted(files: Mapping[Path, osmium.io.File], index: TagIndex) -> set[Name]:
+def _closure(files: Mapping[Path, osmium.io.File], index: TagIndex) -> set[Name]:
     """Return the elements that have the tags of a layer in any file, and those that they need."""
-    wanted: set[Name] = set()
+    closure: set[Name] = set()
     for path, file in files.items():
         with readable(path):
             for element in _elements(file, KeyFilter(*index.keys)):
                 if index.layers({tag.k: tag.v for tag in element.tags}):
-                    wanted.add(_name(element))
-                    wanted.update(_parts(element))
+                    closure.add(_name(element))
+                    closure.update(_parts(element))
     for path, file in files.items():
         with readable(path):
             for way in _elements(file, EntityFilter(WAY)):
-                if _name(way) in wanted:
-                    wanted.update(_parts(way))
-    return wanted
+                if _name(way) in closure:
+                    closure.update(_parts(way))
+    return closure
 
 
 def _elements(

@@ -72,7 +72,7 @@ def _address(client: Client) -> str:
         )
         raise CatalogError(msg)
     service = found[1]
-    wanted = client.dataset.rstrip("/").rpartition("/")[2] if found[2] else ""
+    layer = client.dataset.rstrip("/").rpartition("/")[2] if found[2] else ""
     try:
         root = client.json(Query(service, {"f": "json"}))
     except HttpError as error:
@@ -80,12 +80,12 @@ def _address(client: Client) -> str:
         msg = f"{msg}; correct `dataset` or `endpoints` in the catalogue."
         raise HttpError(msg, error.status) from error
     layers = {str(item["id"]): item["name"] for item in _tables(root)}
-    if not wanted and len(layers) == 1:
-        wanted = next(iter(layers))
-    number = next((n for n, name in layers.items() if wanted in {n, name}), None)
+    if not layer and len(layers) == 1:
+        layer = next(iter(layers))
+    number = next((n for n, name in layers.items() if layer in {n, name}), None)
     if number is None:
         listed = [f"{number} ({name})" for number, name in layers.items()]
-        raise client.unknown(listed, what="layer", name=wanted)
+        raise client.unknown(listed, what="layer", name=layer)
     return f"{service}/{number}"
 
 

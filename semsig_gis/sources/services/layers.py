@@ -246,10 +246,10 @@ class Download:
             return _read_vector(first, self.spec, filters=filters, crs=None)
         table = open_table(first)
 
-        def records(wanted: Sequence[str]) -> Iterator[Record | str]:
-            yield from table.records(wanted)
+        def records(names: Sequence[str]) -> Iterator[Record | str]:
+            yield from table.records(names)
             for path in others:
-                yield from open_table(path).records(wanted)
+                yield from open_table(path).records(names)
 
         whole = dataclasses.replace(table, records=records, rest=0)
         if self.fields:
@@ -301,7 +301,7 @@ def _read_table(
 def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None) -> RawLayer:
     layers = {info.name: info for info in vector_file.list_layers(path)}
     named = [layers[spec.layer]] if spec.layer in layers else list(layers.values())
-    fields = [field for info in named for field, _ in info.fields]
+    fields = [field for info in named for field in info.fields]
     layer = vector_file.read_layer(path, settle_fields(spec, fields), filters=filters, crs=crs)
     return dataclasses.replace(layer, spec=spec)
 

@@ -232,7 +232,7 @@ def _parquet(path: Path) -> Table:
     stated = metadata.get("columns", {}).get(primary, {}).get("crs")
     return Table(
         fields,
-        lambda wanted: _parquet_records(path, wanted, primary),
+        lambda columns: _parquet_records(path, columns, primary),
         has_geometry=primary is not None,
         crs=None if stated is None else _stated_crs(stated, path),
     )

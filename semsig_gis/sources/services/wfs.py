@@ -69,10 +69,10 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     names = {text.partition(";")[0].strip().lower(): text for text in reversed(said.formats)}
     json_format = next((text for kind, text in names.items() if kind in JSON_FORMATS), None)
     query = _query(client, "GetFeature").also(typeNames=name, srsName=SHORT if json_format else URN)
-    wanted = [field for field in client.fields(fields) if field in types]
+    properties = [field for field in client.fields(fields) if field in types]
     places = [field for field, kind in types.items() if kind.startswith("gml:")]
-    if wanted and places:
-        query = query.also(propertyName=",".join(dict.fromkeys([*wanted, *places])))
+    if properties and places:
+        query = query.also(propertyName=",".join(dict.fromkeys([*properties, *places])))
     order: dict[str, str | float] = {"outputFormat": json_format} if json_format else {}
     key = client.layer.id_field and find_field(client.layer.id_field, client.layer, fields)
     if key and key in types and not said.denies("ImplementsSorting"):
@@ -131,10 +131,10 @@ def _texts(element: ET.Element, name: str) -> list[str]:
 
 
 def _type_name(client: Client, said: _Capabilities) -> str:
-    wanted = client.dataset
-    names = [name for name in said.types if wanted in {name, name.rpartition(":")[2]}]
-    if wanted in names:
-        return wanted
+    dataset = client.dataset
+    names = [name for name in said.types if dataset in {name, name.rpartition(":")[2]}]
+    if dataset in names:
+        return dataset
     if len(names) != 1:
         raise client.unknown(said.types, what="feature type")
     return names[0]

@@ -138,7 +138,10 @@ class CitySpec:
 
 
 PARIS_LIKE = CitySpec(size=9690.0)
-"""A synthetic city with as many cells, and objects of each class in them, as the paper's Paris."""
+"""A synthetic city with as many cells, and objects of each class in them, as the paper's Paris.
+
+It is a square of 9,690 m.
+"""
 
 
 def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:

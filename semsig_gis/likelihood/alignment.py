@@ -1,0 +1,293 @@
+"""One-to-one associations of what is seen with what is there, as loops that are compiled.
+
+Each has a slow, obvious twin in the tests.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.jit import compiled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_TURN = 360.0
+_ROOT = math.sqrt(2.0 * math.pi)
+_REACH = 6.0  # deviations beyond which a detection is not taken for an object
+_LEAST = 1e-6  # weight of a pair against a miss and a false detection, from which it counts
+_WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
+_LARGE = 1e200  # from which on a product becomes a logarithm
+_SURE = 6.0  # from which on the error function is one
+# How often messages are sent, and the relative change at which they are taken for settled.
+_ROUNDS, _SETTLED = 30, 1e-2
+_PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
+
+
+@compiled
+def _mass(start: float, width: float, spread: float) -> float:
+    """Return how much of a wrapped normal distribution lies in a sector."""
+    start -= _TURN * math.floor(start / _TURN + 0.5)
+    scale = 1.0 / (spread * math.sqrt(2.0))
+    laps = 1 if spread < _WIDE else 3
+    total = 0.0
+    for lap in range(-laps - 1, laps + 1):
+        low = (start + _TURN * lap) * scale
+        high = low + width * scale
+        if low < _SURE and high > -_SURE:
+            total += math.erf(high) - math.erf(low)
+    return 0.5 * total
+
+
+@compiled
+def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
+    part: NDArray[np.int64],
+    offsets: NDArray[np.int64],
+    kinds: NDArray[np.int64],
+    bearing_units: NDArray[np.uint16],
+    distance_units: NDArray[np.uint8],
+    beyond: NDArray[np.bool_],
+    unit: float,
+    bearings: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    range_sigma: NDArray[np.float64],
+    own: NDArray[np.float64],
+    other: NDArray[np.float64],
+    density: NDArray[np.float64],
+    disc: NDArray[np.float64],
+    sectors: NDArray[np.float64],
+    width: float,
+    turns: NDArray[np.float64],
+    detected: NDArray[np.float64],
+    misnamed: NDArray[np.float64],
+    clutter: NDArray[np.float64],
+    seen: NDArray[np.float64],
+    left: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    blur: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    totals: NDArray[np.float64],
+) -> None:
+    """Sum over the one-to-one associations of a photo with what is seen from some places.
+
+    Fills `totals`, shape (models, places, turns), with log-likelihoods, for the places ``part[0]``
+    to ``part[1] - 1``. Objects of the places have
+    class rows `kinds` and bearings of `unit` degrees a unit; some are `beyond` the range. The
+    photo, turned by `turns`, shape (places, turns), has detections by `bearings`, `ranges` (NaN if
+    unknown) and, by model and class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round,
+    `width` of the turn. What speaks for a class is `own`, shape (k, n), and `other` if it is
+    misnamed, shape (models, k, n); `density` (models, n) is of false detections, in which `disc`
+    (n,) is that of the range. By model, `detected` and `misnamed` are by length and class,
+    `clutter` is the sum of false detections, and by class and distance unit `seen` and `left` are
+    the chances that what is in range of the place is seen by the observer, and that it has left the
+    range, and `sigma` the deviation of a bearing. `blur` is that of the observer's place in metres,
+    `distances` the metres
+    of a unit.
+    """
+    models, longest = detected.shape[0], detected.shape[1] - 1
+    size = len(bearings)
+    most = 0
+    for place in range(part[0], part[1]):
+        most = max(most, offsets[place + 1] - offsets[place])
+    pairs = most * size
+    ends = np.empty(most + 1, np.int64)  # the pairs of an object are ends[one]:ends[one + 1]
+    other_of = np.empty(pairs, np.int64)
+    weight = np.empty(pairs)
+    forth = np.empty(pairs)  # messages from the objects of the place to those of the query
+    back = np.empty(pairs)
+    at_right = np.empty(size)
+    floor = np.empty(size)
+    named = np.empty((most, size))
+    for place in range(part[0], part[1]):
+        low = offsets[place]
+        count = offsets[place + 1] - low
+        length = min(count, longest)
+        for model in range(models):
+            gone = 0.0
+            for one in range(size):
+                floor[one] = density[model, one]
+            for one in range(count):
+                kind = kinds[low + one]
+                wrong = misnamed[model, length, kind]
+                far = distance_units[low + one]
+                leaving = detected[model, length, kind] * left[model, kind, far]
+                if beyond[low + one]:
+                    leaving += detected[model, length, kind] * seen[model, kind, far]
+                gone += leaving
+                for two in range(size):
+                    name = (1.0 - wrong) * own[kind, two] + wrong * other[model, kind, two]
+                    named[one, two] = name
+                    # As many objects come into range as leave it, in any direction.
+                    floor[two] += leaving * name * disc[two] / _TURN
+            start = -(clutter[model] + gone) * width
+            for two in range(size):
+                start += math.log(floor[two])
+            for way in range(turns.shape[1]):
+                turn = turns[place, way]
+                total, unseen = start, 1.0
+                edges = 0
+                for one in range(count):
+                    ends[one] = edges
+                    if beyond[low + one]:
+                        continue
+                    kind, far = kinds[low + one], distance_units[low + one]
+                    bearing = (bearing_units[low + one] + 0.5) * unit
+                    spread = sigma[model, kind, far]
+                    chance = detected[model, length, kind] * seen[model, kind, far]
+                    inside = 1.0
+                    if len(sectors):
+                        inside = 0.0
+                        for sector in range(len(sectors)):
+                            inside += _mass(
+                                sectors[sector, 0] + turn - bearing,
+                                sectors[sector, 1] - sectors[sector, 0],
+                                spread,
+                            )
+                    missed = 1.0 - chance * inside
+                    unseen *= missed
+                    if unseen < 1.0 / _LARGE:
+                        total += math.log(unseen)
+                        unseen = 1.0
+                    if chance == 0.0:
+                        continue
+                    factor = chance / (missed * spread * _ROOT)
+                    reach = min(_REACH * spread, 180.0)
+                    away_m = distances[far]
+                    for two in range(size):
+                        away = bearings[two] + turn - bearing
+                        away -= _TURN * math.floor(away / _TURN + 0.5)
+                        if abs(away) > reach:
+                            continue
+                        near = math.exp(-0.5 * (away / spread) ** 2)
+                        if spread > _WIDE:
+                            for lap in range(1, 4):
+                                near += math.exp(-0.5 * ((away + _TURN * lap) / spread) ** 2)
+                                near += math.exp(-0.5 * ((away - _TURN * lap) / spread) ** 2)
+                        if not math.isnan(ranges[two]):
+                            error = math.hypot(range_sigma[model, kind, two], blur[model] / away_m)
+                            ratio = math.log(ranges[two] / away_m) / error
+                            near *= math.exp(-0.5 * ratio**2) / (error * _ROOT)
+                        value = factor * near * named[one, two] / floor[two]
+                        if value > _LEAST:
+                            other_of[edges] = two
+                            weight[edges] = value
+                            back[edges] = 1.0
+                            edges += 1
+                ends[count] = edges
+                # Belief propagation, as in `associate`; as a function of its own it is slower.
+                for _ in range(_ROUNDS):
+                    at_right[:] = 1.0
+                    for one in range(count):
+                        here = 1.0
+                        for edge in range(ends[one], ends[one + 1]):
+                            here += weight[edge] * back[edge]
+                        for edge in range(ends[one], ends[one + 1]):
+                            rest = max(here - weight[edge] * back[edge], 1.0)
+                            forth[edge] = weight[edge] / rest
+                            at_right[other_of[edge]] += forth[edge]
+                    settled = True
+                    for edge in range(edges):
+                        new = 1.0 / max(at_right[other_of[edge]] - forth[edge], 1.0)
+                        settled &= abs(new - back[edge]) < _SETTLED * new
+                        back[edge] = new
+                    if settled:
+                        break
+                product = unseen
+                for one in range(count):
+                    here = 1.0
+                    for edge in range(ends[one], ends[one + 1]):
+                        here += weight[edge] * back[edge]
+                    product *= here
+                    if product > _LARGE:
+                        total += math.log(product)
+                        product = 1.0
+                for two in range(size):
+                    product *= at_right[two]
+                    if product > _LARGE:
+                        total += math.log(product)
+                        product = 1.0
+                for edge in range(edges):
+                    product /= 1.0 + forth[edge] * back[edge]
+                    if product < 1.0 / _LARGE:
+                        total += math.log(product)
+                        product = 1.0
+                totals[model, place, way] = total + math.log(product)
+
+
+@compiled
+def mass_rows(
+    sigma: NDArray[np.float64], sectors: NDArray[np.float64], masses: NDArray[np.float32]
+) -> None:
+    """Fill `masses`, shape (groups, levels, bins), with the chance that a bearing is in sectors.
+
+    `sigma`, shape (groups, levels), is its deviation in degrees.
+    """
+    groups, levels, bins = masses.shape
+    for group in range(groups):
+        for level in range(levels):
+            for one in range(bins):
+                bearing = (one + 0.5) * _TURN / bins
+                total = 0.0
+                for part in range(len(sectors)):
+                    width = sectors[part, 1] - sectors[part, 0]
+                    total += _mass(sectors[part, 0] - bearing, width, sigma[group, level])
+                masses[group, level, one] = total
+
+
+@compiled
+def associate(  # noqa: C901, PLR0917
+    starts: NDArray[np.int64],
+    left: NDArray[np.int64],
+    right: NDArray[np.int64],
+    weight: NDArray[np.float64],
+    at_left: NDArray[np.float64],
+    at_right: NDArray[np.float64],
+    chance: NDArray[np.float64],
+    total: NDArray[np.float64],
+) -> None:
+    """Sum over the one-to-one associations of independent problems.
+
+    The pairs of problem i are ``starts[i]:starts[i + 1]``, each an object `left` and a detection
+    `right` with a weight of 0 or more; no two problems share one. `at_left` and `at_right` are
+    working memory. Fills `chance`, that a pair is one thing, and `total`, the logarithm of the sum
+    of each problem, in which the empty association counts as one.
+    """
+    back = np.ones(len(weight))
+    forth = np.empty(len(weight))
+    for problem in range(len(starts) - 1):
+        low, high = starts[problem], starts[problem + 1]
+        for _ in range(_PAIR_ROUNDS):
+            for edge in range(low, high):
+                at_left[left[edge]] = 1.0
+                at_right[right[edge]] = 1.0
+            for edge in range(low, high):
+                at_left[left[edge]] += weight[edge] * back[edge]
+            for edge in range(low, high):
+                rest = at_left[left[edge]] - weight[edge] * back[edge]
+                forth[edge] = weight[edge] / max(rest, 1.0)
+                at_right[right[edge]] += forth[edge]
+            change = 0.0
+            for edge in range(low, high):
+                new = 1.0 / max(at_right[right[edge]] - forth[edge], 1.0)
+                change = max(change, abs(new - back[edge]) / new)
+                back[edge] = new
+            if change < _PAIR_SETTLED:
+                break
+        # Each object and detection counts once, at the first of its pairs.
+        for edge in range(low, high):
+            at_left[left[edge]] = 1.0
+        for edge in range(low, high):
+            at_left[left[edge]] += weight[edge] * back[edge]
+        sums = 0.0
+        for edge in range(low, high):
+            pair = forth[edge] * back[edge]
+            chance[edge] = pair / (1.0 + pair)
+            sums -= math.log1p(pair)
+            for once in (at_left[left[edge]], at_right[right[edge]]):
+                sums += math.log(once)
+            at_left[left[edge]] = 1.0
+            at_right[right[edge]] = 1.0
+        total[problem] = sums

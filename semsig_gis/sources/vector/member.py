@@ -1,0 +1,178 @@
+"""The parts of a vector file, itself or the files in an archive, and whether they are sound."""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+import struct
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from semsig_gis.core.errors import SourceError
+from semsig_gis.sources import require_file
+from semsig_gis.sources.packed import bomb, swells
+
+CSV = "CSV"
+GEOJSON = "GeoJSON"
+SHAPEFILE = "ESRI Shapefile"
+CONTAINER = "GPKG"  # the one driver whose files hold several layers
+# The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
+DRIVERS = {
+    ".csv": CSV,
+    ".fgb": "FlatGeobuf",
+    ".geojson": GEOJSON,
+    ".gpkg": CONTAINER,
+    ".json": GEOJSON,
+    ".shp": SHAPEFILE,
+}
+# How their files begin, GeoJSON after white space.
+BEGINNINGS = {
+    "FlatGeobuf": b"fgb",
+    GEOJSON: b"{",
+    CONTAINER: b"SQLite format 3\0",
+    SHAPEFILE: b"\x00\x00\x27\x0a",
+}
+# In an archive beside other data, these hold a legend or metadata.
+SIDE_SUFFIXES = frozenset({".csv", ".json"})
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One layer of a file, or of the file `inner` of an archive; `layer` is None until known."""
+
+    file: Path
+    inner: str | None
+    layer: str | None = None
+
+    @property
+    def driver(self) -> str:
+        """GDAL's name of the one driver that may open it."""
+        return DRIVERS[Path(self.inner or self.file).suffix.lower()]
+
+    @property
+    def address(self) -> str:
+        """What GDAL opens."""
+        if self.inner is None:
+            file = str(self.file)
+            # pyogrio takes what stands before a '!' for an archive, but not in GDAL's own forms.
+            escaped = file.replace("%", "%25").replace("&", "%26")
+            return f"/vsicached?file={escaped}" if "!" in file else file
+        # GDAL's own form: zip:// is parsed as a URL and loses what follows a '#' or a '?'.
+        return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
+
+    def __str__(self) -> str:
+        """Return the name as messages say it."""
+        return str(self.file) if self.inner is None else f"{self.inner} in {self.file}"
+
+    def open(self) -> IO[bytes]:
+        """Return a stream of the bytes of the file."""
+        if self.inner is None:
+            return self.file.open("rb")
+        with zipfile.ZipFile(self.file) as archive:
+            return archive.open(self.inner)
+
+    def beside(self, suffix: str) -> Member:
+        """Return the file of the same name with another suffix."""
+        if self.inner is None:
+            return Member(self.file.with_suffix(suffix), None)
+        return Member(self.file, str(PurePosixPath(self.inner).with_suffix(suffix)))
+
+    def require_sound(self) -> None:
+        """Raise SourceError for content of another kind, which another driver would open."""
+        try:
+            with self.open() as stream:
+                start = stream.read(4096)
+        except OSError as error:
+            raise unreadable(self, error) from error
+        if self.driver == GEOJSON:
+            start = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+        if not start.startswith(BEGINNINGS[self.driver]):
+            raise not_of_its_kind(self)
+        if self.driver == CONTAINER and self.inner is None:
+            _refuse_damaged(self.file)
+
+
+def not_of_its_kind(what: object) -> SourceError:
+    """Return the plain sentence for a file whose content belies its name."""
+    return SourceError(f"{what} is not the kind of file that its name says; get it again.")
+
+
+def unreadable(what: object, error: BaseException) -> SourceError:
+    """Return the plain sentence for what a library raised on opening something."""
+    if isinstance(error, UnicodeDecodeError):
+        return SourceError(f"{what} is not UTF-8 text; save it as UTF-8.")
+    cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
+    if "not recognized" in cause:
+        return not_of_its_kind(what)
+    return SourceError(f"{what} cannot be read ({cause}); it may be damaged, get it again.")
+
+
+def members(path: Path) -> tuple[Member, ...]:
+    """Return the parts of a file that hold layers: itself, or the vector files in an archive."""
+    suffix = path.suffix.lower()
+    require_file(path, "a vector file")
+    suffixes = {*DRIVERS, ".zip"}
+    if suffix not in suffixes:
+        msg = f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
+        raise SourceError(msg)
+    inner = _archived(path) if suffix == ".zip" else (None,)
+    return tuple(Member(path, name) for name in inner)
+
+
+# What zipfile raises at damaged archives.
+_ZIP_FAULTS = (
+    *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
+    *(struct.error, zipfile.BadZipFile, zlib.error),
+)
+
+
+def _archived(path: Path) -> tuple[str, ...]:
+    """Return the names of the vector files in an archive whose checksums hold."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            items = [item for item in archive.infolist() if not item.is_dir()]
+            for item in items:
+                if swells(item.compress_size, item.file_size):
+                    what = f"{item.filename} in {path}"
+                    raise bomb(what)
+            names = [item.filename for item in items]
+            broken = archive.testzip()
+    except SourceError:
+        raise
+    except _ZIP_FAULTS as error:
+        raise unreadable(path, error) from error
+    if broken is not None:
+        msg = f"archive {path} is damaged at {broken}; get it again."
+        raise SourceError(msg)
+    usable = [
+        name
+        for name in names
+        if Path(name).suffix.lower() in DRIVERS and not name.startswith("__MACOSX/")
+    ]
+    if not usable:
+        msg = (
+            f"archive {path} holds no vector file, only {', '.join(names) or 'nothing'}; "
+            f"one of {', '.join(sorted(DRIVERS))} is needed."
+        )
+        raise SourceError(msg)
+    data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
+    return tuple(data or usable)
+
+
+def _refuse_damaged(path: Path) -> None:
+    """Refuse a damaged GeoPackage, of which GDAL says things at which its readers crash."""
+    try:
+        with contextlib.closing(
+            sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
+        ) as f:
+            found = f.execute("PRAGMA quick_check(1)").fetchone()[0]
+    except UnicodeDecodeError:
+        found = "a name in it is not UTF-8 text"
+    except sqlite3.Error as error:
+        found = str(error)
+    if found != "ok":
+        msg = f"{path} cannot be read ({' '.join(found.split())}); it may be damaged, get it again."
+        raise SourceError(msg)

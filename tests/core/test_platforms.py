@@ -1,0 +1,78 @@
+"""What systems other than Linux lack, taken away here (see the table in docs/reliability.md)."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from typing import TYPE_CHECKING, NoReturn
+
+import filelock
+import pytest
+
+from semsig_gis import open_cache
+from semsig_gis.core.memory import address_space_left
+from semsig_gis.core.scratch import own_folder
+from semsig_gis.core.threads import cores
+from semsig_gis.storage.whole import alone_in, exchanged, whole_folder
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_without_affinity_all_processors_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    assert cores() == os.cpu_count()
+
+
+def test_without_limits_of_memory_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert address_space_left() is None
+
+
+def test_without_locks_folders_are_made_and_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_locks(*_: object, **__: object) -> NoReturn:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(filelock, "lock_descriptor", no_locks)
+    with own_folder(tmp_path) as one, own_folder(tmp_path) as two:
+        assert {*tmp_path.iterdir()} == {one, two}
+    assert list(tmp_path.iterdir()) == []
+    with alone_in(tmp_path) as alone:
+        assert not alone
+
+
+def test_where_folders_cannot_be_opened_nobody_is_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> NoReturn:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(os, "open", refuse)
+    with alone_in(tmp_path) as alone:
+        assert not alone
+
+
+def test_without_exchange_a_folder_is_replaced_in_two_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert not exchanged(tmp_path, tmp_path)
+    for text in ("old", "new"):
+        with whole_folder(tmp_path / "city") as folder:
+            (folder / "a.txt").write_text(text)
+    assert (tmp_path / "city" / "a.txt").read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["city"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="its cache folder is elsewhere")
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "HOME"])
+def test_downloads_are_kept_where_the_system_keeps_them(
+    variable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv(variable, str(tmp_path))
+    expected = tmp_path if variable == "XDG_CACHE_HOME" else tmp_path / ".cache"
+    assert open_cache()[0].folder == expected / "semsig"
