@@ -1,21 +1,52 @@
 """Configuration of the documentation, built with ``make docs``."""
 
+import os
+import sys
+from pathlib import Path
+
 import semsig_gis
+
+sys.path.insert(0, str(Path(__file__).parent))  # where the modules of the build are
+from gallery import package_hash
+
+# For the commands that the tutorial and the gallery run.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 
 project = "semsig_gis"
 author = "semsig_gis authors"
 project_copyright = "2026, semsig_gis authors"
 version = release = semsig_gis.__version__
 
-extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
+extensions = [
+    "alternatives",
+    "myst_nb",
+    "numpydoc",
+    "pages",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+]
 exclude_patterns = ["_build"]
-templates_path = ["_templates"]
 default_role = "py:obj"
+nitpicky = True
+smartquotes = False  # would make a dash of the two hyphens of an option
+nitpick_ignore_regex = [("py:obj", ".*")]  # in docstrings, names of parameters, too
+
+myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist"]
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(Path(__file__).parent / "_build/notebooks" / package_hash())
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
 
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
 autodoc_typehints = "none"  # the docstrings say the types, with shapes and units
 numpydoc_show_class_members = False  # autodoc lists them
 
 html_extra_path = ["../data_sources/catalog.schema.json"]  # editors ask for it
-html_theme = "alabaster"
-html_theme_options = {"description": "Semantic signatures from open data"}
+html_theme = "furo"
+html_title = "semsig_gis"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False

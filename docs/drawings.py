@@ -1,0 +1,163 @@
+"""The figures of the site, drawn by the build from the results of the benchmarks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import semsig_gis as sg
+from semsig_gis.reports.plots import COLOURS, blank_figure, saved
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from semsig_gis.reports.plots import Picture
+
+RESULTS = Path(__file__).resolve().parents[1] / "benchmarks"
+FOUND, RECALL = "P(error ≤ 50 m)", "recall@10 %"
+SHORT = {"types": "types", "angles": "angles", "types and angles, 5 %": "both"}
+FEWEST = 25  # queries, of which a share says something
+LEVELS = ("light", "medium", "strong")
+RIVALS = {
+    "the paper's best method": "edit+edit:5%, order kept",
+    "likelihood": "likelihood, noise generic, re-ranked",
+}
+
+
+def drawings() -> Iterable[sg.Plot]:
+    """Yield what is drawn; its files are called by its name."""
+    rows = _results("reproduction.json")
+    ranges = {f"R = {metres} m": metres for metres in (20, 30, 40)}
+    scales = {f"Q = {levels}": levels for levels in (8, 16, 24, 32)}
+    for name, section, places, title, x_label in (
+        ("ranges", "ranges", ranges, "How far one sees", "visibility range (m)"),
+        ("scales", "scales", scales, "How exactly bearings are told", "angle levels"),
+    ):
+        yield _beside(rows, name, section=section, places=places, title=title, x_label=x_label)
+    for city in ("Paris-like", "Montpellier"):
+        yield _rivals(_results("accuracy.json"), city)
+    yield _chances(_results("chances.json"))
+
+
+def _results(name: str) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = json.loads((RESULTS / name).read_text(encoding="utf-8"))
+    return rows
+
+
+def _beside(
+    rows: Sequence[dict[str, Any]],
+    name: str,
+    *,
+    section: str,
+    places: dict[str, int],
+    title: str,
+    x_label: str,
+) -> sg.Plot:
+    """Return how often the paper's best method is right, ours beside the paper's figures."""
+    found = {
+        row["row"]: row for row in rows if row["section"] == section and row["column"] == FOUND
+    }
+    chosen = [(places[key], found[key]) for key in places]
+    return sg.Plot(
+        name=name,
+        title=f"{title}: queries placed within 50 m",
+        x_label=x_label,
+        y_label="share within 50 m",
+        curves=(_curve("ours", chosen, "ours", "low", "high"),),
+        paper=tuple((x, row["paper"], f"{row['paper']:.4f}") for x, row in chosen),
+        y_range=(0.0, 0.6),
+    )
+
+
+def times() -> Picture:
+    """Draw the milliseconds of a query by method, ours and the paper's, as bars."""
+    rows = [row for row in _results("reproduction.json") if row["section"] == "times"]
+    names = [f"{row['row']}, {SHORT[row['column']]}" for row in rows]
+    places = np.arange(len(rows))[::-1]
+    title = "Time of one query among about 312,000 cells"
+    with blank_figure(6.6, 4.4) as figure:
+        axes = figure.add_axes((0.4, 0.17, 0.55, 0.74))
+        for whose, shift, colour in (("paper", 0.2, COLOURS[1]), ("ours", -0.2, COLOURS[0])):
+            widths = [row[whose] for row in rows]
+            axes.barh(places + shift, widths, height=0.38, color=colour, label=whose)
+            for place, width in zip(places, widths, strict=True):
+                axes.text(1.1 * width, place + shift, f"{width:,.1f}", va="center", size=7.5)
+        axes.set(xscale="log", xlim=(0.5, 6000), xlabel="milliseconds", yticks=places)
+        axes.set_yticklabels(names)
+        axes.set_xticks(ticks := [1, 10, 100, 1000], [f"{tick:,}" for tick in ticks])
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
+        figure.text(0.02, 0.95, title, weight="bold", size=10.5)
+        pairs = zip(names, rows, strict=True)
+        told = (f"{name}: {row['ours']:.1f}, the paper {row['paper']:g}" for name, row in pairs)
+        return saved(figure, title=title, description=f"{title}, in ms. {'; '.join(told)}.")
+
+
+def _rivals(rows: Sequence[dict[str, Any]], city: str) -> sg.Plot:
+    """Return how often two methods place the same queries, by how badly these are spoiled."""
+    setting = "north known; on the grid"
+    found = {
+        (row["method"], row["distortion"]): row
+        for row in rows
+        if row["city"] == city and row["setting"] == setting and row["coverage"] is None
+    }
+    curves = tuple(
+        _curve(
+            label,
+            [(place, found[method, level]) for place, level in enumerate(LEVELS, 1)],
+            *("p50", "p50_low", "p50_high"),
+        )
+        for label, method in RIVALS.items()
+    )
+    errors = ("1 error", "7 errors", "13 errors")
+    return sg.Plot(
+        name=f"rivals-{city.lower()}",
+        title=f"{city}: queries placed within 50 m, by what the detector got wrong",
+        x_label="errors of the detector in one query",
+        y_label="share within 50 m",
+        curves=curves,
+        ticks=tuple(enumerate(errors, 1)),
+    )
+
+
+def _chances(rows: Sequence[dict[str, Any]]) -> sg.Plot:
+    """Return how often stated chances come true, on maps of the day."""
+    curves = tuple(
+        _curve(
+            row["city"],
+            [(part["stated"], part) for part in row["bins"] if part["n"] >= FEWEST],
+            *("true", "low", "high"),
+        )
+        for row in rows
+        if row["map"] == "of the day"
+    )
+    return sg.Plot(
+        name="chances",
+        title="Stated chances, and how often they come true",
+        x_label="chance stated to be within 50 m (mean of a tenth)",
+        y_label="share within 50 m",
+        curves=curves,
+        diagonal=True,
+    )
+
+
+def _curve(
+    label: str, rows: Iterable[tuple[float, dict[str, Any]]], y: str, low: str, high: str
+) -> sg.Curve:
+    xs, found = zip(*rows, strict=True)
+    values = ([row[key] for row in found] for key in (y, low, high))
+    ys, lows, highs = (tuple(column) for column in values)
+    return sg.Curve(label=label, x=tuple(xs), y=ys, low=lows, high=highs)
+
+
+def write_drawings(folder: Path) -> None:
+    """Draw all into a folder; a file that is the same is left."""
+    folder.mkdir(exist_ok=True)
+    pictures = {plot.name: sg.draw_plot(plot) for plot in drawings()} | {"times": times()}
+    for name, picture in pictures.items():
+        path, svg = folder / f"{name}.svg", picture.svg
+        if not path.is_file() or path.read_bytes() != svg:
+            path.write_bytes(svg)

@@ -1,0 +1,218 @@
+"""The pages that the build writes before it reads any: commands, public names, notebooks."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import re
+import shutil
+from collections import defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from docutils import nodes
+from drawings import write_drawings
+from gallery import write_gallery
+from PIL import Image
+
+import semsig_gis
+from semsig_gis.cli.commands import app as semsig
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from sphinx.application import Sphinx
+
+ROOT = Path(__file__).resolve().parents[1]
+WRITTEN = ("api", "commands", "notebooks")
+NOTES = re.compile(r"\s*\[([^\[\]]+)\]$")
+# What the theme leaves out, and who cannot see or has no mouse needs.
+NAMED = {
+    '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Site">',
+    '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
+    'role="heading">': 'role="heading" aria-level="2">',
+    '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
+    '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
+}
+COLOURS = 128  # enough for figures and maps
+RANGE = re.compile(r"(\S+)<=x<=(\S+)")
+COMMANDS = """# Commands
+
+Every step is one command. `semsig COMMAND --help` prints what these pages say.
+"""
+API = """# Python names
+
+Every public name is imported from `semsig_gis`, whichever package defines it. What a module holds
+beside it may change without notice.
+
+```python
+import semsig_gis as sg
+```
+
+The examples begin from `demo_objects` and `demo_database`: the street objects of a made-up town of
+300 m, and the signatures of its cells.
+"""
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages when the build begins, and the maps of the gallery when it ends."""
+    app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir)))
+    app.connect("builder-inited", lambda app: write_drawings(Path(app.srcdir, "drawn")))
+    app.connect("build-finished", _finish)
+    app.connect("html-page-context", _lighten)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _finish(app: Sphinx, error: Exception | None) -> None:
+    """Name the parts of the pages that were written, lighten pictures, and draw the maps."""
+    for path in Path(app.outdir).rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        named = text
+        for part, name in NAMED.items():
+            named = named.replace(part, name)
+        if named != text:
+            path.write_text(named, encoding="utf-8")
+    for path in Path(app.outdir, "_images").glob("*.png"):
+        with Image.open(path) as picture:
+            if picture.mode != "P":
+                picture.convert("RGB").quantize(COLOURS).save(path, optimize=True)
+    if error is None and app.config.nb_execution_mode != "off":
+        write_gallery(Path(app.outdir, "gallery"))
+
+
+def _lighten(*event: Any) -> None:  # noqa: ANN401
+    """Leave out the style of notebooks, which is large, where there is none."""
+    *_, context, doctree = event
+    parts = () if doctree is None else doctree.findall(nodes.Element)
+    if not any("cell" in part["classes"] for part in parts):
+        styles = context["css_files"]
+        context["css_files"] = [one for one in styles if "mystnb" not in str(one.filename)]
+
+
+def write_pages(docs: Path) -> None:
+    """Write the folders of `WRITTEN`; a page that is the same is left, and so not read again."""
+    pages = {
+        **{f"commands/{name}.md": text for name, text in command_pages()},
+        **{f"api/{name}.md": text for name, text in api_pages()},
+        "notebooks/index.md": notebooks_page(),
+    }
+    notebooks = {f"notebooks/{path.name}": path for path in ROOT.glob("notebooks/*.ipynb")}
+    pages |= {name: path.read_text(encoding="utf-8") for name, path in notebooks.items()}
+    for folder in WRITTEN:
+        for path in docs.glob(f"{folder}/*"):
+            if path.relative_to(docs).as_posix() not in pages:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+    for name, text in pages.items():
+        path = docs / name
+        path.parent.mkdir(exist_ok=True)
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def listed(head: str, entries: Mapping[str, tuple[str, str]]) -> str:
+    """Return a page with a row for each page beside it: what it is called, and a line of it."""
+    rows = [f"| [`{name}`]({page}.md) | {marked(line)} |" for page, (name, line) in entries.items()]
+    table = "\n".join(["| Name | What it does |", "| --- | --- |", *rows])
+    pages = "\n".join(entries)
+    return f"{head}\n{table}\n\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
+
+
+# --- Commands ---------------------------------------------------------------------------------
+
+
+def command_pages() -> Iterable[tuple[str, str]]:
+    """Yield the name and the text of the page of every command, and of their list."""
+    group: Any = typer.main.get_command(semsig)
+    lines = {name: one.help.partition("\n")[0] for name, one in group.commands.items()}
+    yield "index", listed(COMMANDS, {name: (f"semsig {name}", lines[name]) for name in lines})
+    for name, command in group.commands.items():
+        yield name, command_page(f"semsig {name}", command)
+
+
+def command_page(name: str, command: Any) -> str:  # noqa: ANN401
+    """Return the page of a command, with an address for each of its options."""
+    context = command.make_context(name, [], resilient_parsing=True)
+    usage = command.get_usage(context).removeprefix("Usage: ")
+    parts = [
+        f"# `{name}`\n\n{marked(command.help)}\n",
+        f"```text\n{' '.join(usage.split())}\n```\n\n```{{program}} {name}\n```\n",
+    ]
+    headings = {"argument": "Arguments", "option": "Options"}
+    for parameter in command.get_params(context):
+        heading = headings.pop(parameter.param_type_name, None)
+        if heading:
+            parts.append(f"## {heading}\n")
+        written, said = parameter.get_help_record(context)
+        option = written.replace(" / ", ", ")
+        parts.append(f"````{{option}} {option}\n{described(said)}\n````\n")
+    return "\n".join(parts)
+
+
+def described(said: str) -> str:
+    """Return what is said of an option, and in a line of its own what it takes by default."""
+    notes: list[str] = []
+    while found := NOTES.search(said):
+        said = said[: found.start()]
+        notes[:0] = [RANGE.sub(r"from \1 to \2", note) for note in found[1].split("; ")]
+    lines = [note[0].upper() + note[1:] for note in notes]
+    return marked(said) + "".join(f"\n\n*{marked(line)}.*" for line in lines)
+
+
+def marked(text: str) -> str:
+    """Return plain text as Markdown; what is between backticks stays."""
+    parts = text.split("`")
+    parts[::2] = [re.sub(r"([\\*_<>\[\]|#{}~$])", r"\\\1", part) for part in parts[::2]]
+    return "`".join(parts)
+
+
+# --- Public names -----------------------------------------------------------------------------
+
+
+def public_names() -> dict[str, list[str]]:
+    """Return the public names by the package that defines them, in the order of the flow."""
+    stub = ROOT / "semsig_gis/__init__.pyi"
+    names: defaultdict[str, list[str]] = defaultdict(list)
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names[node.module.partition(".")[0]] += [one.name for one in node.names]
+    return names
+
+
+def api_pages() -> Iterable[tuple[str, str]]:
+    """Yield the name and the text of the page of every package, and of their list."""
+    packages = public_names()
+    yield "index", listed(API, {one: (one, package_line(one)) for one in packages})
+    for package, names in packages.items():
+        yield package, api_page(package, names)
+
+
+def package_line(package: str) -> str:
+    """Return the first line of the docstring of a package."""
+    module = importlib.import_module(f"semsig_gis.{package}")
+    return (module.__doc__ or "").partition("\n")[0]
+
+
+def api_page(package: str, names: list[str]) -> str:
+    """Return the page of a package: its public names in brief, then each in full."""
+    lines = [".. currentmodule:: semsig_gis", "", ".. autosummary::", ""]
+    lines += [f"   {name}" for name in names]
+    for name in names:
+        one = getattr(semsig_gis, name)
+        if inspect.isclass(one):
+            lines += ["", f".. autoclass:: {name}", "   :members:"]
+        else:
+            lines += ["", f".. auto{'function' if callable(one) else 'data'}:: {name}"]
+    rst = "\n".join(lines)
+    return f"# `{package}`\n\n{package_line(package)}\n\n```{{eval-rst}}\n{rst}\n```\n"
+
+
+# --- Notebooks --------------------------------------------------------------------------------
+
+
+def notebooks_page() -> str:
+    """Return the list of the notebooks, with those beside it as its pages."""
+    text = (ROOT / "notebooks/README.md").read_text(encoding="utf-8")
+    names = "\n".join(sorted(path.name for path in ROOT.glob("notebooks/*.ipynb")))
+    return f"{text}\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"

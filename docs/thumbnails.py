@@ -1,0 +1,63 @@
+"""Take the pictures of maps that the site shows, in Chromium: ``python docs/thumbnails.py``.
+
+Those of the gallery are of what ``make docs`` wrote. ``--hero MAP`` takes the picture of the first
+page instead, of a map that ``semsig map city.parquet --ambiguity`` drew of Montpellier.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from PIL import Image
+from selenium import webdriver
+
+DOCS = Path(__file__).resolve().parent
+GALLERY, IMAGES = DOCS / "_build/html/gallery", DOCS / "images"
+HERO = IMAGES / "hero.webp"
+HERO_SIZE, THUMBNAIL_SIZE = (1280, 640), (900, 600)
+THUMBNAIL_WIDTH = 450
+QUALITY = 72
+SETTLED_S = 4.0  # until what moves and fades is at rest
+
+
+def main() -> None:
+    """Read the options, and take the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hero", type=Path, metavar="MAP")
+    hero = parser.parse_args().hero
+    if hero is not None:
+        pages = [(hero, HERO, HERO_SIZE, HERO_SIZE[0])]
+    else:
+        pages = [
+            (page, IMAGES / f"gallery/{page.stem}.webp", THUMBNAIL_SIZE, THUMBNAIL_WIDTH)
+            for page in sorted([*GALLERY.glob("*.html"), *GALLERY.glob("*.svg")])
+        ]
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if chromium is None or driver is None:
+        sys.exit("Chromium and its driver are not on this machine.")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for switch in ("headless=new", "no-sandbox", "disable-dev-shm-usage", "hide-scrollbars"):
+        options.add_argument(f"--{switch}")
+    service = webdriver.ChromeService(executable_path=driver)
+    browser = webdriver.Chrome(options=options, service=service)
+    for page, target, (across, down), width in pages:
+        screen = {"width": across, "height": down, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+        browser.get(page.resolve().as_uri())
+        time.sleep(SETTLED_S)
+        taken = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
+        height = round(taken.height * width / taken.width)
+        target.parent.mkdir(exist_ok=True)
+        taken.resize((width, height), Image.Resampling.LANCZOS).save(target, quality=QUALITY)
+        print(f"{target.relative_to(DOCS)}: {target.stat().st_size / 1000:.0f} kB")  # noqa: T201
+    browser.quit()
+
+
+if __name__ == "__main__":
+    main()
