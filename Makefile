@@ -9,27 +9,56 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c c
 FRAME := pyproject.toml constraints.txt hatch_build.py $(wildcard */assets/manifest.toml)
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
+RELEASE := $(VENV)/.release
+TESTS := $(BIN)/python -m pytest -n auto --dist worksteal
 BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint bench accuracy views bayes chances reproduce golden soak walks docs pictures plugin clean
+.PHONY: help demo test coverage busy test-all oldest size lint bench accuracy views bayes chances reproduce golden soak stranger walks docs pictures plugin dist clean
 
 help: ## show this list
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
 
 demo: $(RUNTIME) ## the embedded city end to end, into demo/: database, evaluation, map, GeoPackage
 	$(BIN)/semsig demo --out demo
 
-test: $(DEV) ## the whole test suite on all processors, with coverage
-	$(BIN)/python -m pytest -n auto --dist loadfile --cov --cov-report=term:skip-covered
+test: $(DEV) ## the whole test suite on all processors
+	$(TESTS)
 
-lint: $(DEV) ## style, types, import layers, docstrings, browser code
+coverage: $(DEV) ## the same, and whether it runs enough of the lines
+	$(TESTS) --cov --cov-report=term:skip-covered
+
+busy: $(DEV) ## the same beside six busy processes, because no test depends on time
+	$(BIN)/python -m benchmarks.busy $(TESTS)
+
+test-all: $(DEV) ## what is installed, over Pythons, dependencies and archives: hours
+	PATH="$$(printf '%s:' $$HOME/.pyenv/versions/*/bin)$$PATH" $(BIN)/nox -s matrix
+
+oldest: $(DEV) ## what test-all calls oldest, into constraints-oldest.txt
+	$(BIN)/nox -s oldest
+
+size: ## the megabytes and seconds that the plain installation takes
+	$(PYTHON) -m benchmarks.installed
+
+lint: $(DEV) ## style, types, import layers, dead code, spelling, dependencies, browser code
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/numpydoc lint $$(find semsig_gis -name '*.py')
+	$(BIN)/vulture
+	$(BIN)/codespell
+	$(BIN)/deptry semsig_gis
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	.ci/audit $(BIN)/python constraints.txt
+	$(BIN)/bandit --quiet --recursive qgis_plugin/semsig
+	$(BIN)/flake8 --max-line-length 120 qgis_plugin/semsig
+	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*
+	$(BIN)/zizmor --quiet --offline --min-confidence medium .github/workflows
+	$(BIN)/hadolint Dockerfile
 	@if command -v npx >/dev/null; then \
 		echo 'npx $(BIOME) lint'; \
 		npx --yes --prefer-offline $(BIOME) lint --error-on-warnings; \
@@ -41,6 +70,7 @@ lint: $(DEV) ## style, types, import layers, docstrings, browser code
 bench: $(DEV) ## the benchmarks
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.tables
+	$(BIN)/python -m benchmarks.history
 
 accuracy: $(DEV) ## how well the methods localize: figures, an hour
 	$(BIN)/python -m benchmarks.accuracy
@@ -63,8 +93,9 @@ reproduce: $(DEV) ## the paper's experiments, into reproduction/: report and fig
 	mv reproduction.json benchmarks/reproduction.json
 	$(BIN)/python -m benchmarks.tables
 
-docs: $(DEV) ## the documentation, into docs/_build/html
+docs: $(DEV) ## the site, into docs/_build/html, with all that it shows run; then its checks
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+	SEMSIG_SITE=docs/_build/html $(BIN)/python -m pytest -q tests/project/test_site.py
 
 golden: $(DEV) ## what must not change, into golden/: outputs and files of all commands
 	$(BIN)/python -m benchmarks.golden golden
@@ -73,6 +104,9 @@ soak: $(DEV) ## kill, starve and damage everything, some thousand times: half an
 	$(BIN)/python -m benchmarks.soak
 	$(BIN)/python -m benchmarks.tables
 
+stranger: $(DEV) ## the commands of the README on a bare machine, from clone to map, timed
+	$(BIN)/python -m benchmarks.stranger
+
 walks: $(DEV) ## the functions and modules that a row of trees and a query cross
 	$(BIN)/python -m benchmarks.walks
 
@@ -80,11 +114,14 @@ pictures: $(DEV) ## every kind of map in a browser, light and dark, desk and pho
 	$(BIN)/python -m benchmarks.pictures
 
 plugin: ## the QGIS plugin, into dist/: a zip file to install
-	$(PYTHON) qgis_plugin/package.py dist
+	$(PYTHON) qgis_plugin/package.py dist $(if $(SEMSIG_EMAIL),--email $(SEMSIG_EMAIL))
+
+dist: $(RELEASE) ## a release, into dist/: built twice, checked, installed offline, with its hashes
+	.ci/dist $(BIN)
 
 clean: ## remove .venv and everything that the targets write
-	rm -rf $(VENV) demo golden pictures reproduction reproduction.json build dist docs/_build docs/generated htmlcov .coverage .coverage.* \
-		.hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) demo golden pictures reproduction reproduction.json build dist docs/_build docs/api docs/commands docs/notebooks htmlcov .coverage .coverage.* \
+		.hypothesis .import_linter_cache .nox .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The demonstration needs no tools, so it has a smaller set-up of its own.
@@ -94,6 +131,10 @@ $(RUNTIME): $(FRAME) | $(BIN)/python
 
 $(DEV): $(FRAME) | $(BIN)/python
 	$(INSTALL) -e '.[dev]'
+	@touch $(RUNTIME) $@
+
+$(RELEASE): $(FRAME) | $(BIN)/python
+	$(INSTALL) -e '.[release]'
 	@touch $(RUNTIME) $@
 
 $(BIN)/python:

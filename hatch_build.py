@@ -1,16 +1,22 @@
-"""Build hook: brings the pinned map files (Leaflet, jQuery, heat layer) with ``npm pack``.
+"""Build hooks: the pinned map files (Leaflet, jQuery), and the metadata that depends on a build.
 
-A map can then be opened without a network. The build never depends on it: where ``npm`` is
-absent, the download fails or a file has the wrong SHA-256, the hook says so in one line and the
-package is built without the files; its maps then link them.
+A map can be opened without a network when the package carries the files, which are brought with
+``npm pack``. The build never depends on it: where ``npm`` is absent, the download fails or a file
+has the wrong SHA-256, one line says so and the package is built without the files; its maps then
+link them. The metadata has the licences of what the package carries, and, where the environment
+variable ``SEMSIG_REPOSITORY`` is the address of the project, all addresses.
 """
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import json
 import os
+import re
 import shutil
 import subprocess
+import sys
 import tarfile
 import tempfile
 import tomllib
@@ -18,42 +24,125 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
-__all__ = ["AssetsBuildHook", "AssetsError", "bring_assets"]
+__all__ = [
+    "AssetsBuildHook",
+    "AssetsError",
+    "ReleaseMetadataHook",
+    "absolute_links",
+    "bring_assets",
+]
 
 ASSETS = Path("semsig_gis", "assets")
 TEST_ASSETS = Path("tests", "assets")
 NPM_SECONDS = 120
+PAPER = "https://doi.org/10.1007/s11042-020-08992-6"
+# Where a link or a picture of a page in Markdown or HTML points to, if it is beside the page.
+_BESIDE = re.compile(r"""(\]\(|\b(?:src|href)=["'])(?![a-z]+:|[#/])([^)\s"'#]+)""")
 
 
 class AssetsError(Exception):
     """The files could not be brought; the message is one line."""
 
 
-class AssetsBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its parameter is private to hatchling
-    """Put the files of the manifest beside it before the wheel or sdist is made."""
+class ReleaseMetadataHook(MetadataHookInterface):
+    """Say what a package holds and where its project is."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
-        """Bring the files; a failure is a warning, never an error.
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Bring the map files, and set their licences, the addresses and the README.
+
+        Parameters
+        ----------
+        metadata : dict
+            The table ``[project]``; in an unpacked sdist, with what that was built with.
+
+        Raises
+        ------
+        ValueError
+            If ``SEMSIG_REPOSITORY`` is not an address.
+        """
+        root = Path(self.root)
+        _bring(root / ASSETS, "Maps will link Leaflet instead of containing it")
+        packages = _carried(root / ASSETS)
+        metadata["license"] = " AND ".join(
+            [self.config["license"], *(package["license"] for package in packages)]
+        )
+        texts = [file["target"] for package in packages for file in package["file"]]
+        metadata["license-files"] = [
+            "LICENSE",
+            *((ASSETS / name).as_posix() for name in texts if "LICENSE" in name),
+        ]
+        readme, urls = (root / "README.md").read_text(encoding="utf-8"), {"Paper": PAPER}
+        if repository := os.environ.get("SEMSIG_REPOSITORY", "").rstrip("/"):
+            if not re.fullmatch(r"https://[^\s/]+/\S+", repository):
+                message = (
+                    f"SEMSIG_REPOSITORY is {repository!r}, which is not the address of a project; "
+                    "give one such as https://example.org/owner/semsig_gis."
+                )
+                raise ValueError(message)
+            tag = f"v{metadata['version']}"
+            readme = absolute_links(readme, repository, tag)
+            urls |= {
+                "Homepage": repository,
+                "Documentation": f"{repository}/blob/{tag}/docs/index.md",
+                "Repository": repository,
+                "Issues": f"{repository}/issues",
+                "Changelog": f"{repository}/blob/{tag}/CHANGELOG.md",
+            }
+        metadata.setdefault("readme", {"content-type": "text/markdown", "text": readme})
+        metadata.setdefault("urls", urls)
+
+
+class AssetsBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its parameter is private to hatchling
+    """List the map files in a wheel, and bring the files of the tests to who works on it."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Do what the kind of build needs; a failure is a warning, never an error.
 
         Parameters
         ----------
         version : str
-            ``"standard"`` or ``"editable"``; both need the files, and who works on the package
-            those of the tests, too.
+            ``"standard"`` or ``"editable"``.
         build_data : dict
-            What other hooks may change; unused.
+            What the hook may change.
         """
-        try:
-            bring_assets(Path(self.root, ASSETS))
-        except AssetsError as error:
-            self.app.display_warning(f"Maps will link Leaflet instead of containing it: {error}")
-        if version != "editable" or not Path(self.root, TEST_ASSETS).is_dir():
-            return
-        try:
-            bring_assets(Path(self.root, TEST_ASSETS))
-        except AssetsError as error:
-            self.app.display_warning(f"Some tests in a browser will be skipped: {error}")
+        root = Path(self.root)
+        if version == "editable":
+            if (root / TEST_ASSETS).is_dir():
+                _bring(root / TEST_ASSETS, "Some tests in a browser will be skipped")
+        elif self.target_name == "wheel" and (packages := _carried(root / ASSETS)):
+            bill = _bill(self.metadata.core.name, self.metadata.version, packages)
+            place = tempfile.TemporaryDirectory()
+            atexit.register(place.cleanup)  # hatchling reads the file after this
+            path = Path(place.name, "assets.cdx.json")
+            path.write_bytes(json.dumps(bill, indent=1).encode())
+            build_data["sbom_files"].append(str(path))
+
+
+def absolute_links(text: str, repository: str, tag: str) -> str:
+    """Return a page whose links to files beside it point into a repository.
+
+    Parameters
+    ----------
+    text : str
+        The page, in Markdown.
+    repository : str
+        The address of the project.
+    tag : str
+        Which version of the files is meant.
+
+    Returns
+    -------
+    str
+        The page; links to its own sections, and to elsewhere, are as before.
+    """
+
+    def link(match: re.Match[str]) -> str:
+        kind = "raw" if Path(match[2]).suffix in {".gif", ".jpg", ".png", ".svg"} else "blob"
+        return f"{match[1]}{repository}/{kind}/{tag}/{match[2]}"
+
+    return _BESIDE.sub(link, text)
 
 
 def bring_assets(folder: Path) -> tuple[str, ...]:
@@ -78,15 +167,67 @@ def bring_assets(folder: Path) -> tuple[str, ...]:
         If ``npm`` is not on the machine, a package cannot be brought, or a file is missing from
         its package or has another SHA-256 than the manifest says.
     """
-    manifest = tomllib.loads((folder / "manifest.toml").read_text(encoding="utf-8"))
     contents: dict[str, bytes] = {}
-    for package in manifest["package"]:
+    for package in _packages(folder):
         missing = [file for file in package["file"] if not _is_there(folder, file)]
         if missing:
             contents |= _from_npm(f"{package['name']}@{package['version']}", missing)
     for target, content in contents.items():
         _write_whole(folder / target, content)
     return tuple(contents)
+
+
+def _bring(folder: Path, otherwise: str) -> None:
+    """Bring the files of a folder, or say in one line what their absence means."""
+    try:
+        bring_assets(folder)
+    except AssetsError as error:
+        sys.stderr.write(f"{otherwise}: {error}\n")
+
+
+def _packages(folder: Path) -> list[dict[str, Any]]:
+    """Return the packages that the manifest of a folder names."""
+    manifest = tomllib.loads((folder / "manifest.toml").read_text(encoding="utf-8"))
+    packages: list[dict[str, Any]] = manifest["package"]
+    return packages
+
+
+def _carried(folder: Path) -> list[dict[str, Any]]:
+    """Return the packages of which the files are there."""
+    return [
+        one for one in _packages(folder) if all(_is_there(folder, file) for file in one["file"])
+    ]
+
+
+def _bill(name: str, version: str, packages: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return a bill of materials (CycloneDX) of what a wheel carries of other projects."""
+
+    def component(name: str, version: str, index: str) -> dict[str, Any]:
+        address = f"pkg:{index}/{name}@{version}"
+        told = {"type": "library", "bom-ref": address, "name": name, "version": version}
+        return told | {"purl": address}
+
+    return {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.6",
+        "version": 1,
+        "metadata": {"component": component(name, version, "pypi")},
+        "components": [
+            component(one["name"], one["version"], "npm")
+            | {"licenses": [{"license": {"id": one["license"]}}]}
+            | {
+                "components": [
+                    {
+                        "type": "file",
+                        "name": file["target"],
+                        "hashes": [{"alg": "SHA-256", "content": file["sha256"]}],
+                    }
+                    for file in one["file"]
+                ]
+            }
+            for one in packages
+        ],
+    }
 
 
 def _is_there(folder: Path, file: dict[str, str]) -> bool:

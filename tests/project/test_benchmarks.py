@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from machine import PATIENCE_S
 from noisy_cells import every_association, random_database
 from view_oracle import cell_loglik, random_view
 
-from benchmarks import bayes, chances, tables, views
+from benchmarks import bayes, chances, history, stranger, tables, views
 from benchmarks.views import NOISE
 from semsig_gis.core.view import Photo, View
 from semsig_gis.maps import page
@@ -98,7 +99,7 @@ def run(module: str, out: Path) -> tuple[list[dict[str, Any]], str]:
         check=True,
         stdout=subprocess.PIPE,
         text=True,
-        timeout=300,
+        timeout=6 * PATIENCE_S,
     )
     return json.loads(out.read_text(encoding="utf-8")), done.stdout
 
@@ -126,11 +127,23 @@ def test_pictures_of_a_page_are_taken(tmp_path: Path, name: str, each: int) -> N
         f"--out {tmp_path}".split(),
         cwd=Path(__file__).parents[2],
         check=False,  # it fails on frames that take long
-        timeout=300,
+        timeout=6 * PATIENCE_S,
     )
     rows = json.loads((tmp_path / "pictures.json").read_text(encoding="utf-8"))
     assert (len(rows), len(list(tmp_path.glob(f"{name}-*.png")))) == (4, 4 * each)
     assert not any(row["errors"] or row["requests"] or row["violations"] for row in rows)
+
+
+def test_a_command_runs_beside_six_busy_processes() -> None:
+    code = "import os, psutil; print(len(psutil.Process(os.getppid()).children())); exit(3)"
+    done = subprocess.run(
+        [*(sys.executable, "-m", "benchmarks.busy"), *(sys.executable, "-c", code)],
+        cwd=Path(__file__).parents[2],
+        check=False,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (3, "7\n")  # the command is one of them
 
 
 def test_the_page_of_figures_is_that_of_the_results() -> None:
@@ -261,3 +274,51 @@ def test_the_exact_likelihood_is_that_of_the_oracle(seed: int) -> None:
             assert found[cell] == pytest.approx(exact, abs=1e-3)
         else:
             assert exact < best - 30.0
+
+
+ROW = {"name": "a query, 10 cells", "unit": "ms", "ours": 2.0, "peer": 8.0, "peer_name": "cdist"}
+
+
+def test_results_are_kept_by_commit(tmp_path: Path) -> None:
+    rows = [ROW | {"bar": 3.0}]
+    history.record(rows, commit="1" * 40, seconds=86_400, folder=tmp_path)
+    slow = [rows[0] | {"ours": 4.0}, ROW | {"name": "a new one", "bar": None}]
+    for _ in range(2):  # the second of a commit replaces the first
+        history.record(slow, commit="2" * 40, seconds=3600, folder=tmp_path)
+    early, late = history.runs(tmp_path)
+    assert early.measured == {"a query, 10 cells": (4.0, 8.0), "a new one": (2.0, 8.0)}
+    assert late.measured == {"a query, 10 cells": (2.0, 8.0)}
+    lines = history.page(slow, [early, late]).splitlines()[-4:]
+    assert lines == [
+        "| benchmark | unit | 1970-01-01 01:00 | 1970-01-02 00:00 |",
+        "| --- | --- | ---: | ---: |",
+        "| a query, 10 cells | ms | 4 (2) | 2 (4) |",
+        "| a new one | ms | 2 (4) |  |",
+    ]
+    picture = history.draw(slow, [early, late])
+    assert "a query, 10 cells" in picture
+    assert "a new one" not in picture
+
+
+def test_a_stranger_types_what_the_readme_says() -> None:
+    readme = """`make bench` and
+
+```
+make demo     # first
+$ semsig load monaco.osm.pbf --out a.parquet
+the answer
+make test     # later
+semsig localize a.parquet "tree at 40" --map a.html
+```
+
+```console
+semsig map a.parquet --out "a b.html"
+semsig export a.parquet
+```
+"""
+    assert stranger.commands(readme) == [
+        "make demo",
+        "semsig load monaco.osm.pbf --out a.parquet",
+        "semsig localize a.parquet 'tree at 40' --map a.html",
+        "semsig map a.parquet --out 'a b.html'",
+    ]

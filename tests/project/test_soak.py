@@ -1,4 +1,4 @@
-"""A tenth of the soak (see `benchmarks.soak`): nothing is lost, and every refusal is a sentence."""
+"""Some trials of the soak (see `benchmarks.soak`): nothing is lost, every refusal is a sentence."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ import sys
 from pathlib import Path
 
 import pytest
+from machine import PATIENCE_S
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks, and mounts disks of its own")
-def test_a_tenth_of_the_soak(tmp_path: Path) -> None:
+def test_some_of_the_soak(tmp_path: Path) -> None:
     out = tmp_path / "soak.json"
     done = subprocess.run(
-        [*(sys.executable, "-m", "benchmarks.soak"), *f"--share 0.1 --out {out}".split()],
+        [*(sys.executable, "-m", "benchmarks.soak"), *f"--share 0.03 --out {out}".split()],
         cwd=Path(__file__).parents[2],
         capture_output=True,
         check=False,
         text=True,
-        timeout=900,
+        timeout=6 * PATIENCE_S,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     rows = {row["part"]: row for row in json.loads(out.read_text(encoding="utf-8"))}
-    assert rows["kills"]["cases"] == 70
-    assert rows["damaged files"]["cases"] > 4_900
+    assert rows["kills"]["cases"] == 21
+    assert rows["damaged files"]["cases"] >= 1_500
     assert all(row["clean"] == row["cases"] for row in rows.values())

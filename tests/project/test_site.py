@@ -1,0 +1,179 @@
+"""The site: it builds without a warning, its links lead somewhere, everybody can read it.
+
+Here it is built without running notebooks. ``make docs`` builds all of it, and then runs these
+tests on that, which SEMSIG_SITE names.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from axe_core_python.selenium import Axe
+from typer.main import get_group
+
+import semsig_gis
+from semsig_gis.cli.commands import app
+
+if TYPE_CHECKING:
+    from selenium.webdriver import Chrome
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+# Of a page with its styles, scripts and pictures, as a server sends them, but without its maps.
+MOST_BYTES = 300_000
+MAIN = (
+    *("index", "install", "tutorial", "gallery", "beside_the_paper", "how_sure"),
+    *("commands/localize", "api/core"),
+)
+
+pytestmark = pytest.mark.skipif(
+    not (DOCS / "conf.py").is_file(), reason="the tests do not run from a checkout"
+)
+
+
+def sent(content: bytes) -> int:
+    """Return how many bytes of a file go over the line."""
+    return len(gzip.compress(content))
+
+
+@dataclass
+class Page(HTMLParser):
+    """What a page links, loads and shows."""
+
+    path: Path
+    links: list[str] = field(default_factory=list)
+    loaded: list[str] = field(default_factory=list)
+    pictures: list[dict[str, str | None]] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
+    size: int = 0
+
+    def __post_init__(self) -> None:
+        super().__init__()
+        text = re.sub(r' srcdoc="[^"]*"', "", self.path.read_text(encoding="utf-8"))
+        self.size = sent(text.encode())
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.names |= {given[key] or "" for key in ("id", "name") if key in given}
+        if tag == "a" and given.get("href"):
+            self.links.append(given["href"] or "")
+        if tag == "img":
+            self.pictures.append(given)
+        if tag in {"img", "script"} and given.get("src"):
+            self.loaded.append(given["src"] or "")
+        if tag == "link" and given.get("rel") == "stylesheet":
+            self.loaded.append(given["href"] or "")
+
+    def file(self, address: str) -> Path:
+        """Return the file that an address of this page means."""
+        path = unquote(urlsplit(address).path)
+        return (self.path.parent / path).resolve() if path else self.path.resolve()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    built = os.environ.get("SEMSIG_SITE")
+    if built:
+        return Path(built).resolve()
+    out = tmp_path_factory.mktemp("site")
+    options = ["-W", "--keep-going", "-q", "-D", "nb_execution_mode=off"]
+    places = ["-d", f"{out}.doctrees", str(DOCS), str(out)]
+    command = [sys.executable, "-m", "sphinx", *options, *places]
+    built_now = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert built_now.returncode == 0, built_now.stderr
+    return out
+
+
+@pytest.fixture(scope="module")
+def pages(site: Path) -> dict[str, Page]:
+    paths = (path for path in site.rglob("*.html") if path.parent != site / "gallery")
+    return {path.relative_to(site).with_suffix("").as_posix(): Page(path) for path in paths}
+
+
+def test_every_link_within_the_site_leads_somewhere(site: Path, pages: dict[str, Page]) -> None:
+    by_file = {page.path.resolve(): page for page in pages.values()}
+    drawn = (site / "gallery").is_dir()
+    broken = []
+    for name, page in pages.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            target = page.file(link)
+            if parts.scheme or (target.parent.name == "gallery" and not drawn):
+                continue
+            fragment = unquote(parts.fragment)
+            there = target.is_file()
+            if there and fragment and target in by_file:
+                there = fragment in by_file[target].names
+            if not there:
+                broken.append(f"{name}: {link}")
+    assert broken == []
+
+
+def test_a_page_loads_nothing_from_elsewhere_and_is_light(pages: dict[str, Page]) -> None:
+    heavy = {}
+    for name, page in pages.items():
+        assert [one for one in page.loaded if urlsplit(one).scheme not in {"", "data"}] == [], name
+        files = {page.file(one) for one in page.loaded if not urlsplit(one).scheme}
+        size = page.size + sum(sent(file.read_bytes()) for file in files)
+        if size > MOST_BYTES and name != "search":  # that page loads the index of all words
+            heavy[name] = size
+    assert heavy == {}
+
+
+def test_every_picture_has_an_alternative(pages: dict[str, Page]) -> None:
+    without = [
+        f"{name}: {picture['src']}"
+        for name, page in pages.items()
+        for picture in page.pictures
+        if not (picture.get("alt") or "").strip()
+    ]
+    assert without == []
+    assert len(pages["index"].pictures) > 1
+    assert len(pages["beside_the_paper"].pictures) > 4
+
+
+def test_every_command_and_every_public_name_has_its_place(pages: dict[str, Page]) -> None:
+    for name in get_group(app).commands:
+        assert f"cmdoption-semsig-{name}-help" in pages[f"commands/{name}"].names
+    places = Counter(
+        name.removeprefix("semsig_gis.")
+        for key, page in pages.items()
+        for name in page.names
+        if key.startswith("api/") and re.fullmatch(r"semsig_gis\.\w+", name)
+    )
+    assert places == Counter(dir(semsig_gis))
+
+
+def test_every_thumbnail_of_the_gallery_is_of_what_a_command_writes() -> None:
+    text = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    targets = re.findall(r"^:target: gallery/(\S+)$", text, re.MULTILINE)
+    thumbnails = re.findall(r"^```\{figure\} (images/gallery/\S+)$", text, re.MULTILINE)
+    assert [Path(one).stem for one in targets] == [Path(one).stem for one in thumbnails]
+    code = "".join(
+        re.findall(r"^```(?:console|python)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    )
+    for target, thumbnail in zip(targets, thumbnails, strict=True):
+        assert re.search(rf"[ \"]{re.escape(target)}[\n\"]", code), target
+        assert (DOCS / thumbnail).is_file()
+
+
+@pytest.mark.parametrize("name", MAIN)
+def test_everybody_can_read_it(name: str, site: Path, browser: Chrome) -> None:
+    browser.get((site / f"{name}.html").as_uri())
+    result = Axe().run(browser, context={"exclude": [["iframe"]]})  # maps have their own tests
+    assert [
+        (rule["id"], [node["html"][:200] for node in rule["nodes"]])
+        for rule in result["violations"]
+    ] == []
