@@ -70,8 +70,9 @@ def walk(folder: Path, repository: str, extract: Path) -> list[tuple[str, float]
     temporary.mkdir()
     kept = {name: value for name, value in os.environ.items() if not name.startswith(BARE)}
     environment = {**kept, "HOME": str(home), "TMPDIR": str(temporary)}
-    first = shlex.join(["git", "clone", "--quiet", repository, clone.name])
-    steps = run([first], folder, environment)
+    # Not named in the results: where a checkout lies is nobody's concern.
+    environment["REPOSITORY"] = repository
+    steps = run([f'git clone --quiet "$REPOSITORY" {clone.name}'], folder, environment)
     rest = commands((clone / "README.md").read_text(encoding="utf-8"))
     words = [word for command in rest for word in shlex.split(command)]
     for name in {word for word in words if word.endswith(".osm.pbf")}:

@@ -149,8 +149,10 @@ def _remark(text: str) -> None:
 
 
 def _short_of_memory(error: MemoryError) -> str:
-    remedy = "close other programs, or process less at once"
-    return f"this machine is short of memory ({_brief(error)}); {remedy}."
+    return (
+        f"this machine is short of memory ({_brief(error)}); close other programs, "
+        "or process less at once."
+    )
 
 
 def _refusal(error: OSError) -> str:
@@ -173,8 +175,7 @@ def _fault(error: Exception) -> str:
         proof = "this line"
     return (
         f"a fault in semsig, not in your input ({_brief(error)}); please report it to the "
-        "authors of "
-        f"semsig_gis, with {proof}."
+        f"authors of semsig_gis, with {proof}."
     )
 
 

@@ -80,7 +80,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
@@ -252,9 +251,7 @@ def in_files(
         yield files
         return
     crs = open_objects(objects, box=NOWHERE).crs
-    parent = Path(os.path.realpath(out)).parent
-    parent.mkdir(parents=True, exist_ok=True)
-    with own_folder(parent) as folder:
+    with folder_beside(out) as folder:
         for name, table in in_memory.items():
             files[name] = folder / f"{name}.parquet"
             save_surroundings(read_surroundings(table, role=name, crs=crs), files[name])
@@ -262,16 +259,12 @@ def in_files(
 
 
 @contextlib.contextmanager
-def in_file(objects: StreetObjects | Path, out: Path) -> Iterator[Path]:
-    """Give the file of street objects; those in memory are written to one beside the result."""
-    if isinstance(objects, Path):
-        yield objects
-        return
+def folder_beside(out: str | Path) -> Iterator[Path]:
+    """Give a folder beside a result, for what its workers read; it is removed after the block."""
     parent = Path(os.path.realpath(out)).parent
     parent.mkdir(parents=True, exist_ok=True)
     with own_folder(parent) as folder:
-        save_objects(objects, folder / "objects.parquet")
-        yield folder / "objects.parquet"
+        yield folder
 
 
 def build_parts(
@@ -469,7 +462,7 @@ def _by_box(
     if copy.exists():
         return copy
     if _covered(path, crs):
-        with whole_file(copy) as whole, Path(path).open("rb") as own, whole.open("wb") as copied:
+        with whole_file(copy) as whole, path.open("rb") as own, whole.open("wb") as copied:
             shutil.copyfileobj(own, copied)
     elif name == "objects":  # those of before have no bounds
         save_objects(open_objects(path), copy)

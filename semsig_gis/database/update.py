@@ -34,7 +34,7 @@ from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.tiles import (
     TileSpec,
     build_parts,
-    in_file,
+    folder_beside,
     plan_tiles,
     publish,
     save_tile,
@@ -42,7 +42,7 @@ from semsig_gis.database.tiles import (
 )
 from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import licenses_of, open_objects
+from semsig_gis.objects.table import licenses_of, open_objects, save_objects
 from semsig_gis.storage.runs import read_json, write_json
 
 if TYPE_CHECKING:
@@ -372,7 +372,11 @@ def update_tiles(
     numbers = np.unique(np.stack([cells[0] // side, cells[1] // side], axis=1), axis=0)
     stale: set[Tile] = {(column, row) for column, row in numbers.tolist()}
     target = Path(path if out is None else out)
-    with in_file(joined if kept else Path(objects), target) as source:
+    with folder_beside(target) as beside:
+        source = Path(objects)
+        if kept:
+            source = beside / "objects.parquet"
+            save_objects(joined, source)
         plan = plan_tiles(
             source,
             target,

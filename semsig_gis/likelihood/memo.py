@@ -42,17 +42,17 @@ class TurnMemo:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return the scores of a photo in every cell, and its likeliest turns there."""
         setting = index, photo.photos[0].sectors, north_sigma
-        told = [_object(photo, row) for row in range(len(photo))]
-        objects = Counter(told)
+        marks = [_object(photo, row) for row in range(len(photo))]
+        objects = Counter(marks)
         less = [one for one in self._photos if one.setting == setting and one.objects <= objects]
         before = max(less, key=lambda one: one.objects.total(), default=None)
-        known = Counter[bytes]() if before is None else before.objects.copy()
-        more = []
-        for row, one in enumerate(told):
-            if known[one]:
-                known[one] -= 1
+        rest = Counter[bytes]() if before is None else before.objects.copy()
+        rows = []
+        for row, mark in enumerate(marks):
+            if rest[mark]:
+                rest[mark] -= 1
             else:
-                more.append(row)
+                rows.append(row)
         # What is not gone on from makes room.
         self._photos, others = (
             [one for one in self._photos if (one is before) == kept] for kept in (True, False)
@@ -62,18 +62,18 @@ class TurnMemo:
         size = len(index.database)
         if 2 * size * after.shares.shape[1] * after.shares.itemsize <= MOST_BYTES:
             after = room[0] if room else turn_scores(size, north_sigma)
-        found = index.turned(
-            photo.select(np.array(more, np.int64)),
+        scores = index.turned(
+            photo.select(np.array(rows, np.int64)),
             north_sigma,
             before=None if before is None else before.turned,
             after=after,
         )
         if len(after.logs):
             self._photos.append(_Photo(setting, objects, after))
-        return found
+        return scores
 
 
 def _object(photo: View, row: int) -> bytes:
     """Return all that is told of an object of a photo."""
-    told = (photo.codes, photo.bearings, photo.ranges, photo.range_errors, photo.scores)
-    return b"|".join(b"" if one is None else one[row].tobytes() for one in told)
+    values = (photo.codes, photo.bearings, photo.ranges, photo.range_errors, photo.scores)
+    return b"|".join(b"" if one is None else one[row].tobytes() for one in values)

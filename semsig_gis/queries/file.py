@@ -50,8 +50,8 @@ class QueryLine:
     line: int
     name: str | int
     query: View | InputError
-    unplaced: tuple[int, ...] = ()
-    absent: tuple[int, ...] = ()
+    unplaced: Codes = ()
+    absent: Codes = ()
 
 
 def read_queries(

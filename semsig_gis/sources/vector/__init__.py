@@ -117,15 +117,15 @@ def read_layer(
     """
     where = f"layer {spec.name!r} ({path})"
     member = _pick(Path(path), spec.layer)
-    if (table := _csv(member, spec, where=where)) is not None:
-        return read_csv_layer(table, spec, filters=filters, crs=crs, where=where)
+    if (lines := _csv(member, spec, where=where)) is not None:
+        return read_csv_layer(lines, spec, filters=filters, crs=crs, where=where)
     layer = describe(member)
     if layer.geometry == NO_GEOMETRY:
         msg = f"{where} has no geometry; give the layer that holds the positions."
         raise SourceError(msg)
     rules = RowRules(spec, layer.fields, filters=filters, where=where)
-    found = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
-    return raw_layer(found.rows, rules, found.crs, by_file=found.by_file, notes=found.notes)
+    table = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
+    return raw_layer(table.rows, rules, table.crs, by_file=table.by_file, notes=table.notes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +151,8 @@ def read_tables(
     for member, layer in list(_with_geometry(path)):
         chosen = choose(layer.fields)
         if chosen:
-            wanted = tuple(field for field in layer.fields if field in chosen)
-            yield _read_member(member, layer, wanted, expected=None, given=crs, where=str(member))
+            fields = tuple(field for field in layer.fields if field in chosen)
+            yield _read_member(member, layer, fields, expected=None, given=crs, where=str(member))
 
 
 def _with_geometry(path: Path) -> Iterator[tuple[Member, Layer]]:

@@ -15,7 +15,7 @@ import shapely
 import shapely.geometry
 
 from semsig_gis.sources.raw_layer import BadFeatureError, Rows
-from semsig_gis.sources.vector.member import GEOJSON, unreadable
+from semsig_gis.sources.vector.member import GEOJSON, NOT_UTF8, OUT_OF_REACH, unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -72,7 +72,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
             # GDAL parses GeoJSON whole: what it says then belongs to no row.
             rows = _rows(source, fields, count, heard if member.driver != GEOJSON else [])
     blank = any(record.getMessage().startswith("Failed to decode") for record in heard)
-    return rows, ("some text is not UTF-8 and was read as missing",) if blank else ()
+    return rows, (NOT_UTF8,) if blank else ()
 
 
 def _rows(
@@ -111,7 +111,7 @@ def _rows(
             place = str(error)
         rows.add([properties[field] for field in fields], feature.id, place)
     if damage or failures:
-        rows.lose(count, damage or "out of reach behind unreadable rows")
+        rows.lose(count, damage or OUT_OF_REACH)
     return rows
 
 

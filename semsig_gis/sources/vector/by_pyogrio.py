@@ -22,6 +22,8 @@ from semsig_gis.sources.raw_layer import Rows
 from semsig_gis.sources.vector.member import (
     CONTAINER,
     GEOJSON,
+    NOT_UTF8,
+    OUT_OF_REACH,
     SHAPEFILE,
     not_of_its_kind,
     unreadable,
@@ -156,7 +158,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
             rows.errors[rows.read] = str(error).rstrip(".")
             failures += 1
             if failures == FAILURES_IN_A_ROW:
-                rows.lose(count, "out of reach behind unreadable rows")
+                rows.lose(count, OUT_OF_REACH)
             continue
         for name, row, shape in zip(names, values, shapes, strict=True):
             rows.read += 1
@@ -164,7 +166,7 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
             empty = member.driver == CONTAINER and _is_nowhere(place)
             rows.add(row, name, shapely.Point() if empty else place)
         step, failures = min(8 * step, LARGEST_STEP), 0
-    return rows, ("some text is not UTF-8 and was read as missing",) if blank else ()
+    return rows, (NOT_UTF8,) if blank else ()
 
 
 def first_rows_of(member: Member, limit: int) -> Iterator[dict[str, Any]]:

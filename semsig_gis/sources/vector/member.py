@@ -28,6 +28,9 @@ DRIVERS = {
     ".json": GEOJSON,
     ".shp": SHAPEFILE,
 }
+# What is said of rows by both readers.
+NOT_UTF8 = "some text is not UTF-8 and was read as missing"
+OUT_OF_REACH = "out of reach behind unreadable rows"
 # How their files begin, GeoJSON after white space.
 BEGINNINGS = {
     "FlatGeobuf": b"fgb",
