@@ -22,6 +22,7 @@ import pytest
 import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from pyogrio.raw import open_arrow
 from pyproj import CRS
 from sentences import refused
 
@@ -293,6 +294,15 @@ def test_null_and_empty_geometries_are_no_errors(suffix: str, tmp_path: Path) ->
     assert counts(layer) == (4, 4, 0)
     missing = layer.table.geometry.isna() | layer.table.geometry.is_empty
     assert missing.tolist() == [False, True, True, False]
+
+
+def test_missing_geometries_of_flatgeobuf_are_none(tmp_path: Path) -> None:
+    points = [shapely.Point(1, 2), None, None, shapely.Point(7, 8)]
+    path = tmp_path / "things.fgb"
+    gpd.GeoDataFrame(geometry=points, crs="EPSG:2154").to_file(path, SPATIAL_INDEX="NO")
+    with open_arrow(path, use_pyarrow=True) as (_, reader):
+        table = reader.read_all()
+    assert table.column("wkb_geometry").null_count == 2
 
 
 @pytest.mark.parametrize("suffix", ["fgb", "geojson", "gpkg", "shp"])
