@@ -147,7 +147,7 @@ def _maps(objects: StreetObjects, queries: int) -> dict[str, Callable[[], folium
     index = build_index(database, cell_noise(named_noise("generic"), database.grid.step))
     store = ObjectStore.of(objects)
     query = database.signature(int(np.argsort(database.lengths)[-len(database) // 10]))
-    changes: Any = {"newer": newer, "objects_before": objects, "objects_after": later}
+    changes: Any = {"objects_before": objects, "objects_after": later}
 
     @functools.cache
     def identifiability() -> Identifiability:
@@ -161,12 +161,13 @@ def _maps(objects: StreetObjects, queries: int) -> dict[str, Callable[[], folium
         "ambiguity": lambda: ambiguity_map(database, identifiability=identifiability()),
         "identifiability": lambda: identifiability_map(identifiability()),
         "evaluation": lambda: evaluation_map(evaluation(), database),
-        "drift": lambda: drift_map(database, **changes),
+        "drift": lambda: drift_map(database, newer, **changes),
         "everything": lambda: city_map(
             database,
             evaluation=evaluation(),
             identifiability=identifiability(),
             ambiguity=True,
+            newer=newer,
             **changes,
         ),
         "objects": lambda: objects_map(objects, database=database),
