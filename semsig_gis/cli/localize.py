@@ -175,9 +175,9 @@ def localize(options: LocalizeOptions) -> None:
 
     if options.queries is None:
         query = options.query(city.dataset, others=", or --queries")
-        told = options.unplaced(city.dataset)
+        others = options.unplaced(city.dataset)
         locator = _locator(options, city, method, north)
-        _answer(options, city, _beside(locator, query, *told, ranking=options.ranking), query)
+        _answer(options, city, _beside(locator, query, *others, ranking=options.ranking), query)
         return
     queries = options.read_queries(city.dataset)
     _answer_lines(queries, _locator(options, city, method, north), options)
@@ -241,9 +241,9 @@ def _answer_lines(
         try:
             if isinstance(one.query, InputError):
                 raise one.query
-            told = one.unplaced, one.absent
-            asked = _beside(locator, one.query, *told, ranking=options.ranking)
-            result = asked.locate(one.query).to_dict()
+            others = one.unplaced, one.absent
+            beside = _beside(locator, one.query, *others, ranking=options.ranking)
+            result = beside.locate(one.query).to_dict()
             answered += 1
         except (EmptyResultError, InputError, UnknownNameError) as error:
             result = {"error": str(error)}

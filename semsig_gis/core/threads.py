@@ -44,19 +44,19 @@ class NotWantedError(Exception):
 
 
 @contextlib.contextmanager
-def while_wanted(wanted: Callable[[], bool]) -> Iterator[None]:
-    """Raise `NotWantedError` here, and in `share_rows` of this thread, once it is not `wanted`."""
-    _here.wanted = wanted
+def while_wanted(check: Callable[[], bool]) -> Iterator[None]:
+    """Raise `NotWantedError` here, and in `share_rows` of this thread, once the `check` fails."""
+    _here.check = check
     try:
         _go_on()
         yield
     finally:
-        del _here.wanted
+        del _here.check
 
 
 def _go_on() -> None:
-    wanted = getattr(_here, "wanted", None)
-    if wanted is not None and not wanted():
+    check = getattr(_here, "check", None)
+    if check is not None and not check():
         raise NotWantedError
 
 

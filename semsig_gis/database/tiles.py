@@ -272,7 +272,7 @@ def build_parts(
     objects: str | Path,
     *,
     work: Callable[[Tile], Part | None],
-    known: dict[Tile, Part] | None = None,
+    old_parts: Mapping[Tile, Part] | None = None,
     share: float = 1.0,
     workers: int,
     scheduler: str | None,
@@ -281,14 +281,14 @@ def build_parts(
 ) -> list[Part]:
     """Build the tiles of a plan that are not there yet, and return all parts, ordered by tile.
 
-    `work` builds one; `known` parts lie in the folder already, and of the others about this `share`
-    of the cells is computed.
+    `work` builds one; `old_parts` lie in the folder already. About this `share` of the cells of the
+    others is computed.
     """
-    known = known or {}
+    old_parts = old_parts or {}
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
-        left = [tile for tile in tiles if tile not in known]
-        done: dict[Tile, Part | None] = {**known, **finished_tiles(plan.folder, left)}
+        left = [tile for tile in tiles if tile not in old_parts]
+        done: dict[Tile, Part | None] = {**old_parts, **finished_tiles(plan.folder, left)}
         left = [tile for tile in left if tile not in done]
         _look_ahead(plan, tiles, left=share * len(left), workers=workers, scheduler=scheduler)
         if done and tell is not None:

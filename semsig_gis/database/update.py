@@ -388,10 +388,10 @@ def update_tiles(
             streets=inputs.get("streets"),
             digests={name: manifest.recipe["inputs"][name] for name in inputs},
         )
-        known: dict[Tile, Part] = {}
+        old_parts: dict[Tile, Part] = {}
         if database_specs(after) == database_specs(first) and not open_city(path).has_columns:
-            known = {part.tile: part for part in manifest.parts if part.tile not in stale}
-        for tile, part in known.items():
+            old_parts = {part.tile: part for part in manifest.parts if part.tile not in stale}
+        for tile, part in old_parts.items():
             shutil.copyfile(files[tile], plan.folder / part.file)
         old_tiles = _OldTiles(folder, plan.folder / INPUTS / "stale.npy", facts)
         np.save(old_tiles.stale, cell_ids(*cells))
@@ -399,7 +399,7 @@ def update_tiles(
             plan,
             source,
             work=partial(update_tile, plan, old_tiles),
-            known=known,
+            old_parts=old_parts,
             share=len(cells[0]) / manifest.cells,
             workers=workers,
             scheduler=scheduler,

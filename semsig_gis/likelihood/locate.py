@@ -315,8 +315,8 @@ class LikelihoodLocator:
 
     def scan(self, query: Signature) -> CellScores:
         """Return the scores of all cells by the sum over detections, one by one."""
-        known = self._known(query)
-        return self.index.scores(known, north_sigma=self.north_sigma, memo=self.memo)
+        view = self._known(query)
+        return self.index.scores(view, north_sigma=self.north_sigma, memo=self.memo)
 
     def scores(
         self,

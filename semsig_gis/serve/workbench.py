@@ -349,8 +349,8 @@ class Workbench:
         question = Question.parse(asked, taxonomy=self.taxonomy, radius=self.database.spec.radius)
         rows = question.rows(self.taxonomy)
         setting = self._noise(question), question.seen_from
-        known = question.absent, question.near
-        key = rows, *setting, *known, question.top, self._is_quick(question)
+        hints = question.absent, question.near
+        key = rows, *setting, *hints, question.top, self._is_quick(question)
         if self._last is None or self._last[0] != key:
             locator = self._locator(question)
             # Views that did not change are not compared with the city again.
@@ -358,7 +358,7 @@ class Workbench:
             scores: list[CellScores] = []
             names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in question.views]
             for number, (name, view) in enumerate(zip(names, question.views, strict=True)):
-                told, prior = ((), None) if number else (known, locator.log_prior)
+                told, prior = ((), None) if number else (hints, locator.log_prior)
                 scanned = self._scores.get(name) or locator.scan(view)
                 ranked = json.dumps([name, told, locator.quick])
                 best = self._scores.get(ranked) or locator.scores(view, prior, scanned=scanned)

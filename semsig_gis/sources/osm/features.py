@@ -199,16 +199,16 @@ def _index() -> TagIndex:
 
 def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Iterator[FeatureTable]:
     """Yield the tables of a file, with the columns that matter."""
-    column_set = {*_keys(specs), *MAPS, *NAMES, WAY_NUMBER, CLASS, CODE}
-    column_set.update(name for pair in KINDS_AND_NUMBERS for name in pair)
+    names_read = {*_keys(specs), *MAPS, *NAMES, WAY_NUMBER, CLASS, CODE}
+    names_read.update(name for pair in KINDS_AND_NUMBERS for name in pair)
     if path.suffix.lower() in parquet.SUFFIXES:
-        frame = read_parquet(path, kind="features", columns=column_set)
+        frame = read_parquet(path, kind="features", columns=names_read)
         if frame.crs is None and crs is not None:
             frame = frame.set_crs(parse_crs(crs))
         yield frame_table(frame)
         return
     for table in read_tables(
-        path, lambda fields: column_set if holds_tags(fields) else (), crs=crs
+        path, lambda fields: names_read if holds_tags(fields) else (), crs=crs
     ):
         rows = table.rows
         values = zip(*rows.values, strict=True) if rows.values else [()] * len(table.fields)

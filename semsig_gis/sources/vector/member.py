@@ -171,11 +171,13 @@ def _refuse_damaged(path: Path) -> None:
         with contextlib.closing(
             sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
         ) as f:
-            found = f.execute("PRAGMA quick_check(1)").fetchone()[0]
+            verdict = f.execute("PRAGMA quick_check(1)").fetchone()[0]
     except UnicodeDecodeError:
-        found = "a name in it is not UTF-8 text"
+        verdict = "a name in it is not UTF-8 text"
     except sqlite3.Error as error:
-        found = str(error)
-    if found != "ok":
-        msg = f"{path} cannot be read ({' '.join(found.split())}); it may be damaged, get it again."
+        verdict = str(error)
+    if verdict != "ok":
+        msg = (
+            f"{path} cannot be read ({' '.join(verdict.split())}); it may be damaged, get it again."
+        )
         raise SourceError(msg)
