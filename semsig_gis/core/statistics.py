@@ -204,7 +204,12 @@ def _loss(
 
 def _terms(scaled: NDArray[np.float64], powers: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the products of powers of the features, shape (n, p)."""
-    return np.asarray((scaled[:, None, :] ** powers).prod(axis=2))
+    rows = np.ascontiguousarray(scaled.T)
+    ladder = np.cumprod([np.ones_like(rows), *[rows] * DEGREE], axis=0)
+    terms = np.ones((len(powers), len(scaled)))
+    for row, feature in np.argwhere(powers):
+        terms[row] *= ladder[powers[row, feature], feature]
+    return terms.T
 
 
 def _logistic(logits: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -60,6 +60,11 @@ def _go_on() -> None:
         raise NotWantedError
 
 
+def work_alone() -> None:
+    """Let this thread share nothing from now on, as the others have work of their own."""
+    _here.sharing = True
+
+
 def share_rows(
     work: Callable[[NDArray[np.int64]], object], rows: int, *, least: int = ROWS_A_PART
 ) -> None:

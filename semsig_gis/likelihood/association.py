@@ -440,41 +440,44 @@ def _replaced(
     turns = [np.concatenate(each) for each in zip(*(turn for _, turn in parts), strict=True)]
     loglik = old.copy()
     if len(cells) < len(old):
-        loglik += _shift(lambda some: rank(some)[0], old, total, cells, sample)
+        _shift(loglik, lambda some: rank(some)[0], total, cells, sample)
     loglik[cells] = new
     return loglik, cells, turns
 
 
 def _shift(
+    loglik: NDArray[np.float64],
     rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
-    old: NDArray[np.float64],
     total: NDArray[np.float64],
     ranked: NDArray[np.int64],
     size: int,
-) -> NDArray[np.float64] | float:
-    """Return by how much the likelihood of cells changes that are not among those `ranked`.
+) -> None:
+    """Move the log-likelihood of all cells as far as it changes for some that are not `ranked`.
 
-    `rank` gives the new likelihood of some cells, `old` is that of all, and `total` with the prior;
-    so many are tried.
+    `rank` gives the new likelihood of some cells, `total` is that of all with the prior; so many
+    are tried.
     """
     rest = total > total.max() - NEGLIGIBLE
     rest[ranked] = False
     tail = np.flatnonzero(rest)
     if not len(tail):
-        return 0.0
+        return
+    pool = tail
     if len(tail) > POOL * size:
         random = np.random.default_rng(0)
-        tail = random.choice(tail, POOL * size, replace=False, shuffle=False)
-    tail = tail[np.argsort(-total[tail], kind="stable")]
-    ranks = np.unique(np.geomspace(1, len(tail), size).astype(np.int64)) - 1
-    sample = tail[ranks]
-    new, before, window = rank(sample), old[sample], size // WINDOWS
+        pool = random.choice(tail, POOL * size, replace=False, shuffle=False)
+    pool = pool[np.argsort(-total[pool], kind="stable")]
+    ranks = np.unique(np.geomspace(1, len(pool), size).astype(np.int64)) - 1
+    sample = pool[ranks]
+    new, before, window = rank(sample), loglik[sample], size // WINDOWS
     moves, levels = [], []
     for low in range(0, len(sample), window):
         part = slice(low, low + window)
         moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(before[part]))
         levels.append(total[sample[part]].mean())
-    return np.asarray(np.interp(total, levels[::-1], moves[::-1]))
+    move = np.full(len(loglik), moves[-1])  # the others are worse than any level
+    move[tail] = np.interp(total[tail], levels[::-1], moves[::-1])
+    loglik += move
 
 
 def _aligned(
@@ -490,7 +493,7 @@ def _aligned(
     from semsig_gis.database.aside import views_aside  # noqa: PLC0415 - numba loads slowly
 
     models, places = index.stands if aside else (index.models, np.zeros((1, 2)))
-    seen = views_aside(index.database, cells, places)
+    seen = views_aside(index.database, cells, places) if aside else views_in(index.database, cells)
     total, likeliest = np.zeros((len(cells), len(places))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):
         turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS

@@ -94,7 +94,8 @@ def expected_best(
         left = np.arange(ordered.size, 0, -1, dtype=np.float64)
         steps = np.maximum(left - slots, 0.0) / left
         beyond = np.concatenate([[1.0], np.cumprod(steps)])  # by the number of errors at most x
-        expected = float(np.dot(beyond[:-1] - beyond[1:], np.minimum(ordered, nearest)))
+        chances = beyond[:-1] - beyond[1:]
+        expected = float((chances * np.minimum(ordered, nearest)).sum())
         drawn = 1.0 - beyond[np.searchsorted(ordered, limits, side="right")]
     return expected, np.where(limits >= nearest, 1.0, drawn)
 

@@ -52,7 +52,6 @@ LEAST_VIEW, MOST_VIEW = 10, 360  # degrees
 DIRECTIONS = 8  # in which photos are looked at from each cell, at least
 CELLS_A_PART = 4096
 TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
-TEMPERATURE_TRIALS = 300
 DECIMALS = 3  # of all numbers: more than they are sure to, and short in a file
 
 TOUCHED_CLASSES = 4  # that the mean trial tells of
@@ -271,8 +270,7 @@ def _stages(
 
 def _temperature(columns: SymbolColumns, tried: Trials, *, radius: float, threads: int) -> float:
     """Return the power that brings the likelihoods of signatures nearest to the answers."""
-    shown = columns.counts.sum(axis=1)[tried.looks, tried.cells]
-    some = np.flatnonzero(np.isfinite(tried.lean) & (shown > 0))[:TEMPERATURE_TRIALS]
+    some = np.flatnonzero(np.isfinite(tried.lean))
     if not len(some):
         return 1.0
     fits = []

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from semsig_gis.core.threads import work_alone
 from semsig_gis.core.view import FULL_VIEW, View
 from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import city_extent
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.model import Noise, NoiseSpec
 
 
-RERANKED = 300  # cells of a trial, whose answer counts among thousands
+LEANS = 300  # trials, by which likelihoods of signatures are brought near the answers
+# Cells that are re-ranked in a trial, whose answer counts among thousands, and of the others.
+RERANKED, SAMPLE = 300, 512
 HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of the sums
 
 
@@ -45,8 +48,8 @@ class Trials:
     The answer to a query from a cell (a row number of `cells`), in one of the `looks`, gave the
     chance `itself` to that cell and `near` to all cells near it; `found` tells whether the best
     place is near, `bits` the entropy of all chances. `lean` is the mean, by these chances, of the
-    log-likelihood of what the look shows in a cell less that in the true one; NaN where nothing was
-    detected, or no columns were given.
+    log-likelihood of what the look shows in a cell less that in the true one: for the first `LEANS`
+    whose look shows something, if columns were given and something was detected, else NaN.
     """
 
     cells: NDArray[np.int64]
@@ -118,25 +121,29 @@ def try_cells(
     if queries is None:
         photos = None if columns is None else [columns.looks[look] for look in numbers.tolist()]
         queries = draw_trials(index, cells, photos=photos, seed=seed)
-    places = _without_signatures(index.database)
+    places = _without_signatures(index.database, slice(None))
     radius = min(radius, city_extent(places))
+    leaning = np.zeros(len(cells), np.bool_)
+    if columns is not None and left_out is None:
+        leaning[np.flatnonzero(columns.counts[numbers, :, cells].any(axis=1))[:LEANS]] = True
 
-    def ask(cell: int, look: int, query: Signature) -> tuple[float, ...]:
+    def ask(trial: int, query: Signature) -> tuple[float, ...]:
+        cell, look = int(cells[trial]), int(numbers[trial])
         if not len(query):
             return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
         if columns is None:
-            return _outcome(index, places, cell, query, radius, index.scores(query))
-        if left_out is not None:
+            scores = index.scores(query)
+        elif left_out is None:
+            scores = CellScores(loglik=columns.scores(query, look))
+        else:
             number, rows = left_out
-            first = columns.scores(query, look, left_out=number)[rows]
-            return _outcome(index, places, cell, query, radius, CellScores(loglik=first))
-        first = columns.scores(query, look)
-        own = partial(columns.loglik, cell, look)
-        return _outcome(index, places, cell, query, radius, CellScores(loglik=first), own)
+            scores = CellScores(loglik=columns.scores(query, look, left_out=number)[rows])
+        own = partial(columns.loglik, cell, look) if columns and leaning[trial] else None
+        return _outcome(index, places, cell, query, radius, scores, own)
 
     rows: list[tuple[float, ...]] = []
-    with ThreadPoolExecutor(threads) as pool:
-        for row in pool.map(ask, cells.tolist(), numbers.tolist(), queries):
+    with ThreadPoolExecutor(threads, initializer=work_alone) as pool:
+        for row in pool.map(ask, range(len(cells)), queries):
             rows.append(row)
             if progress is not None:
                 progress(len(rows), len(cells))
@@ -152,12 +159,16 @@ def try_cells(
     )
 
 
-def _without_signatures(database: SignatureDatabase) -> SignatureDatabase:
-    """Return the cells alone, some of which are selected far faster."""
-    nothing = slice(0)
+def _without_signatures(
+    database: SignatureDatabase, cells: slice | NDArray[np.int64]
+) -> SignatureDatabase:
+    """Return some cells alone, without what they see: far faster than to select them."""
+    columns, nothing = database.columns[cells], slice(0)
     return replace(
         database,
-        offsets=np.zeros_like(database.offsets),
+        columns=columns,
+        rows=database.rows[cells],
+        offsets=np.zeros(len(columns) + 1, database.offsets.dtype),
         codes=database.codes[nothing],
         bearing_units=database.bearing_units[nothing],
         distance_units=database.distance_units[nothing],
@@ -174,11 +185,11 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
     """Return what comes of one query, in the order of `Trials`."""
-    loglik = rerank(index, query, scores, count=RERANKED, aside=False).loglik
+    loglik = rerank(index, query, scores, count=RERANKED, aside=False, sample=SAMPLE).loglik
     kept = loglik > loglik.max() - HOPELESS
     kept[cell] = True
     cells = np.flatnonzero(kept)
-    answer = posterior(places.select(cells), loglik[cells])
+    answer = posterior(_without_signatures(places, cells), loglik[cells])
     true = int(np.searchsorted(cells, cell))
     best, _ = answer.best_place(radius)
     near = float(answer.mass_within(radius, np.array([true]))[0])
@@ -186,13 +197,13 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
         int(places.columns[cells[best]]) - int(places.columns[cell]),
         int(places.rows[cells[best]]) - int(places.rows[cell]),
     )
-    alike = np.full(len(cells), np.nan) if own is None else own(cells)
+    alike = None if own is None else own(cells)
     return (
         min(float(answer.chances[true]), near),
         near,
         float(apart <= radius + 1e-6),
         answer.entropy,
-        float(answer.chances @ alike - alike[true]),
+        np.nan if alike is None else float((answer.chances * alike).sum() - alike[true]),
     )
 
 
