@@ -33,10 +33,10 @@ busy: $(DEV) ## the same beside six busy processes, because no test depends on t
 	$(BIN)/python -m benchmarks.busy $(TESTS)
 
 test-all: $(DEV) ## what is installed, over Pythons, dependencies and archives: hours
-	PATH="$$(printf '%s:' $$HOME/.pyenv/versions/*/bin)$$PATH" $(BIN)/nox -s matrix
+	PATH="$$(printf '%s:' $$HOME/.pyenv/versions/*/bin)$$PATH:$(abspath $(BIN))" $(BIN)/nox -s matrix
 
 oldest: $(DEV) ## what test-all calls oldest, into constraints-oldest.txt
-	$(BIN)/nox -s oldest
+	PATH="$$PATH:$(abspath $(BIN))" $(BIN)/nox -s oldest
 
 size: ## the megabytes and seconds that the plain installation takes
 	$(PYTHON) -m benchmarks.installed

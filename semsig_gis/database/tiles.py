@@ -6,28 +6,22 @@ left; when all are there, the folder is renamed to ``OUT``.
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import shutil
 from collections import Counter
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import shapely
-from pyproj import CRS
-from pyproj.exceptions import CRSError
 
 from semsig_gis import __version__
 from semsig_gis.core.effort import announce
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError, SourceError
+from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
-    HALF_WIDTH,
     GridSpec,
     cell_ids,
     cells_near,
@@ -37,7 +31,7 @@ from semsig_gis.core.geometry import (
 )
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.ranges import MOST_METRES, require_number
-from semsig_gis.core.scratch import HALF_DONE, own_folder
+from semsig_gis.core.scratch import HALF_DONE
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
@@ -57,12 +51,13 @@ from semsig_gis.database.file import (
     read_manifest,
     save_database,
 )
+from semsig_gis.database.inputs import copy_by_box, fingerprint, in_files, widest_street
 from semsig_gis.database.occlusion import TOLERANCE_M
 from semsig_gis.database.viewpoints import require_surroundings
 from semsig_gis.database.views import ViewpointSpec
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, NOWHERE, each_bounds
+from semsig_gis.objects.surroundings import read_surroundings
+from semsig_gis.objects.table import open_objects
+from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
 from semsig_gis.storage.runs import (
     PARTIAL,
     RunKind,
@@ -71,19 +66,19 @@ from semsig_gis.storage.runs import (
     read_json,
     write_json,
 )
-from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     import geopandas as gpd
     from numpy.typing import NDArray
+    from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.inputs import Input
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
-    Input = Literal["objects", "buildings", "streets"]
 
 # Beyond the range: for rounding, and for walls as near as occlusion.GAP_M and TOLERANCE_M look.
 MARGIN_M = 2.0
@@ -204,6 +199,7 @@ def build_tiles(
     Examples
     --------
     >>> import tempfile
+    >>> from semsig_gis import save_objects
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     save_objects(demo_objects, f"{folder}/objects.parquet")
     ...     parts = build_tiles(f"{folder}/objects.parquet", f"{folder}/town")
@@ -233,38 +229,6 @@ def build_tiles(
             tell=tell,
         )
         return publish(plan.folder, parts)
-
-
-@contextlib.contextmanager
-def in_files(
-    objects: str | Path, out: str | Path, **tables: str | Path | gpd.GeoDataFrame | None
-) -> Iterator[dict[str, Path]]:
-    """Give the files of buildings and streets; tables are written to some beside the result.
-
-    There workers elsewhere find them.
-    """
-    files = {name: Path(path) for name, path in tables.items() if isinstance(path, str | Path)}
-    in_memory: dict[Any, gpd.GeoDataFrame] = {
-        name: table for name, table in tables.items() if table is not None and name not in files
-    }
-    if not in_memory:
-        yield files
-        return
-    crs = open_objects(objects, box=NOWHERE).crs
-    with folder_beside(out) as folder:
-        for name, table in in_memory.items():
-            files[name] = folder / f"{name}.parquet"
-            save_surroundings(read_surroundings(table, role=name, crs=crs), files[name])
-        yield files
-
-
-@contextlib.contextmanager
-def folder_beside(out: str | Path) -> Iterator[Path]:
-    """Give a folder beside a result, for what its workers read; it is removed after the block."""
-    parent = Path(os.path.realpath(out)).parent
-    parent.mkdir(parents=True, exist_ok=True)
-    with own_folder(parent) as folder:
-        yield folder
 
 
 def build_parts(
@@ -419,7 +383,7 @@ def plan_tiles(
     folder = begin(out, recipe)
     try:
         files = {
-            name: _by_box(name, path, nothing.crs, folder, tell) for name, path in paths.items()
+            name: copy_by_box(name, path, nothing.crs, folder, tell) for name, path in paths.items()
         }
         lines = files.get("streets")
         return TilePlan(
@@ -432,64 +396,11 @@ def plan_tiles(
             viewpoints=viewpoints,
             side=tile.cells(grid),
             reach=reach,
-            street_reach=0.0 if lines is None else max(viewpoints.width, _widest(lines)),
+            street_reach=0.0 if lines is None else max(viewpoints.width, widest_street(lines)),
         )
     except BaseException:
         RUN.abandon(folder)
         raise
-
-
-def fingerprint(path: Path) -> str:
-    """Return the digest of a file, with its companions, or of a folder."""
-    if path.is_dir():
-        files = sorted(one for one in path.rglob("*") if one.is_file())
-    elif path.suffix.lower() == ".shp":
-        files = sorted(path.parent.glob(f"{path.stem}.*"))
-    else:
-        files = [path]
-    try:
-        return digest(*files)
-    except OSError as error:
-        msg = f"{path} does not exist or cannot be read; give another file."
-        raise SourceError(msg) from error
-
-
-def _by_box(
-    name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
-) -> Path:
-    """Return a copy of an input that can be read by box in a CRS."""
-    copy = folder / INPUTS / f"{name}.parquet"
-    if copy.exists():
-        return copy
-    if _covered(path, crs):
-        with whole_file(copy) as whole, path.open("rb") as own, whole.open("wb") as copied:
-            shutil.copyfileobj(own, copied)
-    elif name == "objects":  # those of before have no bounds
-        save_objects(open_objects(path), copy)
-    else:
-        save_surroundings(read_surroundings(path, role=name, crs=crs, tell=tell), copy)
-    return copy
-
-
-def _covered(path: Path, crs: CRS) -> bool:
-    """Tell whether a file is GeoParquet in this CRS with a column of bounds."""
-    try:
-        schema = pq.read_schema(path)
-        geo = json.loads(schema.metadata[b"geo"])
-        column = geo["columns"][geo["primary_column"]]
-        bounds = column["covering"]["bbox"]["xmin"][0]
-        return bounds in schema.names and CRS.from_user_input(column["crs"]) == crs
-    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, CRSError):
-        return False
-
-
-def _widest(streets: Path) -> float:
-    """Return the largest half-width of any street in metres, 0 where the file tells none."""
-    if HALF_WIDTH not in pq.read_schema(streets).names:
-        return 0.0
-    widths = pq.read_table(streets, columns=[HALF_WIDTH], **CHECKING_PAGES)[HALF_WIDTH].to_numpy()
-    finite = widths[np.isfinite(widths.astype(np.float64))]
-    return float(finite.max(initial=0.0))
 
 
 def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:

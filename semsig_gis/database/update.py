@@ -30,11 +30,11 @@ from semsig_gis.database.file import (
     part_name,
     read_manifest,
 )
+from semsig_gis.database.inputs import folder_beside
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.tiles import (
     TileSpec,
     build_parts,
-    folder_beside,
     plan_tiles,
     publish,
     save_tile,

@@ -265,7 +265,9 @@ def geojson_files(draw: st.DrawFn) -> bytes:
         kinds = [point, line, line.envelope, shapely.MultiPoint([point]), None]
         shape = draw(st.sampled_from(kinds)) if features else point
         geometry = shape and json.loads(shapely.to_geojson(shape))
-        values = st.none() | st.booleans() | st.integers(-9, 9) | TEXTS | st.lists(st.integers())
+        # Within 64 bits: GDAL refuses files with larger numbers.
+        numbers = st.lists(st.integers(-(2**63), 2**63 - 1))
+        values = st.none() | st.booleans() | st.integers(-9, 9) | TEXTS | numbers
         properties = {field: draw(values) for field in fields}
         features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     return json.dumps({"type": "FeatureCollection", "features": features}).encode()

@@ -48,8 +48,7 @@ def expected(extract: Path) -> StreetObjects:
 @pytest.fixture(scope="module")
 def frame(extract: Path) -> gpd.GeoDataFrame:
     """Return what osmnx makes of the town."""
-    import osmnx
-
+    osmnx = pytest.importorskip("osmnx", reason="osmnx is not installed")
     return osmnx.features_from_xml(extract, tags=dict.fromkeys(KEYS, True))
 
 
@@ -57,6 +56,7 @@ def frame(extract: Path) -> gpd.GeoDataFrame:
 def quack(extract: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the GeoParquet file that QuackOSM makes of the town."""
     folder = tmp_path_factory.mktemp("quackosm")
+    pytest.importorskip("quackosm", reason="QuackOSM is not installed")
     package = importlib.util.find_spec("duckdb_extension_spatial")
     assert package is not None
     assert package.origin is not None

@@ -270,15 +270,16 @@ TEXT = pd.Series(dtype="str").dtype
 TYPES = {"class_name": TEXT, "source_id": TEXT, "geometry": "geometry"}
 
 
+@pytest.mark.parametrize("name", ["x#y?z! %20", "x%y;z", "x&y!z"])
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_names_that_a_url_would_cut(suffix: str, tmp_path: Path) -> None:
+def test_names_that_a_url_would_cut(suffix: str, name: str, tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.mkdir()
     path = write(frame([(1, 2)], n=[1]), plain, suffix)
-    folder = plain.rename(tmp_path / "a#b ?c=1&d!e")
+    folder = plain.rename(tmp_path / f"in {name}")
     path = folder / path.name
     if suffix != "shp":
-        path = path.rename(folder / f"x#y?z! %20.{suffix}")
+        path = path.rename(folder / f"{name}.{suffix}")
     assert read(path, crs="EPSG:2154").table.dtypes.to_dict() == TYPES
     assert list_layers(path)[0].rows == 1
 

@@ -60,9 +60,10 @@ class Member:
         """What GDAL opens."""
         if self.inner is None:
             file = str(self.file)
-            # pyogrio takes what stands before a '!' for an archive, but not in GDAL's own forms.
+            # pyogrio takes what stands before a '!' for an archive, and a ';' for the end of the
+            # name, but not in GDAL's own forms.
             escaped = file.replace("%", "%25").replace("&", "%26")
-            return f"/vsicached?file={escaped}" if "!" in file else file
+            return f"/vsicached?file={escaped}" if {"!", ";"} & {*file} else file
         # GDAL's own form: zip:// is parsed as a URL and loses what follows a '#' or a '?'.
         return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
 
