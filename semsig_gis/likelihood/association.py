@@ -324,7 +324,7 @@ SAMPLE, QUICK_SAMPLE = 2304, 768
 # Cells that are looked at from aside before, the first of them whatever comes out.
 ASIDE, FIRST_ASIDE, SAMPLE_ASIDE = 8192, 2048, 1024
 HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from which the rest are not
-NEGLIGIBLE = 30.0  # nats below the best, at which cells hold nothing together
+NEGLIGIBLE = 30.0  # nats below the best that was re-ranked, at which cells hold nothing together
 POOL, WINDOWS = 16, 8  # times a sample, that it is taken from; parts of it, by likelihood
 # Turns around the likeliest one of the scan, which knows it to less than six degrees.
 TURNS = np.arange(-7.5, 7.6, 3.0)
@@ -440,7 +440,11 @@ def _replaced(
     turns = [np.concatenate(each) for each in zip(*(turn for _, turn in parts), strict=True)]
     loglik = old.copy()
     if len(cells) < len(old):
-        _shift(loglik, lambda some: rank(some)[0], total, cells, sample)
+        # The best that was re-ranked may be far below what the others seem to be.
+        best = (new if log_prior is None else new + log_prior[cells]).max()
+        rest = total > min(best, total.max()) - NEGLIGIBLE
+        rest[cells] = False
+        _shift(loglik, lambda some: rank(some)[0], total, np.flatnonzero(rest), sample)
     loglik[cells] = new
     return loglik, cells, turns
 
@@ -449,17 +453,14 @@ def _shift(
     loglik: NDArray[np.float64],
     rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
     total: NDArray[np.float64],
-    ranked: NDArray[np.int64],
+    tail: NDArray[np.int64],
     size: int,
 ) -> None:
-    """Move the log-likelihood of all cells as far as it changes for some that are not `ranked`.
+    """Move the log-likelihood of all cells as far as it changes for some of the `tail`.
 
     `rank` gives the new likelihood of some cells, `total` is that of all with the prior; so many
     are tried.
     """
-    rest = total > total.max() - NEGLIGIBLE
-    rest[ranked] = False
-    tail = np.flatnonzero(rest)
     if not len(tail):
         return
     pool = tail

@@ -48,7 +48,7 @@ LEVELS = 64
 TURNS = 64
 """Turns of a photo whose north is uncertain: steps of 5.625 degrees."""
 
-VERSION = 5  # raised whenever the same database and noise give other likelihoods
+VERSION = 6  # raised whenever the same database and noise give other likelihoods
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 STANDS = 3  # places a side of a cell, at which the best cells are compared
 LEAST_DENSITY = 1e-12

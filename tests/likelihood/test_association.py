@@ -293,6 +293,24 @@ def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:
     assert rerank(index, types, scores) is scores
 
 
+def test_a_sum_that_is_far_too_high_everywhere_hides_nothing() -> None:
+    # Told that next to nothing fails, many detections look like a few objects in the first sum.
+    noise = NoiseSpec(detection=0.999, misnamed=0.0, clutter=0.01, bearing_sigma=5.0)
+    database = random_database(5, cells=400, longest=40, classes=2)
+    index = build_index(database, noise)
+    hidden = 0
+    for cell in np.argsort(-database.lengths)[:12].tolist():
+        query = distorted(database, cell, np.random.default_rng([cell, 1]))
+        scores = index.scores(query)
+        exact = align_cells(database, query, noise, np.arange(400))
+        best = int(exact.argmax())
+        found = rerank(index, query, scores, count=20).loglik
+        assert exact[best] < scores.loglik.max() - 30.0
+        if found[best] == pytest.approx(exact[best]):
+            hidden += found.argmax() != best
+    assert not hidden
+
+
 @pytest.mark.parametrize("north_sigma", [10.0, math.inf])
 def test_the_heading_is_found_finer_than_the_scan_has_it(north_sigma: float) -> None:
     database = random_database(3, cells=100, longest=20)
