@@ -15,7 +15,7 @@ from .sources.catalog import (
     paper_taxonomy as paper_taxonomy,
 )
 from .sources.area import clip_layers as clip_layers
-from .sources.catalog import LayerSpec as LayerSpec
+from .sources.layers import LayerSpec as LayerSpec
 from .sources.synthetic.city import (
     CitySpec as CitySpec,
     PARIS_LIKE as PARIS_LIKE,

@@ -26,8 +26,9 @@ from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
-    from semsig_gis.sources.catalog import Catalog, LayerSpec
+    from semsig_gis.sources.catalog import Catalog
     from semsig_gis.sources.conditions import Rules
+    from semsig_gis.sources.layers import LayerSpec
 
 
 def _catalogs(incomplete: str) -> list[str]:

@@ -32,10 +32,11 @@ from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
 from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.objects.load import assemble, read_files
 from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import LayerSpec, catalog_names, load_catalog, paper_taxonomy
+from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
 from semsig_gis.sources.conditions import ANY_VALUE, BETWEEN_SLASHES, Condition
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.decimals import decimal
+from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm.file import FORMATS
 from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84, off_the_globe
 from semsig_gis.sources.services.layers import POINT, SHAPE, fold

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import Catalog, LayerSpec
+    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.sources.layers import LayerSpec
 
 # Readers whose service sends an area in parts, each a file.
 TILED: Mapping[str, ModuleType] = {

@@ -13,14 +13,9 @@ from semsig_gis.core.geometry import LICENSES, SOURCE_ID
 from semsig_gis.objects.load import assemble, choose_layers
 from semsig_gis.objects.table import Licence
 from semsig_gis.sources import TAGS_READER
-from semsig_gis.sources.catalog import (
-    Catalog,
-    ClassBy,
-    LayerSpec,
-    built_in_taxonomy,
-    load_catalog,
-)
+from semsig_gis.sources.catalog import Catalog, built_in_taxonomy, load_catalog
 from semsig_gis.sources.conditions import as_text
+from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.osm.features import frame_fields, frame_layers, holds_tags, tells_elements
 from semsig_gis.sources.raw_layer import RowRules, Rows, raw_layer
 

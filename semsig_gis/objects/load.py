@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.sources import RawLayer, RowCounts
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import Catalog, LayerSpec, Role
+    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.sources.layers import LayerSpec, Role
 
 
 # Two objects of a class within the same centimetre are one object listed twice.

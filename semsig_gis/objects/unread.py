@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import Catalog, LayerSpec
+    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.sources.layers import LayerSpec
 
 # Files that are read in about a second.
 SMALL_BYTES = 2**21

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from geopandas import GeoDataFrame
 
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import LayerSpec
+    from semsig_gis.sources.layers import LayerSpec
 
 # The module of this package that reads what a catalogue's `reader` names.
 READERS = {

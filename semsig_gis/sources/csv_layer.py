@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from typing import IO
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.csv_file import CsvFile
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
     Row = Mapping[str, str | None]

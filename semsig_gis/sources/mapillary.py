@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 FIELDS = ("id", "object_value", "object_type", "geometry", "first_seen_at", "last_seen_at")

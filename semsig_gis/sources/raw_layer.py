@@ -20,17 +20,17 @@ from pyproj.exceptions import CRSError
 from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
 from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, NAME, SOURCE_ID, crs_label
 from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.catalog import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.conditions import Condition, as_text, matches, pattern_of
 from semsig_gis.sources.decimals import decimal
+from semsig_gis.sources.layers import MAX_WIDTH_M, MIN_WIDTH_M
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.conditions import Value
+    from semsig_gis.sources.layers import LayerSpec
 
 
 WGS84 = CRS.from_epsg(4326)

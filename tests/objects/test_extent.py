@@ -14,7 +14,8 @@ from semsig_gis.core.geometry import angular_distance, grid_convergence, wrap_de
 from semsig_gis.database.build import build_database
 from semsig_gis.objects.extent import settle_extent
 from semsig_gis.objects.load import assemble
-from semsig_gis.sources.catalog import Catalog, LayerSpec, paper_taxonomy
+from semsig_gis.sources.catalog import Catalog, paper_taxonomy
+from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

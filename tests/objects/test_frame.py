@@ -20,7 +20,8 @@ from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.frame import objects_from_frame
 from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.sources.catalog import Catalog, LayerSpec, load_catalog, paper_taxonomy
+from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
+from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase

@@ -30,7 +30,8 @@ from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.objects.unread import passed_by, read_small
 from semsig_gis.reports.quality import quality_report, quality_tables
 from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import Catalog, ClassBy, LayerSpec, load_catalog, paper_taxonomy
+from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
+from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.raw_layer import RowRules, Rows
 

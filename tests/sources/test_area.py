@@ -24,7 +24,7 @@ from semsig_gis.sources.area import (
     note_outside,
     parse_area,
 )
-from semsig_gis.sources.catalog import LayerSpec
+from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

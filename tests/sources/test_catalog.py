@@ -19,13 +19,12 @@ from semsig_gis.core.taxonomy import ObjectClass
 from semsig_gis.sources import FILE_SUFFIXES, find_files
 from semsig_gis.sources.catalog import (
     Catalog,
-    LayerSpec,
-    WidthBy,
     catalog_names,
     combine_catalogs,
     load_catalog,
     paper_taxonomy,
 )
+from semsig_gis.sources.layers import LayerSpec, WidthBy
 from semsig_gis.sources.vector.member import DRIVERS
 
 if TYPE_CHECKING:

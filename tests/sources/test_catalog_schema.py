@@ -17,18 +17,20 @@ from semsig_gis.core.errors import CatalogError
 from semsig_gis.sources import READERS
 from semsig_gis.sources.catalog import (
     CATALOG_KEYS,
-    CLASS_BY_KEYS,
     CLASS_KEYS,
-    LAYER_KEYS,
     MEASURES,
-    WIDTH_BY_KEYS,
-    ElementKind,
-    GeometryKind,
-    Role,
     _catalog,
     catalog_names,
     data_folder,
     paper_taxonomy,
+)
+from semsig_gis.sources.layers import (
+    CLASS_BY_KEYS,
+    LAYER_KEYS,
+    WIDTH_BY_KEYS,
+    ElementKind,
+    GeometryKind,
+    Role,
 )
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import ClassBy, LayerSpec
+from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.osm.elements import TagIndex, has_tags, relation_shape, way_shape
 from semsig_gis.sources.osm.file import read_layers
 

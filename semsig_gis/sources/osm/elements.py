@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import ElementKind, LayerSpec, Role
+    from semsig_gis.sources.layers import ElementKind, LayerSpec, Role
     from semsig_gis.sources.raw_layer import Position
 
 RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its end

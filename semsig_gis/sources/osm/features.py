@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import ElementKind, LayerSpec
+    from semsig_gis.sources.layers import ElementKind, LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 SUFFIXES = frozenset({*DRIVERS, *parquet.SUFFIXES, ".zip"} - {".csv"})

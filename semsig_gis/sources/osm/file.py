@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from osmium.osm import Location
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import ElementKind, LayerSpec
+    from semsig_gis.sources.layers import ElementKind, LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 # What a file is by its name, and what pyosmium calls it.

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
 
 JSON = ("application/json",)

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.http.cache import Fetched
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Position
     from semsig_gis.sources.services.table import Record, Table
 

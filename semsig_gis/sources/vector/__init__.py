@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import LayerSpec
     from semsig_gis.sources.csv_layer import CsvTable
+    from semsig_gis.sources.layers import LayerSpec
     from semsig_gis.sources.raw_layer import Rows
     from semsig_gis.sources.vector.by_pyogrio import Layer
 

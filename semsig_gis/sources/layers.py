@@ -1,0 +1,374 @@
+"""Layers of catalogues: which files and rows hold a class of object, buildings or streets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.errors import (
+    CatalogError,
+    UnknownNameError,
+)
+from semsig_gis.sources.conditions import COMPARES, Condition, Value
+from semsig_gis.storage.toml import check_keys, metres, one_of, texts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.sources.conditions import Rules
+
+
+GeometryKind = Literal["point", "line", "polygon"]
+ElementKind = Literal["node", "way", "relation"]
+Role = Literal["objects", "buildings", "streets"]
+# No street is narrower or wider; the number is in another unit, or means something else.
+MIN_WIDTH_M = 0.1
+MAX_WIDTH_M = 200.0
+
+
+@dataclass(frozen=True, slots=True)
+class ClassBy:
+    """A field whose value decides the class of a row.
+
+    Rows of other values, and of values without a class, are left out, unless `otherwise` gives the
+    former the layer's class.
+    """
+
+    field: str
+    classes: tuple[tuple[Value, str], ...]
+    otherwise: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class WidthBy:
+    """A field that says of which class a street is, and how wide the streets of a class are.
+
+    Widths are in metres; `default` is for other values, None where nobody knows.
+    """
+
+    field: str
+    widths: tuple[tuple[Value, float], ...]
+    default: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LayerSpec:
+    """One layer of a source and the class of street object it holds.
+
+    Parameters
+    ----------
+    name, class_name : str
+        Name of the layer in the catalogue, and class of its rows; empty where `class_by` says it
+        of every row, and for surroundings.
+    files : tuple of str
+        File-name patterns (``*``, ``?``) by which the layer's file is recognised.
+    layer : str, optional
+        Layer inside a file that holds several.
+    where, exclusions : tuple of (str, tuple)
+        Fields or tags and the values of each: of `where`, all must hold for a row to count, and of
+        `exclusions`, none. Values are exact, but for texts between slashes (a regular expression
+        that the whole value must match), comparisons such as ``">=0"``, ``"none"`` (absent or
+        empty) and ``"*"`` (every value but ``"no"``).
+    class_by : ClassBy, optional
+        Field that decides the class row by row.
+    width_by, width_field : WidthBy, str, optional
+        Of streets: the field that says how wide they are by its class of street, and the one that
+        holds their width in metres, which goes first.
+    name_field : str, optional
+        Of streets: the field that holds their name.
+    id_field, unique_id : str, bool, optional
+        Field that identifies a row in its source (else the feature's number does), and whether rows
+        of the same id are the same object, also across several files.
+    geometry, crs, rows : {"point", "line", "polygon"}, str, tuple of (int, int), optional
+        What is expected: geometry, CRS (used where the file states none), and the least and largest
+        number of rows.
+    x_field, y_field : str, optional
+        Coordinate columns of a CSV file.
+    aliases : tuple of (str, tuple of str)
+        Fields and the names that they go by in other editions of the file (Opendatasoft only).
+    dataset, server_where, select : str, str, tuple of str, optional
+        Name of the dataset on its portal, filter in the portal's own language, and fields to ask
+        for.
+    tags, elements : tuple of tuple of (str, tuple of str), tuple of {"node", "way", "relation"}
+        OpenStreetMap elements that count, and their tags: alternatives, each of keys and accepted
+        values that must all hold; the value ``"*"`` accepts every value but ``"no"``.
+    role : {"objects", "buildings", "streets"}
+        Street objects, footprints that hide them, or centre lines. Only objects have a class.
+    optional, reader, note : bool, str, str
+        Whether the layer is read only when it is named, the reader of its file, and a remark for
+        people.
+    license, attribution : str
+        Licence of the data and the line that its publisher asks for.
+
+    Examples
+    --------
+    >>> LayerSpec(name="trees", class_name="alignment_tree", files=("trees.*",)).geometry
+    'point'
+    """
+
+    name: str
+    class_name: str
+    files: tuple[str, ...] = ()
+    layer: str | None = None
+    where: Rules = ()
+    exclusions: Rules = ()
+    class_by: ClassBy | None = None
+    width_by: WidthBy | None = None
+    width_field: str | None = None
+    name_field: str | None = None
+    id_field: str | None = None
+    geometry: GeometryKind = "point"
+    crs: str | None = None
+    rows: tuple[int, int] | None = None
+    x_field: str | None = None
+    y_field: str | None = None
+    aliases: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    unique_id: bool = False
+    dataset: str | None = None
+    server_where: str | None = None
+    select: tuple[str, ...] = ()
+    tags: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...] = ()
+    elements: tuple[ElementKind, ...] = ("node", "way", "relation")
+    role: Role = "objects"
+    optional: bool = False
+    reader: str = "vector_file"
+    note: str = ""
+    license: str = "unknown"
+    attribution: str = ""
+
+    @property
+    def has_width(self) -> bool:
+        """Whether something is said about the widths of streets."""
+        return self.width_by is not None or self.width_field is not None
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The classes that objects of the layer may have."""
+        by = self.class_by
+        if by is None:
+            return (self.class_name,) if self.role == "objects" else ()
+        names = [name for _, name in by.classes if name]
+        return tuple(dict.fromkeys([self.class_name, *names] if by.otherwise else names))
+
+    @property
+    def terms(self) -> str:
+        """Whom to name for the layer, and under which licence."""
+        return f"{self.attribution or 'no attribution given'} ({self.license})"
+
+    @property
+    def fields(self) -> tuple[tuple[str, str], ...]:
+        """The keys that name a field of the file, but for coordinates, and the fields."""
+        uses = [("where", field) for field, _ in self.where]
+        uses += [("not", field) for field, _ in self.exclusions]
+        uses += [("class_by", self.class_by.field)] if self.class_by else []
+        uses += [("width_by", self.width_by.field)] if self.width_by else []
+        uses += [("width_field", self.width_field)] if self.width_field else []
+        uses += [("name_field", self.name_field)] if self.name_field else []
+        uses += [("id_field", self.id_field)] if self.id_field else []
+        return tuple(uses)
+
+
+LAYER_KEYS = {
+    "name": str,
+    "class": str,
+    "files": list,
+    "layer": str,
+    "where": dict,
+    "not": dict,
+    "class_by": dict,
+    "width_by": dict,
+    "width_field": str,
+    "name_field": str,
+    "aliases": dict,
+    "id_field": str,
+    "unique_id": bool,
+    "dataset": str,
+    "server_where": str,
+    "select": list,
+    "tags": list,
+    "elements": list,
+    "role": str,
+    "optional": bool,
+    "note": str,
+    "geometry": str,
+    "crs": str,
+    "rows": list,
+    "x_field": str,
+    "y_field": str,
+    "license": str,
+    "attribution": str,
+}
+CLASS_BY_KEYS = {"field": str, "values": dict}
+OTHERWISE = "class"  # the one thing that class_by may say of other values
+WIDTH_BY_KEYS = {"field": str, "values": dict, "default": object}
+
+
+def layer_of(
+    item: object, where: str, *, taxonomy: Taxonomy, shared: Mapping[str, Any]
+) -> LayerSpec:
+    """Return the checked layer of a ``[[layers]]`` table; CatalogError says what is wrong in it.
+
+    `shared` has files, reader, license, attribution and exclusions of layers that do not say
+    otherwise; surroundings have no exclusions but their own.
+    """
+    if not isinstance(item, dict):
+        msg = f"{where} has the layer {item!r}; write a [[layers]] table."
+        raise CatalogError(msg)
+    where = f"{where}, layer {item.get('name', '?')!r}"
+    check_keys(item, LAYER_KEYS, where, ("name",))
+    role = one_of(item.get("role", "objects"), "role", get_args(Role), where)
+    class_by = _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None
+    _require_classes(item, role, class_by, where)
+    if "class" in item:
+        require_class(item["class"], taxonomy, where)
+    if "crs" in item:
+        try:
+            CRS.from_user_input(item["crs"])
+        except CRSError as error:
+            msg = (
+                f"{where} has crs = {item['crs']!r}, which is unknown; "
+                "write a code such as 'EPSG:4326'."
+            )
+            raise CatalogError(msg) from error
+    if role != "streets" and (of_streets := {"width_by", "width_field", "name_field"} & set(item)):
+        msg = f"{where} has {min(of_streets)}, which only streets have; remove it or add its role."
+        raise CatalogError(msg)
+    if item.get("unique_id", False) and "id_field" not in item:
+        msg = f"{where} has unique_id = true without an id_field; name the field of the ids."
+        raise CatalogError(msg)
+    files = texts(item.get("files", list(shared["files"])), "files", where)
+    if not files and ("files" in item or "dataset" not in item):
+        msg = f"{where} has files = []; write a list of file names or patterns."
+        raise CatalogError(msg)
+    kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
+    exclusions = shared["exclusions"] if role == "objects" else ()
+    if "not" in item:
+        exclusions = conditions_of(item["not"], "not", where)
+    plain = {key: value for key, value in item.items() if LAYER_KEYS[key] in {str, bool}}
+    own = {
+        "class_name": plain.pop("class", ""),
+        "role": role,
+        "files": files,
+        "where": conditions_of(item.get("where", {}), "where", where),
+        "exclusions": exclusions,
+        "class_by": class_by,
+        "width_by": _width_by(item["width_by"], where) if "width_by" in item else None,
+        "aliases": tuple(
+            (field, texts(names, f"aliases of {field!r}", where))
+            for field, names in item.get("aliases", {}).items()
+        ),
+        "geometry": one_of(
+            item.get("geometry", "point"), "geometry", get_args(GeometryKind), where
+        ),
+        "rows": _rows(item["rows"], where) if "rows" in item else None,
+        "select": texts(item.get("select", []), "select", where),
+        "tags": tuple(_tags(tags, where) for tags in item.get("tags", [])),
+        "elements": tuple(one_of(kind, "elements", get_args(ElementKind), where) for kind in kinds),
+    }
+    return LayerSpec(**{**shared, **plain, **own})
+
+
+def _require_classes(
+    item: Mapping[str, Any], role: Role, class_by: ClassBy | None, where: str
+) -> None:
+    """Refuse objects without a class, and surroundings with one."""
+    given = "class" in item
+    if role == "objects" and not given and (class_by is None or class_by.otherwise):
+        msg = f"{where} lacks the key 'class'; add it."
+        raise CatalogError(msg)
+    if role != "objects" and given:
+        msg = f"{where} needs no class; remove it."
+        raise CatalogError(msg)
+
+
+def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    if not isinstance(item, dict) or not item:
+        msg = f"{where} has the tags {item!r}; write a table of keys and values."
+        raise CatalogError(msg)
+    tags = tuple(
+        (key, texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
+        for key, value in item.items()
+    )
+    for key, values in tags:
+        comparison = next(filter(COMPARES.match, values), None)
+        if comparison is not None:
+            msg = (
+                f"{where} has the tag {key!r} = {comparison!r}, and tags are exact; compare in "
+                f"where = {{ {key} = {comparison!r} }}."
+            )
+            raise CatalogError(msg)
+    return tags
+
+
+def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
+    """Refuse a class that does not exist, with a CatalogError that offers the nearest name."""
+    try:
+        taxonomy.by_name(name)
+    except UnknownNameError as error:
+        msg = f"{where}: {error}"
+        raise CatalogError(msg) from error
+
+
+def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
+    where = f"{where}, class_by"
+    check_keys(item, {**CLASS_BY_KEYS, "otherwise": str}, where, CLASS_BY_KEYS)
+    if item.get("otherwise", OTHERWISE) != OTHERWISE:
+        msg = (
+            f"{where} has otherwise = {item['otherwise']!r}; write {OTHERWISE!r}, which gives "
+            "other values the layer's class, or remove it, so that they are left out."
+        )
+        raise CatalogError(msg)
+    for value, name in item["values"].items():
+        if not isinstance(name, str):
+            msg = f"{where} has {value!r} = {name!r}; write the name of a class."
+            raise CatalogError(msg)
+        require_class(name, taxonomy, where)
+    return ClassBy(item["field"], tuple(item["values"].items()), "otherwise" in item)
+
+
+def _width_by(item: dict[str, Any], where: str) -> WidthBy:
+    where = f"{where}, width_by"
+    check_keys(item, WIDTH_BY_KEYS, where, ("field", "values"))
+    default = item.get("default")
+    return WidthBy(
+        item["field"],
+        tuple(
+            (value, metres(width, repr(value), f"{where}, values", most=MAX_WIDTH_M))
+            for value, width in item["values"].items()
+        ),
+        None if default is None else metres(default, "default", where, most=MAX_WIDTH_M),
+    )
+
+
+def conditions_of(item: dict[str, Any], key: str, where: str) -> Rules:
+    """Return what is asked of the fields of a table, such as ``where`` or ``not``."""
+    return tuple((field, _values(accepted, key, field, where)) for field, accepted in item.items())
+
+
+def _values(accepted: object, key: str, field: str, where: str) -> tuple[Value, ...]:
+    values: list[Any] = accepted if isinstance(accepted, list) else [accepted]
+    if not values or not all(isinstance(value, Value) for value in values):
+        msg = (
+            f"{where} filters {field!r} by {accepted!r}; "
+            "write the accepted value, or a list of accepted values."
+        )
+        raise CatalogError(msg)
+    try:
+        Condition.parse(values)
+    except CatalogError as error:
+        msg = f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}"
+        raise CatalogError(msg) from error
+    return tuple(values)
+
+
+def _rows(item: list[Any], where: str) -> tuple[int, int]:
+    match item:
+        # bool is an int to Python, never to a catalogue
+        case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
+            return least, most
+    msg = f"{where} has rows = {item!r}; write [least, most]."
+    raise CatalogError(msg)
