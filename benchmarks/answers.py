@@ -16,8 +16,8 @@ from rapidfuzz.process import cdist
 
 from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.file import save_database
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate
 from semsig_gis.likelihood.noise.model import cell_noise, named_noise

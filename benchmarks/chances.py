@@ -24,7 +24,7 @@ from benchmarks._later_city import later_city
 from benchmarks.tables import TODAY
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.evaluate import score_queries, scored_tables
 from semsig_gis.evaluation.figures import calibration_bins, plain_records
 from semsig_gis.likelihood.index import build_index

@@ -23,7 +23,8 @@ from benchmarks._cities import MONTPELLIER, made_up, real
 from benchmarks.maps import DRAWN, FRAMES, started
 from benchmarks.workbench import asked, photo_in, serving
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, open_city, save_with_store
+from semsig_gis.database.city import open_city
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identify.identify import identify
 from semsig_gis.evaluation.methods import localize

@@ -32,8 +32,8 @@ from benchmarks._cities import MONTPELLIER, PARIS_LIKE, made_up, made_up_streets
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.figures import calibration_bins, plain_records
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator

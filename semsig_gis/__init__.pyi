@@ -62,7 +62,7 @@ from .database.observation import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
 from .database.properties import database_summary as database_summary
 from .database.answer import Requirement as Requirement
-from .database.city import (
+from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,
     save_with_store as save_with_store,

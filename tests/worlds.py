@@ -19,7 +19,7 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, save_with_store
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.objects.table import Licence, StreetObjects
 from semsig_gis.sources.catalog import load_catalog
 

@@ -145,7 +145,7 @@ def _build_whole(
 ) -> tuple[int, int]:
     """Build a database in one piece, and the object store beside it; return cells and entries."""
     from semsig_gis.database.build import build_database
-    from semsig_gis.database.city import ObjectStore, save_with_store
+    from semsig_gis.database.store import ObjectStore, save_with_store
     from semsig_gis.objects.surroundings import read_surroundings
     from semsig_gis.objects.table import open_objects
 

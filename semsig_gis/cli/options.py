@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.core.view import View
-    from semsig_gis.database.city import City, ObjectStore
+    from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.north import North
+    from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.locate import LikelihoodLocator
     from semsig_gis.likelihood.noise.age import Drift
     from semsig_gis.likelihood.noise.model import Noise
@@ -429,7 +430,7 @@ def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
 
 def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:
     """Return the street objects of a database; None where there are none, unless needed."""
-    from semsig_gis.database.city import ObjectStore, open_store
+    from semsig_gis.database.store import ObjectStore, open_store
 
     if objects is not None and not objects.is_dir():
         from semsig_gis.objects.table import open_objects

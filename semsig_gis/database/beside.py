@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.scratch import HALF_DONE, is_abandoned, remove_abandoned
-from semsig_gis.database.city import open_city, store_path, waiting_store
+from semsig_gis.database.city import open_city
+from semsig_gis.database.store import store_path, waiting_store
 from semsig_gis.storage.whole import alone_in, reason
 
 if TYPE_CHECKING:

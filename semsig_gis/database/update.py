@@ -20,7 +20,7 @@ from semsig_gis.core.ranges import MOST_METRES
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.terminal import percent
 from semsig_gis.database.build import build_cells
-from semsig_gis.database.city import open_city, save_with_store, stored_inputs
+from semsig_gis.database.city import open_city
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
 from semsig_gis.database.file import (
     INPUTS,
@@ -32,6 +32,7 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.inputs import folder_beside
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
+from semsig_gis.database.store import save_with_store, stored_inputs
 from semsig_gis.database.tiles import (
     TileSpec,
     build_parts,
@@ -50,9 +51,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import Part
+    from semsig_gis.database.store import ObjectStore
     from semsig_gis.database.tiles import Tile, TilePlan
     from semsig_gis.objects.changes import ClassChange, ObjectChanges
     from semsig_gis.objects.table import StreetObjects

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.answer import Answer, Locator, Requirement
-    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.north import North
+    from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.index import LikelihoodIndex
     from semsig_gis.likelihood.locate import Location
     from semsig_gis.likelihood.noise.model import Noise

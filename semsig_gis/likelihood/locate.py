@@ -32,13 +32,7 @@ from semsig_gis.likelihood.estimate import cell_estimate, refined_estimate
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import CellScores
 from semsig_gis.likelihood.noise.model import cell_noise, place_noise
-from semsig_gis.likelihood.posterior import (
-    KEPT,
-    Posterior,
-    posterior,
-    prior_ratio,
-    refine,
-)
+from semsig_gis.likelihood.posterior import KEPT, Posterior, posterior, prior_ratio, refine
 from semsig_gis.likelihood.route import route_posteriors
 from semsig_gis.likelihood.rule import DEFAULT_RULE
 
@@ -50,9 +44,9 @@ if TYPE_CHECKING:
     from semsig_gis.core.display import MapFrame
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.answer import DistanceMemo
-    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.north import North
+    from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.estimate import PlaceEstimate
     from semsig_gis.likelihood.explain import Explanation
     from semsig_gis.likelihood.index import LikelihoodIndex

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
     from semsig_gis.queries.chain import QueryDistortion
 
 SeenFrom = Literal["cells", "anywhere"]

@@ -9,8 +9,8 @@ from semsig_gis.maps.objects import packed_ground
 from semsig_gis.maps.parts import search_area
 
 if TYPE_CHECKING:
-    from semsig_gis.database.city import ObjectStore
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
 
 BESIDE_M = 100.0  # from the outermost cells, how far streets are drawn
 

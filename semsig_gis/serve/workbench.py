@@ -55,8 +55,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.city import City, ObjectStore
+    from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
     from semsig_gis.likelihood.index import CellScores, LikelihoodIndex
     from semsig_gis.likelihood.locate import Location
     from semsig_gis.likelihood.noise.model import Noise

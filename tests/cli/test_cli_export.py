@@ -17,8 +17,8 @@ from sentences import sentence
 from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
-from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.evaluation.file import save_evaluation
 from semsig_gis.evaluation.identify.result import save_identifiability
 from semsig_gis.exports.rasters import cell_errors

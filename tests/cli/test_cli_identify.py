@@ -11,8 +11,9 @@ import geopandas as gpd
 import pytest
 from worlds import random_town
 
-from semsig_gis.database.city import City, ObjectStore, open_store, save_with_store
+from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.evaluation.identify import identify as identifying
 from semsig_gis.objects.table import save_objects

@@ -17,8 +17,8 @@ from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, World, random_town
 
-from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import save_database
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.views import views_at
 from semsig_gis.evaluation.file import open_evaluation
 from semsig_gis.likelihood.noise.model import open_noise

@@ -15,7 +15,7 @@ from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, save_with_store
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.objects.surroundings import save_surroundings
 
 if TYPE_CHECKING:

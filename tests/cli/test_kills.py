@@ -17,7 +17,8 @@ from kills import killed_at
 from worlds import assert_index_fits, random_town
 
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, open_city, save_with_store
+from semsig_gis.database.city import open_city
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.objects.table import save_objects
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 from worlds import random_town
 
-from semsig_gis.database.city import ObjectStore, save_with_store
 from semsig_gis.database.file import save_database
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.objects.table import save_objects
 

@@ -11,8 +11,8 @@ from small_city import small_city
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.scratch import MACHINE, OWNER, own_folder
 from semsig_gis.database.beside import companions, remove_companions
-from semsig_gis.database.city import ObjectStore, open_store, save_with_store
 from semsig_gis.database.file import open_database
+from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 
 if TYPE_CHECKING:
     from pathlib import Path

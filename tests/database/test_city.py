@@ -18,17 +18,9 @@ from sentences import assert_sentence, refused
 from worlds import CORNER, assert_index_fits, assert_same, random_town, surroundings
 
 from semsig_gis.core.errors import CrsError, DatabaseError, InputError
-from semsig_gis.database import city as store_module
+from semsig_gis.database import store as store_module
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import (
-    City,
-    ObjectStore,
-    built_digest,
-    open_city,
-    open_store,
-    save_with_store,
-    store_path,
-)
+from semsig_gis.database.city import City, open_city
 from semsig_gis.database.file import (
     PartitionedDatabase,
     digest,
@@ -36,6 +28,13 @@ from semsig_gis.database.file import (
     part_files,
     read_manifest,
     save_database,
+)
+from semsig_gis.database.store import (
+    ObjectStore,
+    built_digest,
+    open_store,
+    save_with_store,
+    store_path,
 )
 from semsig_gis.objects.table import open_objects
 

@@ -16,9 +16,9 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.merge import merge_databases
+from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.table import Licence, save_objects

@@ -21,8 +21,8 @@ from worlds import CODES, CORNER, TAXONOMY, assert_index_fits, assert_same, surr
 from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_cells, build_database
-from semsig_gis.database.city import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.file import open_database
+from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.database.update import (
     compare_cells,

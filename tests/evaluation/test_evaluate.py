@@ -12,7 +12,7 @@ from sentences import refused
 from worlds import random_town
 
 from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.compare import changed_successes, common_cases, compare_evaluations
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.methods import make_locator, parse_method

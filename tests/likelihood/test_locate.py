@@ -17,8 +17,8 @@ from worlds import CODES, CORNER, World, random_town
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import View
-from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.occlusion import Footprints
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.database.views import views_at
 from semsig_gis.likelihood.estimate import PlaceEstimate, cell_estimate, refined_estimate
 from semsig_gis.likelihood.index import build_index

@@ -14,17 +14,11 @@ from sentences import refused
 from benchmarks._later_city import later_city
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.evaluate import score_queries, scored_tables
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import LikelihoodLocator
-from semsig_gis.likelihood.noise.age import (
-    Drift,
-    aged_noise,
-    fresh_noise,
-    named_drift,
-    open_drift,
-)
+from semsig_gis.likelihood.noise.age import Drift, aged_noise, fresh_noise, named_drift, open_drift
 from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise
 from semsig_gis.objects.changes import ClassChange, compare_objects
 from semsig_gis.objects.load import build_objects

@@ -13,7 +13,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.likelihood.association import align_cells, rerank
 from semsig_gis.likelihood.explain import explain_cell
 from semsig_gis.likelihood.index import CellScores, build_index

@@ -16,7 +16,7 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.core.signs import ANSWERS, CANDIDATE_RAMP, VERDICTS
 from semsig_gis.core.terminal import percent
 from semsig_gis.core.view import Photo, View
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.locate import locate

@@ -30,7 +30,7 @@ from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.signs import CANDIDATE_RAMP, OBJECT_COLOURS, VERDICTS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.methods import localize
 from semsig_gis.likelihood.index import build_index

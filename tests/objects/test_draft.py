@@ -21,11 +21,11 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.objects.draft import (
+from semsig_gis.objects.draft import draft_catalog
+from semsig_gis.objects.guesses import (
     Column,
     Sample,
     columns_of,
-    draft_catalog,
     guess_class,
     guess_class_by,
     guess_position,

@@ -16,7 +16,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.frame import objects_from_frame
 from semsig_gis.objects.load import assemble, choose_layers, read_files

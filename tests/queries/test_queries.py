@@ -21,8 +21,8 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import ObjectStore
 from semsig_gis.database.north import North
+from semsig_gis.database.store import ObjectStore
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.likelihood.route import Leg
 from semsig_gis.objects.load import assemble, choose_layers, read_files

@@ -17,9 +17,10 @@ from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.database.build import build_database
-from semsig_gis.database.city import City, ObjectStore, save_with_store
+from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.properties import database_summary
+from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.evaluate import versions
 from semsig_gis.evaluation.methods import parse_method

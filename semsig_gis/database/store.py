@@ -1,0 +1,424 @@
+"""Object stores: which objects the cells of a database see, and where these stand exactly.
+
+A database does not say which objects its cells see, where these stand exactly, or what they are
+called in their source. The object store does: ``city.objects`` beside ``city.parquet``, and in a
+folder of parts the copies of what it was built from. An update needs it, and so does whatever looks
+at objects from a place off the grid.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from semsig_gis import __version__
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, NAME, crs_label
+from semsig_gis.database.file import (
+    INPUTS,
+    damaged_files,
+    digest,
+    is_folder,
+    read_manifest,
+    read_specs,
+    require_file,
+    save_database,
+)
+from semsig_gis.objects.table import licenses_of, open_objects, save_objects
+from semsig_gis.storage.geoparquet import UNREADABLE
+from semsig_gis.storage.text import parse_json, read_whole
+from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_folder
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+    import numpy as np
+    from numpy.typing import NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.objects.table import StreetObjects
+
+
+STORE_KIND = "object store"
+# Raised whenever a store of before would be read wrongly.
+FORMAT = 1
+STORE_SUFFIX = ".objects"
+MANIFEST = "manifest.json"
+OBJECTS = "objects.parquet"
+FOOTPRINTS = "footprints.parquet"
+STREETS = "streets.parquet"
+BUILT_DIGEST = "built_digest"
+# What a new store is called until its database is in place.
+NEXT = ".next"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ObjectStore(Displayed):
+    """What a signature database was built from.
+
+    Parameters
+    ----------
+    objects : StreetObjects
+        The objects.
+    footprints, streets : GeoDataFrame, optional
+        Buildings and centre lines in the CRS of the objects, where it was built with them.
+
+    Examples
+    --------
+    >>> store = ObjectStore.of(demo_objects)
+    >>> _, near = store.index.pairs_within(demo_objects.xy[:1], radius=0.0)
+    >>> near.tolist()
+    [0]
+    """
+
+    objects: StreetObjects
+    footprints: gpd.GeoDataFrame | None = None
+    streets: gpd.GeoDataFrame | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "objects": len(self.objects),
+            "buildings": "none" if self.footprints is None else len(self.footprints),
+            "streets": "none" if self.streets is None else len(self.streets),
+            "CRS": crs_label(self.objects.crs),
+        }
+
+    @classmethod
+    def of(
+        cls,
+        objects: StreetObjects,
+        *,
+        footprints: gpd.GeoDataFrame | None = None,
+        streets: gpd.GeoDataFrame | None = None,
+    ) -> ObjectStore:
+        """Make the store of a database that was built from these.
+
+        `footprints` and `streets` are those that `build_database` got; CrsError if they have no
+        CRS.
+        """
+        from semsig_gis.database.build import elements_of  # noqa: PLC0415 - it loads slowly
+
+        houses, lines = elements_of(footprints, "buildings"), elements_of(streets, "streets")
+        return cls(
+            objects=objects,
+            footprints=None if houses is None else _stored(houses, objects.crs),
+            streets=None if lines is None else _stored(lines, objects.crs, HALF_WIDTH, NAME),
+        )
+
+    @cached_property
+    def index(self) -> ObjectIndex:
+        """R-tree over the objects, in their order; made when it is first asked for."""
+        from semsig_gis.core.rtree import ObjectIndex  # noqa: PLC0415 - it loads slowly
+
+        return ObjectIndex(self.objects.xy)
+
+    def buildings_around(
+        self, places: NDArray[np.float64], *, distance: float
+    ) -> Footprints | None:
+        """Return the buildings at most so many metres from some places, None where there are none.
+
+        All that they are joined to are among them. Places, shape (p, 2), are in metres.
+        """
+        if self.footprints is None:
+            return None
+        from semsig_gis.database.occlusion import Footprints, buildings_near  # noqa: PLC0415 - it loads slowly
+
+        polygons = self.footprints.geometry.to_numpy()
+        near = buildings_near(polygons, places, distance=distance)
+        return Footprints(polygons[near]) if len(near) else None
+
+
+def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
+    """Return the shapes of a table and the columns of these names, in a CRS."""
+    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+
+    from semsig_gis.database.build import moved  # noqa: PLC0415 - it loads slowly
+
+    geometry = table.geometry
+    kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
+    columns = {name: kept[name].to_numpy() for name in names if name in kept}
+    stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=kept.crs)
+    stored.attrs[LICENSES] = list(licenses_of(table))
+    return stored
+
+
+def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
+    """Save a database and the store that belongs to it.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What to save.
+    store : ObjectStore
+        What it was built from.
+    path : str or Path
+        File of the database; the store is put beside it (see `store_path`).
+
+    Raises
+    ------
+    InputError
+        If the files cannot be written; those that were there are unchanged then.
+
+    Notes
+    -----
+    Both are written whole in a hidden folder first. Then the new store gets its place under
+    another name, the database is renamed into its place, and at last the store into its own. The
+    store names the digest of its database, so whoever opens the two sees how far an interrupted
+    run came: `open_store` takes the new store as soon as the new database is there, and the old one
+    until then. Any number of programs may read meanwhile; of two that write at once, the later one
+    wins.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "city.parquet")
+    ...     save_with_store(demo_database, ObjectStore.of(demo_objects), file)
+    ...     len(open_store(file).objects) == len(demo_objects)
+    True
+    """
+    final = store_path(path)
+    with contextlib.ExitStack() as stack:
+        with whole_file(path) as partial:
+            try:
+                save_database(database, partial)
+            except InputError as error:  # which knows nothing of the place that was asked for
+                raise InputError(str(error).replace(str(partial), str(path))) from error
+            new = partial.with_name(final.name)
+            _write(store, new, fingerprint=digest(partial))
+            stack.enter_context(alone_in(final.parent))
+            _settle(Path(path))  # what waits there may be needed until the new database is in place
+            move_folder(new, _waiting(final))
+        move_folder(_waiting(final), final)
+
+
+def open_store(database: str | Path, folder: str | Path | None = None) -> ObjectStore:
+    """Open the object store of a database.
+
+    Parameters
+    ----------
+    database : str or Path
+        File of the database, or folder of its parts.
+    folder : str or Path, optional
+        The store, where it does not lie beside the database; one in parts has it in its folder.
+
+    Returns
+    -------
+    ObjectStore
+        The store.
+
+    Raises
+    ------
+    DatabaseError
+        If there is no database or no store, the store is damaged, or belongs to another database.
+
+    Notes
+    -----
+    What an interrupted `save_with_store` left half done is finished, if the folder can be written
+    to. The files of a store are not changed by reading.
+
+    Examples
+    --------
+    >>> open_store("nowhere.parquet")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.DatabaseError: nowhere.parquet does not exist;
+    give a signature database file.
+    """
+    if is_folder(database):
+        if folder is not None:
+            msg = f"{database} is a folder with an object store in it; give no other store."
+            raise DatabaseError(msg)
+        return _read_inputs(Path(database))
+    require_file(database)
+    file = Path(database)
+    while True:
+        place = current_store(file) if folder is None else Path(folder)
+        before = file_state(file), file_state(place)
+        try:
+            store = _read(place, file)
+        except DatabaseError:
+            if before == (file_state(file), file_state(place)):
+                raise
+        else:
+            if before == (file_state(file), file_state(place)):
+                return store
+        # Another program has put something else there meanwhile.
+
+
+def store_path(database: str | Path) -> Path:
+    """Return the folder beside a database file where its object store lies.
+
+    Links are followed. Raise InputError if the name of the database has the ending of a store.
+    """
+    file = Path(os.path.realpath(database))
+    if file.suffix == STORE_SUFFIX:
+        msg = f"{database} is a name for an object store; give a database another ending."
+        raise InputError(msg)
+    return file.with_suffix(STORE_SUFFIX)
+
+
+def waiting_store(database: str | Path) -> Path:
+    """Return where a new object store waits until its database is in place."""
+    return _waiting(store_path(database))
+
+
+def built_digest(path: str | Path) -> str:
+    """Return the SHA-256 digest that a database file had before columns were put into it.
+
+    Without such columns it is the digest of the file as it is, even if that is damaged.
+    """
+    try:
+        return str(read_specs(path)[BUILT_DIGEST])
+    except (DatabaseError, KeyError):
+        return digest(Path(path))
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    path = folder / MANIFEST
+    try:
+        manifest = parse_json(read_whole(path), finite=True)
+        if manifest["kind"] != STORE_KIND or not isinstance(manifest["files"], dict):
+            raise ValueError(manifest["kind"])  # noqa: TRY301
+        known: bool = manifest["format"] == FORMAT
+        version, _ = manifest["version"], manifest["database"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f"{path} is missing or damaged; build the database again."
+        raise DatabaseError(msg) from error
+    if not known:
+        msg = f"{folder} is of another version of semsig ({version}); build the database again."
+        raise DatabaseError(msg)
+    return dict(manifest)
+
+
+def _read(folder: Path, database: Path) -> ObjectStore:
+    if not is_folder(folder):
+        msg = f"{database} has no object store ({folder.name} beside it); build the database again."
+        raise DatabaseError(msg)
+    manifest = _manifest(folder)
+    if manifest["database"] != built_digest(database):
+        msg = f"{folder} belongs to another database than {database}; build the database again."
+        raise DatabaseError(msg)
+    # Stores of before hold an R-tree as well, which nobody reads: damage to it ends the program.
+    names = [name for name in (OBJECTS, FOOTPRINTS, STREETS) if name in manifest["files"]]
+    damaged = damaged_files(folder, {name: manifest["files"][name] for name in names})
+    if damaged or OBJECTS not in names:
+        msg = f"{folder / min(damaged, default=OBJECTS)} is damaged; build the database again."
+        raise DatabaseError(msg)
+    return ObjectStore(
+        objects=open_objects(folder / OBJECTS),
+        footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
+        streets=_table(folder / STREETS) if STREETS in names else None,
+    )
+
+
+def stored_inputs(folder: Path) -> dict[str, Path]:
+    """Return the files of objects, buildings and streets that a database in parts was built from.
+
+    DatabaseError if they are not there.
+    """
+    files = {path.stem: path for path in sorted((folder / INPUTS).glob("*.parquet"))}
+    if "objects" not in files:
+        read_manifest(folder)  # another folder is told as such
+        msg = f"{folder} has no street objects in {INPUTS}; build the database again."
+        raise DatabaseError(msg)
+    return files
+
+
+def _read_inputs(folder: Path) -> ObjectStore:
+    from semsig_gis.objects.surroundings import read_surroundings  # noqa: PLC0415 - it loads slowly
+
+    files = stored_inputs(folder)
+    objects = open_objects(files["objects"])
+
+    def read(role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame | None:
+        path = files.get(role)
+        return None if path is None else read_surroundings(path, role=role, crs=objects.crs)
+
+    return ObjectStore.of(objects, footprints=read("buildings"), streets=read("streets"))
+
+
+def _table(path: Path) -> gpd.GeoDataFrame:
+    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+    import shapely  # noqa: PLC0415 - it loads slowly
+
+    try:
+        return gpd.read_parquet(path)
+    except (*UNREADABLE, shapely.errors.ShapelyError) as error:
+        msg = f"{path} is damaged ({error}); build the database again."
+        raise DatabaseError(msg) from error
+
+
+def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
+    """Write a whole store of that name, in the place of another."""
+    with whole_folder(folder) as partial:
+        save_objects(store.objects, partial / OBJECTS, keep_order=True)
+        for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
+            if table is not None:
+                table.to_parquet(partial / name, compression="zstd")
+        manifest = {
+            "kind": STORE_KIND,
+            "format": FORMAT,
+            "version": __version__,
+            "database": fingerprint,
+            "objects": len(store.objects),
+            "files": {file.name: digest(file) for file in sorted(partial.iterdir())},
+        }
+        (partial / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+
+
+def current_store(database: Path) -> Path:
+    """Return the store of a database, and finish what an interrupted run left, if possible."""
+    final = store_path(database)
+    if not _awaited(database):
+        return final
+    with contextlib.suppress(InputError), alone_in(final.parent) as alone:
+        if alone:
+            _settle(database)
+    return _waiting(final) if _awaited(database) else final
+
+
+def _settle(database: Path) -> None:
+    """Put the store that waits for a database into its place."""
+    if _awaited(database):
+        final = store_path(database)
+        move_folder(_waiting(final), final)
+
+
+def _awaited(database: Path) -> bool:
+    """Tell whether the store that belongs to a database waits to be put into its place."""
+    final = store_path(database)
+    waiting = _waiting(final)
+    if not (waiting.exists() and database.exists()):
+        return False
+    belongs = built_digest(database)
+    return _database_of(waiting) == belongs != _database_of(final)
+
+
+def _database_of(store: Path) -> str | None:
+    """Return the digest of the database that a store names, None if it is missing or damaged."""
+    try:
+        return str(_manifest(store)["database"])
+    except DatabaseError:
+        return None
+
+
+def file_state(path: Path) -> tuple[int, ...] | None:
+    """Return what changes where another file or folder is put in the place of one."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def _waiting(final: Path) -> Path:
+    return final.with_name(final.name + NEXT)
