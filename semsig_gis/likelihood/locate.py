@@ -2,7 +2,7 @@
 
 The steps of the likelihood method in one call: score every cell by the index, re-rank the best
 by one-to-one associations, turn the scores into chances, decide whether to answer, and, where the
-street objects are at hand, look for the place between the viewpoints and say what speaks for it.
+street objects are known, look for the place between the viewpoints and say what speaks for it.
 """
 
 from __future__ import annotations

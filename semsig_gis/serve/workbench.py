@@ -85,7 +85,7 @@ class Workbench:
     city : City
         The city.
     store : ObjectStore or None
-        Its street objects, if they are at hand.
+        Its street objects, if they are known.
     noises : mapping of str to Noise, default those that have a name, that of marks by hand first
         What the page may choose from, as ``--noise`` of `semsig localize` takes it; the first is
         taken where it chooses none.
