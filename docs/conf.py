@@ -47,6 +47,7 @@ numpydoc_show_class_members = False  # autodoc lists them
 html_extra_path = ["../data_sources/catalog.schema.json"]  # editors ask for it
 html_theme = "furo"
 html_title = "semsig_gis"
+html_favicon = "../qgis_plugin/semsig/icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_copy_source = False
