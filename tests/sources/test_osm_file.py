@@ -589,7 +589,7 @@ def test_a_specification_that_does_not_fit_is_refused(
 MEASURE = """
 import sys
 from pathlib import Path
-from semsig_gis.sources.catalog import LayerSpec
+from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm.file import read_layers
 tags = ((("natural", ("tree",)),),)
 (layer,) = read_layers(sys.argv[1], [LayerSpec(name="t", class_name="bench", tags=tags)])
