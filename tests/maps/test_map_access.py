@@ -9,7 +9,9 @@ import geopandas as gpd
 import pytest
 import shapely
 from axe_core_python.selenium import Axe
+from machine import PATIENCE_S
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
 from small_city import (
     chances_of,
     small_city,
@@ -118,4 +120,7 @@ def test_a_map_is_named_and_used_by_keys_alone(page: MapPage) -> None:
         *("Zoom in", "Dark colours", "Print this view")
     ]
     map_.send_keys("c")
-    assert page.one("[role=status].semsig-said").text.startswith("Copied: ")
+    said = page.one("[role=status].semsig-said")
+    # The clipboard answers later.
+    WebDriverWait(page.browser, PATIENCE_S).until(lambda _: said.text)
+    assert said.text.startswith("Copied: ")
