@@ -1,13 +1,20 @@
-"""What the examples in docstrings begin from: a small made-up town, built once."""
+"""How many tests run at once, and the small made-up town that examples in docstrings begin from."""
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
     from semsig_gis import SignatureDatabase, StreetObjects
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one more worker than processors: many tests wait for browsers and other programs."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.fixture(scope="session")
