@@ -234,21 +234,31 @@ def _distance_locator(
 def _answer_lines(
     queries: Iterable[QueryLine], locator: Locator[Any], options: LocalizeOptions
 ) -> None:
-    """Print an answer for each line, or its error, as soon as there is one."""
+    """Print an answer for each line, or its error, as soon as there is one.
+
+    Lines of a file are answered side by side, those of standard input one by one as they come.
+    """
+    from semsig_gis.core.threads import each_in_order
+
     source, first_error, answered, failed = options.source, "", 0, 0
-    for one in queries:
-        result: dict[str, Any]
+
+    def answer(one: QueryLine) -> tuple[QueryLine, dict[str, Any]]:
         try:
             if isinstance(one.query, InputError):
                 raise one.query
             others = one.unplaced, one.absent
             beside = _beside(locator, one.query, *others, ranking=options.ranking)
-            result = beside.locate(one.query).to_dict()
-            answered += 1
+            return one, beside.locate(one.query).to_dict()
         except (EmptyResultError, InputError, UnknownNameError) as error:
-            result = {"error": str(error)}
-            first_error = first_error or str(error)
+            return one, {"error": str(error)}
+
+    side_by_side = options.queries != "-"
+    for one, result in each_in_order(answer, queries) if side_by_side else map(answer, queries):
+        if error := result.get("error"):
+            first_error = first_error or error
             failed += 1
+        else:
+            answered += 1
         print_json({"id": one.name, "line": one.line, **result}, indent=None)
     if not answered:
         what = f"is answered: {first_error}" if failed else "was found; give one on each line."

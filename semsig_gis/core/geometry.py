@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from dataclasses import dataclass
@@ -205,13 +206,19 @@ def plane_distortion(crs: CRS, bounds: Bounds) -> Distortion:
     )
 
 
+@functools.lru_cache(maxsize=8)  # it takes longer to find than a query to answer
+def to_degrees(crs: CRS) -> Transformer:
+    """Return what turns x and y in a CRS into longitudes and latitudes of WGS 84."""
+    return Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+
+
 def degree_bounds(crs: CRS, bounds: Bounds) -> Bounds:
     """Return west, south, east and north in degrees of ``xmin, ymin, xmax, ymax`` in a CRS.
 
     West is greater than east where the box crosses 180 degrees.
     """
-    to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
-    west, south, east, north = to_degrees.transform_bounds(*bounds, densify_pts=EDGE_POINTS)
+    sides = to_degrees(crs).transform_bounds(*bounds, densify_pts=EDGE_POINTS)
+    west, south, east, north = sides
     return west, south, east, north
 
 

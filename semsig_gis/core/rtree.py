@@ -6,6 +6,7 @@ for very many; it answers for boxes too.
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,12 +28,16 @@ class ObjectIndex:
     """An R-tree over points in metres, shape (n, 2).
 
     InputError if there is no point, or one is not finite. The tree is packed in one go and asked
-    for many boxes at once. It belongs to the process and thread that made it.
+    for many boxes at once. As a tree belongs to its thread, each that asks has its own.
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
         self._xy = checked_points(xy)
-        self._tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
+        self._own = threading.local()
+        self._own.tree = self._packed()
+
+    def _packed(self) -> rtree_index.Index:
+        return rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
 
     def __reduce__(self) -> str | tuple[object, ...]:  # noqa: D105
         return (type(self), (self._xy,))
@@ -48,7 +53,9 @@ class ObjectIndex:
         reach = _a_touch_more(radius)
         side = reach / BLOCKS
         corners, block = np.unique(np.floor(places / side) * side, axis=0, return_inverse=True)
-        found, counts = self._tree.intersection_v(corners - reach, corners + (reach + side))
+        if not hasattr(self._own, "tree"):
+            self._own.tree = self._packed()
+        found, counts = self._own.tree.intersection_v(corners - reach, corners + (reach + side))
         sizes = counts.astype(np.int64)
         point = found[consecutive((np.cumsum(sizes) - sizes)[block], sizes[block])]
         viewpoint = np.repeat(np.arange(len(places)), sizes[block])

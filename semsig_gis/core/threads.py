@@ -1,4 +1,4 @@
-"""Loops over rows in kernels, shared by the cores of this machine."""
+"""Work that the cores of this machine share: loops over rows in kernels, and whole tasks."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ import contextlib
 import functools
 import os
 import threading
+from collections import deque
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+    from concurrent.futures import Future
 
     from numpy.typing import NDArray
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 ROWS_A_PART = 8192
 """Rows that are worth a thread, where each takes some hundred nanoseconds."""
@@ -63,6 +68,35 @@ def _go_on() -> None:
 def work_alone() -> None:
     """Let this thread share nothing from now on, as the others have work of their own."""
     _here.sharing = True
+
+
+def each_in_order(work: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
+    """Yield what `work` returns for each of the items, which it is called with side by side.
+
+    Each core has an item of its own, and only a few are taken before what they give is. The first
+    one is worked on by all, so that what is kept for later ones is made once. An error of the items
+    is raised when all before have been yielded.
+    """
+    rest = iter(items)
+    for first in rest:
+        yield work(first)
+        break
+    waiting: deque[Future[_Result]] = deque()
+    pool = ThreadPoolExecutor(cores(), initializer=work_alone)
+    try:
+        try:
+            for item in rest:
+                waiting.append(pool.submit(work, item))
+                if len(waiting) > 2 * cores():
+                    yield waiting.popleft().result()
+        except Exception:
+            while waiting:
+                yield waiting.popleft().result()
+            raise
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def share_rows(

@@ -16,7 +16,7 @@ import numpy as np
 import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import LICENSES
+from semsig_gis.core.geometry import LICENSES, to_degrees
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.core.view import View
 from semsig_gis.database.north import GRID_NORTH
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
-    from pyproj import CRS, Transformer
+    from pyproj import CRS
 
     from semsig_gis.core.display import Axes
     from semsig_gis.core.signature import Signature
@@ -103,15 +103,9 @@ class Answer(Displayed):
         """Draw where the query may have been seen (see `plot_answer`)."""
         return semsig_gis.plot_answer(self, ax=ax, legend=legend)
 
-    @cached_property
-    def _to_degrees(self) -> Transformer:
-        from pyproj import Transformer  # noqa: PLC0415 - it loads slowly
-
-        return Transformer.from_crs(self.crs, "EPSG:4326", always_xy=True)
-
     def _candidate_records(self) -> list[dict[str, Any]]:
         """Return the candidates as plain values, with ``lon`` and ``lat`` to a centimetre."""
-        lon, lat = np.round(self._to_degrees.transform(self.columns["x"], self.columns["y"]), 7)
+        lon, lat = np.round(to_degrees(self.crs).transform(self.columns["x"], self.columns["y"]), 7)
         columns = {**self.columns, "lon": lon, "lat": lat}
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in rows]

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
-from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import grid_convergence, signed_degrees
+from semsig_gis.core.geometry import grid_convergence, signed_degrees, to_degrees
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,8 +82,8 @@ class North:
         turns = -grid_convergence(database.crs, places)
         if name == "magnetic":
             date = dt.datetime.now().astimezone().date() if date is None else date
-            to_degrees = Transformer.from_crs(database.crs, "EPSG:4326", always_xy=True)
-            turns = turns + declination(*to_degrees.transform(*places.T), date)
+            degrees = to_degrees(database.crs).transform(*places.T)
+            turns = turns + declination(*degrees, date)
         middle = float(signed_degrees(turns[0]))
         spread = float(np.abs(signed_degrees(turns - middle)).max())
         return cls(name=name, turn=middle, spread=spread, date=date)

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pystac
-from pyproj import Transformer
 from pystac.extensions.file import FileExtension
 from pystac.extensions.projection import ProjectionExtension
 from shapely.geometry import box, mapping
 
+from semsig_gis.core.geometry import to_degrees
 from semsig_gis.database.file import database_specs, digest
 from semsig_gis.exports.layers import cells_layer
 from semsig_gis.storage.whole import write_whole
@@ -42,8 +42,8 @@ def write_item(city: City, path: str | Path, *, objects: str | Path | None = Non
     """
     database = city.database
     bounds = cells_layer(database).bounds
-    to_degrees = Transformer.from_crs(database.crs, "EPSG:4326", always_xy=True)
-    left, bottom, right, top = (round(side, 7) for side in to_degrees.transform_bounds(*bounds))
+    sides = to_degrees(database.crs).transform_bounds(*bounds)
+    left, bottom, right, top = (round(side, 7) for side in sides)
     facts = {name: fact for name, fact in database_specs(database).items() if name not in LEFT_OUT}
     item = pystac.Item(
         id=city.path.stem,

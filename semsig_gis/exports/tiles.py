@@ -15,9 +15,8 @@ import pyogrio
 import shapely
 from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import Writer
-from pyproj import Transformer
 
-from semsig_gis.core.geometry import GEOMETRY
+from semsig_gis.core.geometry import GEOMETRY, to_degrees
 from semsig_gis.exports.areas import summary
 from semsig_gis.exports.files import feature_stream, whole_by_gdal
 from semsig_gis.exports.layers import cells_layer, table_layer
@@ -58,8 +57,7 @@ def write_pmtiles(
     metadata hold the specs, the classes and the licences.
     """
     cells = cells_layer(database, identifiability=identifiability)
-    to_degrees = Transformer.from_crs(cells.crs, "EPSG:4326", always_xy=True)
-    bounds = to_degrees.transform_bounds(*cells.bounds)
+    bounds = to_degrees(cells.crs).transform_bounds(*cells.bounds)
     zooms = _zooms(cells, database.grid.step, latitude=(bounds[1] + bounds[3]) / 2)
     fields: dict[str, dict[str, Any]] = {}
     with whole_file(path) as partial, whole_by_gdal(path), _writer(partial) as writer:

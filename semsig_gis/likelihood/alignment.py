@@ -21,8 +21,9 @@ _LEAST = 1e-6  # weight of a pair against a miss and a false detection, from whi
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200  # from which on a product becomes a logarithm
 _SURE = 6.0  # from which on the error function is one
+_NEEDLESS = 9.0  # nats below the best of a group, from which on a sum is not needed
 # How often messages are sent, and the relative change at which they are taken for settled.
-_ROUNDS, _SETTLED = 30, 1e-2
+_ROUNDS, _SETTLED = 30, 3e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
 
 
@@ -85,6 +86,8 @@ def _densities(
 @compiled
 def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     part: NDArray[np.int64],
+    group: int,
+    log_weights: NDArray[np.float64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.int64],
     bearing_units: NDArray[np.uint16],
@@ -113,24 +116,24 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
 ) -> None:
     """Sum over the one-to-one associations of a photo with what is seen from some places.
 
-    Fills `totals`, shape (models, places, turns), with log-likelihoods, for the places ``part[0]``
-    to ``part[1] - 1``. Objects of the places have
-    class rows `kinds` and bearings of `unit` degrees a unit; some are `beyond` the range. The
-    photo, turned by `turns`, shape (places, turns), has detections by `bearings`, `ranges` (NaN if
-    unknown) and, by model and class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round,
-    `width` of the turn. What speaks for a class is `own`, shape (k, n), and `other` if it is
+    Fills `totals`, shape (models, places, turns), with log-likelihoods and the `log_weights` of the
+    models, for the groups ``part[0]`` to ``part[1] - 1`` of so many places. What cannot come within
+    e^-9 of the best of its group and turn gets a bound. Objects of the places have class rows
+    `kinds` and bearings of `unit` degrees a unit; some are `beyond` the range. The photo, turned by
+    `turns`, shape (places, turns), has detections by `bearings`, `ranges` (NaN if unknown) and, by
+    model and class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round, `width` of the
+    turn. What speaks for a class is `own`, shape (k, n), and `other` if it is
     misnamed, shape (models, k, n); `density` (models, n) is of false detections, in which `disc`
     (n,) is that of the range. By model, `detected` and `misnamed` are by length and class,
     `clutter` is the sum of false detections, and by class and distance unit `seen` and `left` are
     the chances that what is in range of the place is seen by the observer, and that it has left the
     range, and `sigma` the deviation of a bearing. `blur` is that of the observer's place in metres,
-    `distances` the metres
-    of a unit.
+    `distances` the metres of a unit.
     """
     models, longest = detected.shape[0], detected.shape[1] - 1
     size = len(bearings)
     most = 0
-    for place in range(part[0], part[1]):
+    for place in range(part[0] * group, part[1] * group):
         most = max(most, offsets[place + 1] - offsets[place])
     pairs = most * size + 1
     ends = np.empty(most + 1, np.int64)  # the pairs of an object are ends[one]:ends[one + 1]
@@ -142,21 +145,34 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     at_right = np.empty(size)
     # Four detections are worked out at once; the last ones may be none.
     room = -(-size // 4) * 4
-    floor = np.ones(room)
-    named = np.zeros((most, room))
+    start = np.empty(models)
+    floor = np.ones((models, room))
+    named = np.zeros((models, most, room))
     angles = np.zeros(room)
+    inside = np.ones(most)
+    near = np.empty((most, room))
     values = np.empty(room)
+    sums = np.empty(room)
     ranged = False
     for one in range(size):
         ranged |= not math.isnan(ranges[one])
-    for place in range(part[0], part[1]):
+    # How far off bearings and ranges are is often the same by all models.
+    alike = True
+    for model in range(1, models):
+        alike &= blur[model] == blur[0]
+        alike &= np.array_equal(sigma[model], sigma[0])
+        alike &= np.array_equal(range_sigma[model], range_sigma[0])
+    top = np.empty(turns.shape[1])
+    for place in range(part[0] * group, part[1] * group):
+        if place % group == 0:
+            top[:] = -np.inf
         low = offsets[place]
         count = offsets[place + 1] - low
         length = min(count, longest)
         for model in range(models):
             gone = 0.0
-            for one in range(size):
-                floor[one] = density[model, one]
+            for two in range(size):
+                floor[model, two] = density[model, two]
             for one in range(count):
                 kind = kinds[low + one]
                 wrong = misnamed[model, length, kind]
@@ -167,57 +183,67 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 gone += leaving
                 for two in range(size):
                     name = (1.0 - wrong) * own[kind, two] + wrong * other[model, kind, two]
-                    named[one, two] = name
+                    named[model, one, two] = name
                     # As many objects come into range as leave it, in any direction.
-                    floor[two] += leaving * name * disc[two] / _TURN
-            start = -(clutter[model] + gone) * width
+                    floor[model, two] += leaving * name * disc[two] / _TURN
+            start[model] = log_weights[model] - (clutter[model] + gone) * width
             for two in range(size):
-                start += math.log(floor[two])
-                floor[two] = 1.0 / floor[two]
-            for way in range(turns.shape[1]):
-                turn = turns[place, way]
-                for two in range(size):
-                    angle = bearings[two] + turn
-                    angles[two] = angle - _TURN * math.floor(angle / _TURN)
-                total, unseen = start, 1.0
+                start[model] += math.log(floor[model, two])
+                floor[model, two] = 1.0 / floor[model, two]
+        for way in range(turns.shape[1]):
+            turn = turns[place, way]
+            for two in range(size):
+                angle = bearings[two] + turn
+                angles[two] = angle - _TURN * math.floor(angle / _TURN)
+            for model in range(models):
+                if model == 0 or not alike:
+                    for one in range(count):
+                        if beyond[low + one]:
+                            continue
+                        kind, far = kinds[low + one], distance_units[low + one]
+                        bearing = (bearing_units[low + one] + 0.5) * unit
+                        spread = sigma[model, kind, far]
+                        if len(sectors):
+                            inside[one] = 0.0
+                            for sector in range(len(sectors)):
+                                inside[one] += _mass(
+                                    sectors[sector, 0] + turn - bearing,
+                                    sectors[sector, 1] - sectors[sector, 0],
+                                    spread,
+                                )
+                        own_near = near[one]
+                        _densities(angles, bearing, spread, own_near)
+                        if ranged:
+                            away_m = distances[far]
+                            for two in range(size):
+                                if not math.isnan(ranges[two]):
+                                    error = math.hypot(
+                                        range_sigma[model, kind, two], blur[model] / away_m
+                                    )
+                                    ratio = math.log(ranges[two] / away_m) / error
+                                    own_near[two] *= math.exp(-0.5 * ratio**2) / (error * _ROOT)
+                total, unseen = start[model], 1.0
                 edges = 0
+                sums[:] = 1.0
                 for one in range(count):
                     ends[one] = edges
                     at_left[one] = 1.0
                     if beyond[low + one]:
                         continue
                     kind, far = kinds[low + one], distance_units[low + one]
-                    bearing = (bearing_units[low + one] + 0.5) * unit
-                    spread = sigma[model, kind, far]
                     chance = detected[model, length, kind] * seen[model, kind, far]
-                    inside = 1.0
-                    if len(sectors):
-                        inside = 0.0
-                        for sector in range(len(sectors)):
-                            inside += _mass(
-                                sectors[sector, 0] + turn - bearing,
-                                sectors[sector, 1] - sectors[sector, 0],
-                                spread,
-                            )
-                    missed = 1.0 - chance * inside
+                    missed = 1.0 - chance * inside[one]
                     unseen *= missed
                     if unseen < 1.0 / _LARGE:
                         total += math.log(unseen)
                         unseen = 1.0
                     if chance == 0.0:
                         continue
-                    _densities(angles, bearing, spread, values)
+                    odds = chance / missed
+                    own_near, own_named, own_floor = near[one], named[model, one], floor[model]
                     for two in range(room):
-                        values[two] *= chance / missed * named[one, two] * floor[two]
-                    if ranged:
-                        away_m = distances[far]
-                        for two in range(size):
-                            if not math.isnan(ranges[two]):
-                                error = math.hypot(
-                                    range_sigma[model, kind, two], blur[model] / away_m
-                                )
-                                ratio = math.log(ranges[two] / away_m) / error
-                                values[two] *= math.exp(-0.5 * ratio**2) / (error * _ROOT)
+                        values[two] = odds * own_near[two] * own_named[two] * own_floor[two]
+                        sums[two] += values[two]
                     for two in range(size):
                         # Written in any case: a step that is foreseen is faster than a jump.
                         other_of[edges] = two
@@ -227,6 +253,16 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                             at_left[one] += values[two]
                             edges += 1
                 ends[count] = edges
+                # More than one detection for an object, or more than one object for a detection.
+                by_detection = by_object = unseen  # perhaps infinite, which bounds nothing
+                for two in range(size):
+                    by_detection *= sums[two]
+                for one in range(count):
+                    by_object *= at_left[one]
+                bound = total + math.log(min(by_detection, by_object))
+                if bound < top[way] - _NEEDLESS:
+                    totals[model, place, way] = bound
+                    continue
                 # Belief propagation, as in `associate`; as a function of its own it is slower. Each
                 # object hears at once what those before it have said, which settles it sooner.
                 at_right[:] = 1.0
@@ -263,6 +299,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                         total += math.log(product)
                         product = 1.0
                 totals[model, place, way] = total + math.log(product)
+                top[way] = max(top[way], totals[model, place, way])
 
 
 @compiled

@@ -500,7 +500,7 @@ def _aligned(
         turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
         asked = PhotoTable.of(photo, index.table)
         everywhere = np.repeat(turns, len(places), axis=0)
-        logliks = photo_loglik(asked, seen, *models, turns=everywhere)
+        logliks = photo_loglik(asked, seen, *models, turns=everywhere, group=len(places))
         logliks = logliks.reshape(len(cells), len(places), -1)
         if heading is not None:
             chances = turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))

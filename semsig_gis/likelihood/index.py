@@ -265,12 +265,13 @@ def _scorer(
     asked = PhotoTable.of(photo, table)
     density = asked.density(table)
     rows, masses = levels.rows(asked), levels.masses(asked)
-    named = asked.named(table)[: len(levels.chances)] / density
+    named = asked.named(table)[: len(levels.detected)] / density
     what: dict[str, Any] = {
         "group_of": levels.group_of,
         "width": asked.width,
-        "chances": levels.chances,
-        "leaving": levels.leaving,
+        "detected": levels.detected,
+        "seen": levels.seen,
+        "left": levels.left,
         "base": float(np.log(density).sum()),
     }
     if before is None:
@@ -301,15 +302,17 @@ def _scorer(
 
     def score(seen: _Entries) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         size = len(seen.offsets) - 1
-        scores, best = np.empty(size, np.float32), np.empty(size if turned else 0, np.int16)
         places: dict[str, Any] = {
             "offsets": seen.offsets,
             "kinds": seen.kinds,
             "places": seen.places,
         }
         if not turned:
-            share_rows(partial(scan, **places, **what, scores=scores), size)
-            return scores, None
+            totals, products = np.empty(size), np.empty(size)
+            share_rows(partial(scan, **places, **what, totals=totals, products=products), size)
+            totals += np.log(products)
+            return totals.astype(np.float32), None
+        scores, best = np.empty(size, np.float32), np.empty(size, np.int16)
         share_rows(partial(scan_turned, **places, **what, scores=scores, best=best), size)
         return scores, best * np.float32(FULL_TURN / TURNS)
 
@@ -380,7 +383,8 @@ class _Levels:
     `group_of` is by class row, `level_of` by distance unit; `sigma`, shape (groups, levels), is the
     deviation of bearings, `range_sigma` (groups,) and `blur` (levels,) that of logarithms of ranges
     by the detector and by the place, and `fine` the density of a deviation. By length of a
-    signature, class and level, `chances` are of detection, and of having left the range, `leaving`.
+    signature and class, `detected` is the chance of detection of what is near; by class and level,
+    `seen` is what is left of it, and `left` what has left the range.
     """
 
     table: NoiseTable
@@ -391,8 +395,9 @@ class _Levels:
     distances: NDArray[np.float64]
     blur: NDArray[np.float64]
     fine: NDArray[np.float32]
-    chances: NDArray[np.float32]
-    leaving: NDArray[np.float32]
+    detected: NDArray[np.float32]
+    seen: NDArray[np.float32]
+    left: NDArray[np.float32]
 
     @classmethod
     def of(cls, table: NoiseTable) -> _Levels:
@@ -419,7 +424,7 @@ class _Levels:
 
         def by_level(shares: NDArray[np.float64]) -> NDArray[np.float32]:
             each = np.stack([np.bincount(level_of, row, LEVELS) / count for row in shares])
-            return np.asarray(detected[:, :, None] * each, dtype=np.float32)
+            return each.astype(np.float32)
 
         return cls(
             table=table,
@@ -430,8 +435,9 @@ class _Levels:
             distances=distances,
             blur=table.position_sigma / distances,
             fine=fine.astype(np.float32),
-            chances=by_level(table.seen),
-            leaving=by_level(table.left),
+            detected=detected.astype(np.float32),
+            seen=by_level(table.seen),
+            left=by_level(table.left),
         )
 
     def entries(

@@ -51,7 +51,54 @@ def profile_rows(
 
 
 @compiled
-def scan(  # noqa: PLR0915, PLR0917
+def _add_up(  # noqa: PLR0917
+    odds: NDArray[np.float32],
+    away: NDArray[np.float32],
+    at: NDArray[np.uint64],
+    names: NDArray[np.uint64],
+    count: np.uint64,
+    above: np.uint64,
+    first: np.uint64,
+    flat_rows: NDArray[np.float32],
+    flat_named: NDArray[np.float32],
+    disc: NDArray[np.float32],
+    sums: NDArray[np.float32],
+) -> None:
+    """Fill `sums` with what one block of detections has from the objects of a place.
+
+    A function of its own, or the eight sums are not added up in one go.
+    """
+    a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(1.0)
+    for one in range(count):
+        odd, left, row, name = odds[one], away[one], at[one] + above, names[one] + first
+        b0 = odd * flat_rows[row] + left * disc[first]
+        a0 += b0 * flat_named[name]
+        b1 = odd * flat_rows[row + np.uint64(1)] + left * disc[first + np.uint64(1)]
+        a1 += b1 * flat_named[name + np.uint64(1)]
+        b2 = odd * flat_rows[row + np.uint64(2)] + left * disc[first + np.uint64(2)]
+        a2 += b2 * flat_named[name + np.uint64(2)]
+        b3 = odd * flat_rows[row + np.uint64(3)] + left * disc[first + np.uint64(3)]
+        a3 += b3 * flat_named[name + np.uint64(3)]
+        b4 = odd * flat_rows[row + np.uint64(4)] + left * disc[first + np.uint64(4)]
+        a4 += b4 * flat_named[name + np.uint64(4)]
+        b5 = odd * flat_rows[row + np.uint64(5)] + left * disc[first + np.uint64(5)]
+        a5 += b5 * flat_named[name + np.uint64(5)]
+        b6 = odd * flat_rows[row + np.uint64(6)] + left * disc[first + np.uint64(6)]
+        a6 += b6 * flat_named[name + np.uint64(6)]
+        b7 = odd * flat_rows[row + np.uint64(7)] + left * disc[first + np.uint64(7)]
+        a7 += b7 * flat_named[name + np.uint64(7)]
+    sums[0] = a0
+    sums[1] = a1
+    sums[2] = a2
+    sums[3] = a3
+    sums[4] = a4
+    sums[5] = a5
+    sums[6] = a6
+    sums[7] = a7
+
+
+@compiled
+def scan(  # noqa: PLR0917
     part: NDArray[np.int64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.uint8],
@@ -62,89 +109,75 @@ def scan(  # noqa: PLR0915, PLR0917
     width: float,
     named: NDArray[np.float32],
     disc: NDArray[np.float32],
-    chances: NDArray[np.float32],
-    leaving: NDArray[np.float32],
+    detected: NDArray[np.float32],
+    seen: NDArray[np.float32],
+    left: NDArray[np.float32],
     base: float,
-    scores: NDArray[np.float32],
+    totals: NDArray[np.float64],
+    products: NDArray[np.float64],
 ) -> None:
-    """Fill `scores` of the cells ``part[0]`` to ``part[1] - 1`` by the objects of each.
+    """Fill `totals` and `products` of the cells ``part[0]`` to ``part[1] - 1``.
 
-    The sum over the detections of a photo of the logarithm of a sum over the objects. An object has
+    The score of a cell is its total and the logarithm of its product: the sum over the detections
+    of a photo of the logarithm of a sum over the objects. An object has
     a class row in `kinds` and a level of its distance and a bin of its bearing in `places`. By the
     group of its class (`group_of`) and its place, `rows` are those of `profile_rows`, and `masses`
-    those of `mass_rows`, without a level where all round was seen. `named`, shape (longest + 1, k,
+    those of `mass_rows`, without a level where all round was seen. `named`, shape (lengths, k,
     blocks * LANES), is the chance of a name over the density of such false detections, `disc` the
-    factor of their range. By length, class and level, `chances` are of detection, and of having
-    left the range, `leaving`. `base` is what all get.
+    factor of their range. By length and class, `detected` is the chance of detection of what is
+    near; by class and level, `seen` is what is left of it, and `left` what has left the range.
+    `base` is what all get.
     """
     blocks, groups, levels, bins = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
-    longest, classes = len(chances) - 1, chances.shape[1]
-    # Flat arrays and unsigned numbers, or each look-up is checked and worked out anew; eight sums
-    # that are stored side by side, or they are not added up in one go.
-    lanes, width_u, levels_u = np.uint64(LANES), np.uint64(blocks * LANES), np.uint64(levels)
+    longest, classes = len(detected) - 1, detected.shape[1]
+    # Flat arrays and unsigned numbers, or each look-up is checked and worked out anew.
+    lanes, wide = np.uint64(LANES), np.uint64(blocks * LANES)
+    block_size = np.uint64(groups * levels * bins * LANES)
     flat_rows, flat_named, flat_masses = rows.ravel(), named.ravel(), masses.ravel()
-    flat_chances, flat_leaving = chances.ravel(), leaving.ravel()
+    flat_detected, flat_seen, flat_left = detected.ravel(), seen.ravel(), left.ravel()
     partial = len(flat_masses) > 0
     starts = (group_of * (levels * bins)).astype(np.uint64)
     shift = np.uint64(int(math.log2(bins) + 0.5))
     one_f = np.float32(1.0)
+    most = 0
+    for cell in range(part[0], part[1]):
+        most = max(most, offsets[cell + 1] - offsets[cell])
+    odds, away = np.empty(most, np.float32), np.empty(most, np.float32)
+    at, names = np.empty(most, np.uint64), np.empty(most, np.uint64)
     sums = np.empty(LANES, np.float32)
     for cell in range(part[0], part[1]):
-        low, high = np.uint64(offsets[cell]), np.uint64(offsets[cell + 1])
-        length = min(high - low, np.uint64(longest)) * np.uint64(classes)
+        low, count = np.uint64(offsets[cell]), np.uint64(offsets[cell + 1] - offsets[cell])
+        length = min(count, np.uint64(longest)) * np.uint64(classes)
         total, product, gone = base, 1.0, np.float32(0.0)
+        for one in range(count):
+            kind, place = np.uint64(kinds[low + one]), np.uint64(places[low + one])
+            level = kind * np.uint64(levels) + (place >> shift)
+            near = flat_detected[length + kind]
+            place += starts[kind]
+            chance = near * flat_seen[level]
+            missed = one_f - chance
+            if partial:
+                missed = one_f - chance * flat_masses[place]
+            away[one] = near * flat_left[level]
+            gone += away[one]
+            product *= missed
+            if product < 1.0 / _LARGE:
+                total += math.log(product)
+                product = 1.0
+            odds[one] = chance / missed
+            at[one] = place * lanes
+            names[one] = (length + kind) * wide
         for block in range(np.uint64(blocks)):
-            first = block * lanes
-            above = block * np.uint64(groups * levels * bins)
-            a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = one_f
-            for one in range(low, high):
-                kind, place = np.uint64(kinds[one]), np.uint64(places[one])
-                name = length + kind
-                level = name * levels_u + (place >> shift)
-                place += starts[kind]
-                chance, left = flat_chances[level], flat_leaving[level]
-                missed = one_f - chance
-                if partial:
-                    missed = one_f - chance * flat_masses[place]
-                if block == 0:
-                    product *= missed
-                    if product < 1.0 / _LARGE:
-                        total += math.log(product)
-                        product = 1.0
-                    gone += left
-                odds = chance / missed
-                at, name = (place + above) * lanes, name * width_u + first
-                b0 = odds * flat_rows[at] + left * disc[first]
-                a0 += b0 * flat_named[name]
-                b1 = odds * flat_rows[at + np.uint64(1)] + left * disc[first + np.uint64(1)]
-                a1 += b1 * flat_named[name + np.uint64(1)]
-                b2 = odds * flat_rows[at + np.uint64(2)] + left * disc[first + np.uint64(2)]
-                a2 += b2 * flat_named[name + np.uint64(2)]
-                b3 = odds * flat_rows[at + np.uint64(3)] + left * disc[first + np.uint64(3)]
-                a3 += b3 * flat_named[name + np.uint64(3)]
-                b4 = odds * flat_rows[at + np.uint64(4)] + left * disc[first + np.uint64(4)]
-                a4 += b4 * flat_named[name + np.uint64(4)]
-                b5 = odds * flat_rows[at + np.uint64(5)] + left * disc[first + np.uint64(5)]
-                a5 += b5 * flat_named[name + np.uint64(5)]
-                b6 = odds * flat_rows[at + np.uint64(6)] + left * disc[first + np.uint64(6)]
-                a6 += b6 * flat_named[name + np.uint64(6)]
-                b7 = odds * flat_rows[at + np.uint64(7)] + left * disc[first + np.uint64(7)]
-                a7 += b7 * flat_named[name + np.uint64(7)]
-            sums[0] = a0
-            sums[1] = a1
-            sums[2] = a2
-            sums[3] = a3
-            sums[4] = a4
-            sums[5] = a5
-            sums[6] = a6
-            sums[7] = a7
+            first, above = block * lanes, block * block_size
+            _add_up(odds, away, at, names, count, above, first, flat_rows, flat_named, disc, sums)
             # Each pair is below 1e38, all eight together may not be.
             for lane in range(0, LANES, 2):
                 product *= np.float64(sums[lane] * sums[lane + 1])
             if product > _LARGE or product < 1.0 / _LARGE:
                 total += math.log(product)
                 product = 1.0
-        scores[cell] = total - gone * width + math.log(product)
+        totals[cell] = total - gone * width
+        products[cell] = product
 
 
 @compiled
@@ -203,8 +236,9 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
     width: float,
     named: NDArray[np.float32],
     disc: NDArray[np.float32],
-    chances: NDArray[np.float32],
-    leaving: NDArray[np.float32],
+    detected: NDArray[np.float32],
+    seen: NDArray[np.float32],
+    left: NDArray[np.float32],
     base: float,
     first: int,
     priors: NDArray[np.float64],
@@ -226,9 +260,9 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
     size, groups, levels, inside = rows.shape[0], rows.shape[1], rows.shape[2], rows.shape[3]
     twice, ways = rows.shape[4], len(priors)
     turns, bins = twice // 2, inside * twice // 2
-    longest, classes = len(chances) - 1, chances.shape[1]
+    longest, classes = len(detected) - 1, detected.shape[1]
     flat_rows, flat_named, flat_masses = rows.ravel(), named.ravel(), masses.ravel()
-    partial, moving = len(flat_masses) > 0, leaving.max() > 0.0
+    partial, moving = len(flat_masses) > 0, left.max() > 0.0
     fresh, kept = len(before) == 0, len(after) > 0
     most = 0
     for cell in range(part[0], part[1]):
@@ -241,7 +275,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
     product = np.empty(ways, np.float32)
     missed = np.ones(ways, np.float32)
     floors = np.empty(size, np.float32)
-    left = np.zeros(classes, np.float32)
+    gone = np.zeros(classes, np.float32)
     one_f = np.float32(1.0)
     # As in `scan`: unsigned numbers, and sums side by side that stay where they are added up.
     all_ways, block = np.uint64(ways), np.uint64(TURNED_LANES)
@@ -250,20 +284,21 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
     for cell in range(part[0], part[1]):
         low, count = offsets[cell], offsets[cell + 1] - offsets[cell]
         length = min(count, longest)
-        gone = np.float32(0.0)
+        lost = np.float32(0.0)
         floors[:] = one_f
         if moving:
             for one in range(low, low + count):
-                left[kinds[one]] += leaving[length, kinds[one], places[one] // bins]
-            for row in range(classes):
-                if left[row] > 0.0:
-                    gone += left[row]
+                kind = kinds[one]
+                gone[kind] += detected[length, kind] * left[kind, places[one] // bins]
+            for kind in range(classes):
+                if gone[kind] > 0.0:
+                    lost += gone[kind]
                     for two in range(size):
-                        floors[two] += left[row] * named[length, row, two] * disc[two]
-                    left[row] = 0.0
+                        floors[two] += gone[kind] * named[length, kind, two] * disc[two]
+                    gone[kind] = 0.0
         total, scale = base, 1.0  # the product is so many times larger
         if fresh:
-            total -= float(gone) * width
+            total -= float(lost) * width
             for way in range(ways):
                 product[way] = priors[way]
         else:
@@ -272,7 +307,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917
         for one in range(count):
             kind, place = kinds[low + one], places[low + one]
             level, place = place // bins, place % bins
-            chance = chances[length, kind, level]
+            chance = detected[length, kind] * seen[kind, level]
             start = (first - place // inside) % turns
             start += ((group_of[kind] * levels + level) * inside + place % inside) * twice
             starts[one] = start

@@ -16,7 +16,7 @@ import numpy as np
 
 import semsig_gis
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids, crs_label
+from semsig_gis.core.geometry import cell_ids, crs_label, to_degrees
 from semsig_gis.core.terminal import percent
 from semsig_gis.database.answer import (
     REGION_SHARE,
@@ -167,7 +167,7 @@ class Location(Answer):
         ones, ``explanation``. Its bearings count from ``north``, as those of the query do;
         ``prior`` holds `known` and ``ratio``; None if nothing was known.
         """
-        lon, lat = self._to_degrees.transform(self.estimate.x, self.estimate.y)
+        lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
         candidates = self._candidate_records()
         for candidate, why in zip(candidates, self.explanations, strict=False):
             candidate["explanation"] = why.to_dict(self.north)

@@ -114,10 +114,12 @@ def photo_loglik(
     weights: NDArray[np.float64],
     *,
     turns: NDArray[np.float64],
+    group: int = 1,
 ) -> NDArray[np.float64]:
     """Return the log-likelihood of a photo by place and turn, shape (v, r).
 
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
+    So many places after each other are a `group`, of which only the sum is needed.
     """
     from semsig_gis.likelihood.alignment import align  # noqa: PLC0415 - numba loads slowly
 
@@ -133,6 +135,8 @@ def photo_loglik(
 
     work = partial(
         align,
+        group=group,
+        log_weights=np.log(weights),
         offsets=views.offsets,
         kinds=kinds,
         bearing_units=bearing_units.astype(np.uint16),
@@ -159,6 +163,5 @@ def photo_loglik(
         distances=first.distances,
         totals=logliks,
     )
-    share_rows(work, len(turns), least=PLACES_A_PART)
-    logliks += np.log(weights)[:, None, None]
+    share_rows(work, len(turns) // group, least=max(PLACES_A_PART // group, 1))
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))

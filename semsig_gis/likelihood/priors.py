@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Self
 import geopandas as gpd
 import numpy as np
 import shapely
-from pyproj import Transformer
 
 from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.geometry import to_degrees
 from semsig_gis.core.ranges import MOST_METRES, require_number
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
 
-DEGREES = "EPSG:4326"
 LEAST_SIGMA_M = 0.01
 FARTHEST = 3.0  # standard deviations of a position, beyond the range of sight, from every cell
 
@@ -78,13 +77,12 @@ class KnownPosition:
         parts = text.split(",")
         found = [_COORDINATE.fullmatch(part.strip()) for part in parts[:2]]
         letters = "".join((one[2] or "?")[-1].upper() for one in found if one)
-        to_degrees = Transformer.from_crs(database.crs, DEGREES, always_xy=True)
         readings, sigma = [], math.nan
         if len(parts) == 3 and len(letters) == 2:  # noqa: PLR2004 - two coordinates and sigma
             with contextlib.suppress(ValueError):
                 sigma = float(parts[2].strip().removesuffix("m"))
                 values = [float(one[1]) for one in found if one]
-                readings = _readings(values, letters, to_degrees)
+                readings = _readings(values, letters, database.crs)
         if not readings:
             msg = (
                 f"the position was given as {text!r}; give {NORTH_EAST},SIGMA in degrees or "
@@ -116,19 +114,19 @@ class KnownPosition:
 
 
 def _readings(
-    values: list[float], letters: str, to_degrees: Transformer
+    values: list[float], letters: str, crs: CRS
 ) -> list[tuple[str, tuple[float, float, float, float]]]:
     """Return what two numbers may be taken for, with x, y, longitude and latitude of each."""
     first, second = values
     readings = []
     if letters in {"??", "MM"}:
-        readings.append((METRES, (first, second, *to_degrees.transform(first, second))))
+        readings.append((METRES, (first, second, *to_degrees(crs).transform(first, second))))
     for form, one, other in ((NORTH_EAST, second, first), (EAST_NORTH, first, second)):
         east, north = list(letters)[:: -1 if form == NORTH_EAST else 1]
         if east in "?EW" and north in "?NS" and (east == "?") == (north == "?"):
             lon, lat = (-one if east == "W" else one), (-other if north == "S" else other)
             if abs(lat) <= 90 and abs(lon) <= 180:  # noqa: PLR2004 - degrees
-                x, y = to_degrees.transform(lon, lat, direction="INVERSE")
+                x, y = to_degrees(crs).transform(lon, lat, direction="INVERSE")
                 readings.append((form, (x, y, lon, lat)))
     return readings
 
@@ -148,8 +146,8 @@ def _is_near(database: SignatureDatabase, position: tuple[float, float], sigma: 
 def _extent(database: SignatureDatabase) -> str:
     """Return where the cells lie, in words, in both systems."""
     (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
-    to_degrees = Transformer.from_crs(database.crs, DEGREES, always_xy=True)
-    low_lon, low_lat, high_lon, high_lat = to_degrees.transform_bounds(west, south, east, north)
+    bounds = to_degrees(database.crs).transform_bounds(west, south, east, north)
+    low_lon, low_lat, high_lon, high_lat = bounds
     return (
         f"the cells lie at x {west:.0f} to {east:.0f}, y {south:.0f} to {north:.0f} "
         f"({database.crs.to_string()}), which is latitude {low_lat:.4f} to {high_lat:.4f}, "

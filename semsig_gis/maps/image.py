@@ -12,15 +12,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 
-from semsig_gis.core.geometry import across_180, cell_ids
+from semsig_gis.core.geometry import across_180, cell_ids, to_degrees
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
 
@@ -50,9 +49,9 @@ def place_lattices(database: SignatureDatabase) -> PlaceLattices:
     low = origin + step * np.array([database.columns.min(), database.rows.min()])
     high = origin + step * np.array([database.columns.max() + 1.0, database.rows.max() + 1.0])
     metres, mercator_box = _mercator_lattice(database, low, high)
-    to_degrees = Transformer.from_crs(database.crs, "EPSG:4326", always_xy=True)
     sides = np.linspace(low, high, _LATTICE + 1)
-    longitude, latitude = to_degrees.transform(*np.meshgrid(sides[:, 0], sides[:, 1]))
+    corners = np.meshgrid(sides[:, 0], sides[:, 1])
+    longitude, latitude = to_degrees(database.crs).transform(*corners)
     return PlaceLattices(
         metres=np.moveaxis(metres, 0, 2),
         mercator_box=mercator_box,
@@ -97,8 +96,7 @@ class CellPixels:
             ids = cell_ids(*np.floor((weights @ across - origin[:, None]) / side).astype(np.int64))
             nearest = np.minimum(np.searchsorted(blocks, ids), len(blocks) - 1)
             pixels[line] = np.where(blocks[nearest] == ids, nearest, len(blocks))
-        to_degrees = Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
-        longitudes, latitudes = to_degrees.transform([west, east], [south, north])
+        longitudes, latitudes = to_degrees(CRS(3857)).transform([west, east], [south, north])
         corners = np.stack([latitudes, across_180(longitudes, database.crs)], axis=1)
         return cls(blocks=pixels, members=members, corners=corners.tolist())
 

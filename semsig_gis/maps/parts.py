@@ -17,11 +17,10 @@ from folium.map import Layer
 from folium.raster_layers import ImageOverlay
 from folium.template import Template
 from folium.utilities import JsCode
-from pyproj import Transformer
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN, across_180
+from semsig_gis.core.geometry import FULL_TURN, across_180, to_degrees
 from semsig_gis.core.signs import SHADES, VERDICTS, class_signs
 from semsig_gis.core.view import View
 from semsig_gis.database.database import SignatureDatabase
@@ -265,14 +264,9 @@ def layers_of(map_: folium.Map) -> dict[str, Element]:
     return map_._children  # noqa: SLF001 - branca has no public way to look at them
 
 
-@functools.lru_cache(maxsize=8)
-def _to_degrees(crs: CRS) -> Transformer:
-    return Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
-
-
 def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[np.float64]:
     """Return latitudes and longitudes, by default to about 0.1 m, shape (n, 2); NaN stays NaN."""
-    longitude, latitude = _to_degrees(crs).transform(xy[:, 0], xy[:, 1])
+    longitude, latitude = to_degrees(crs).transform(xy[:, 0], xy[:, 1])
     degrees = np.round(np.stack([latitude, across_180(longitude, crs)], axis=1), digits)
     return np.where(np.isfinite(degrees), degrees, np.nan)
 
@@ -280,7 +274,7 @@ def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[
 def to_metres(place: tuple[float, float], crs: CRS) -> NDArray[np.float64]:
     """Return where a latitude and longitude is in a coordinate system, shape (1, 2)."""
     lat, lon = place
-    return np.array([_to_degrees(crs).transform(lon, lat, direction="INVERSE")])
+    return np.array([to_degrees(crs).transform(lon, lat, direction="INVERSE")])
 
 
 def exact_latlon(xy: ArrayLike, crs: CRS) -> list[list[float]]:

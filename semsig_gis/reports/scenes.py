@@ -13,9 +13,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.path import Path
-from pyproj import Transformer
 
 from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import to_degrees
 from semsig_gis.core.signs import OUTCOMES, ClassSign, class_signs, one_line
 from semsig_gis.queries.sight import Sight
 from semsig_gis.reports.parts import Pair, Scene, SceneObject
@@ -59,7 +59,7 @@ def cell_scene(database: SignatureDatabase, cell: int, *, title: str = "") -> Sc
     True
     """
     x, y = database.xy[cell].tolist()
-    lon, lat = Transformer.from_crs(database.crs, 4326, always_xy=True).transform(x, y)
+    lon, lat = to_degrees(database.crs).transform(x, y)
     number = int(database.cell_ids[cell])
     own = _seen_from(database, cell)
     return Scene(

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import threading
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from semsig_gis.core.threads import NotWantedError, share_rows, while_wanted
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.threads import NotWantedError, each_in_order, share_rows, while_wanted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 @pytest.mark.parametrize("cores", [1, 2, 5])
@@ -48,3 +53,48 @@ def test_what_is_not_wanted_any_more_goes_on_to_the_next_loop_alone() -> None:
     with pytest.raises(NotWantedError), while_wanted(lambda: False):
         share_rows(work, 1)
     assert len(done) == 2
+
+
+@pytest.mark.parametrize("cores", [1, 3])
+def test_items_are_worked_on_side_by_side_and_come_in_their_order(
+    cores: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("semsig_gis.core.threads.cores", lambda: cores)
+    meeting = threading.Barrier(cores)  # which nobody leaves before all are there
+    taken: list[int] = []
+
+    def items() -> Iterator[int]:
+        for number in range(1 + 4 * cores):
+            taken.append(number)
+            yield number
+
+    def square(number: int) -> int:
+        if number:
+            meeting.wait(60.0)
+        return number**2
+
+    squares = []
+    for number, result in enumerate(each_in_order(square, items())):
+        assert len(taken) <= number + 2 * cores + 1
+        squares.append(result)
+    assert squares == [number**2 for number in range(1 + 4 * cores)]
+
+
+def test_an_error_of_the_items_comes_after_what_was_before_it() -> None:
+    def items() -> Iterator[int]:
+        yield from range(3)
+        msg = "no more"
+        raise InputError(msg)
+
+    results: list[int] = []
+    with pytest.raises(InputError, match="no more"):
+        results.extend(each_in_order(abs, items()))
+    assert results == [0, 1, 2]
+
+
+def test_an_error_of_the_work_ends_it() -> None:
+    def work(number: int) -> float:
+        return 1 / number
+
+    with pytest.raises(ZeroDivisionError):
+        list(each_in_order(work, [2, 1, 0, 1]))

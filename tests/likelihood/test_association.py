@@ -23,11 +23,12 @@ from noisy_cells import (
     turned_query,
 )
 from view_oracle import bearing_density, cell_loglik, random_view
-from worlds import CODES, World
+from worlds import CODES, World, random_town
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.view import FULL_VIEW, Photo, View
+from semsig_gis.database.aside import views_aside
 from semsig_gis.database.database import views_in
 from semsig_gis.likelihood.association import (
     Detections,
@@ -40,8 +41,9 @@ from semsig_gis.likelihood.association import (
 )
 from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, cell_noise, named_noise
 from semsig_gis.likelihood.noise.table import database_tables, query_bearings
+from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
@@ -266,6 +268,37 @@ def test_turns_are_those_of_a_turned_query() -> None:
         turned = turned_query(query, float(turns[place, way]))
         alone = align_cells(database, turned, GENERIC, cells[[place]])
         assert found[place, way] == pytest.approx(alone[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("weights", [(0.8, 0.1, 0.1), (1e-6, 0.5, 0.5)])
+def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, float, float]) -> None:
+    town, side = random_town().database, 3
+    rng = np.random.default_rng(0)
+    longest = np.argsort(-town.lengths, kind="stable")
+    cells = rng.choice(longest[:80], 40, replace=False)
+    along = (np.arange(side) - 1) * town.grid.step / side
+    places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    seen = views_aside(town, cells, places)
+    query = View.of(town.signature(int(cells[0])))
+    sharp = [replace(spec, bearing_sigma=1.5) for spec in GENERIC.specs]
+    noise = NoiseMixture(specs=tuple(sharp), weights=weights, name="sharp")
+    tables, shares = database_tables(town, cell_noise(noise, town.grid.step / side))
+    photo = PhotoTable.of(query, tables[0])
+    turns = np.repeat(rng.uniform(-5.0, 5.0, (len(cells), 2)), len(places), axis=0)
+    some = photo_loglik(photo, seen, tables, shares, turns=turns, group=len(places))
+    # One model and one place at a time, of which nothing is left out.
+    each = [
+        photo_loglik(photo, seen, [table], np.array([share]), turns=turns)
+        for table, share in zip(tables, shares.tolist(), strict=True)
+    ]
+    whole = np.logaddexp.reduce(each, axis=0)
+    assert (some > whole - 1e-9).all()
+    assert (some > whole + 1e-3).mean() > 0.01  # which is left out
+    sums, expected = (
+        np.logaddexp.reduce(one.reshape(len(cells), len(places), -1), axis=1)
+        for one in (some, whole)
+    )
+    assert sums == pytest.approx(expected, abs=27 * math.exp(-9.0))
 
 
 def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:
