@@ -67,6 +67,7 @@ NOT_TOLD, SECTORS, RANGES = "as a full turn", "sectors", "sectors and ranges"
 PHOTOS = 5
 NEAR_M = 50.0
 MANY, DECILE_OFF = 100, 0.05  # queries in a tenth of the chance, and how far off it may be
+LEAST_LUCK, LUCK_DRAWS = 0.05, 20_000  # below which it is more than luck; how often it is tried
 PARTS = 16  # of the queries of a line, that processes take
 SPARE = 40  # times the queries of a line are drawn at most, to find enough with five detections
 
@@ -369,6 +370,19 @@ def bars(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Bar]]:
         if offs:
             what = f"from {seen_from}: tenths of the chance off, at most, in all lines"
             yield city, Bar(what=what, value=max(offs), high=DECILE_OFF)
+            what = f"from {seen_from}: how often exact chances would be off by as much, by luck"
+            yield city, Bar(what=what, value=_luck(lines, max(offs)), low=LEAST_LUCK)
+
+
+def _luck(rows: Sequence[dict[str, Any]], off: float) -> float:
+    """Return how often exact chances would be off by `off` or more in a tenth of so many queries.
+
+    A tenth of 100 queries with a chance of a half is .05 off as often as not.
+    """
+    tenths = [one for row in rows for one in row["bins"] if one["n"] >= MANY]
+    sizes, stated = (np.array([one[name] for one in tenths]) for name in ("n", "stated"))
+    hits = np.random.default_rng(0).binomial(sizes, stated, (LUCK_DRAWS, len(sizes)))
+    return float((np.abs(hits / sizes - stated).max(axis=1) >= off).mean())
 
 
 def _share_bars(rows: Iterable[dict[str, Any]]) -> Iterator[Bar]:
