@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 
 
 LEAST_LOG = -700.0  # whose exponential is a number
-LEAST_MASS = 1e-9  # of the chance, in cells that need not be sorted
 ROUNDING = 1e-3  # of a sum of chances that were written as float32
 PLACES = 1000
 """Likeliest cells among which the best place is looked for."""
+LEAST_POWER = -1100  # of two, below which there is no number
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -75,24 +75,28 @@ class Posterior(Displayed):
         }
 
     @cached_property
-    def _likely(self) -> NDArray[np.int64]:
-        """The cells that hold all the chance but `LEAST_MASS`, likeliest first."""
-        level = LEAST_MASS / len(self.chances)
-        return _likeliest_first(self.chances, np.flatnonzero(self.chances >= level))
+    def _powers(self) -> NDArray[np.int64]:
+        """The powers of two of the chances, from `LEAST_POWER` on; 0 where there is no chance."""
+        return np.where(self.chances > 0, np.frexp(self.chances)[1] - LEAST_POWER, 0)
 
-    @cached_property
-    def _held(self) -> NDArray[np.float64]:
-        """The chance of the first of these, of the first two, ..."""
-        return np.cumsum(self.chances[self._likely])
+    def _top(self, amount: float, chances: NDArray[np.float64] | None = None) -> NDArray[np.int64]:
+        """Return the cells that may be among the likeliest that make up an amount, in any order.
+
+        It is a number of cells or, with the chances, a share of these. To sort all takes longer.
+        """
+        held = np.cumsum(np.bincount(self._powers, chances)[::-1])
+        power = len(held) - 1 - int(np.searchsorted(held, amount))
+        return np.flatnonzero(self._powers >= power)
 
     def likeliest(self, count: int) -> NDArray[np.int64]:
         """Return the row numbers of so many cells, likeliest first, or all if there are fewer."""
-        if count <= len(self._likely):
-            return self._likely[:count]
-        cells = np.arange(len(self.chances))
-        if count < len(cells):
-            cells = np.argpartition(-self.chances, count - 1)[:count]
-        return _likeliest_first(self.chances, cells)
+        cells = self._top(count)
+        if len(cells) > 2 * count:
+            some, rest = self.chances[cells], len(cells) - count
+            least = np.partition(some, rest)[rest]
+            above, equal = cells[some > least], cells[some == least]
+            cells = np.concatenate([above, equal[: count - len(above)]])
+        return _likeliest_first(self.chances, cells)[:count]
 
     @property
     def entropy(self) -> float:
@@ -109,12 +113,11 @@ class Posterior(Displayed):
         if not 0 < share <= 1:
             msg = f"a region of a share of {share} was asked for; give a number above 0, at most 1."
             raise InputError(msg)
-        cells, total = self._likely, self._held
-        if share > 1.0 - LEAST_MASS:
-            cells = self.likeliest(int((self.chances > 0).sum()))
-            total = np.cumsum(self.chances[cells])
         # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
-        return cells[: int(np.searchsorted(total, share * (1.0 - 1e-12))) + 1]
+        share *= 1.0 - 1e-12
+        cells = self._top(share, self.chances)
+        cells = _likeliest_first(self.chances, cells[self.chances[cells] > 0])
+        return cells[: int(np.searchsorted(np.cumsum(self.chances[cells]), share)) + 1]
 
     def mass_within(
         self, radius: float, cells: NDArray[np.int64] | None = None
