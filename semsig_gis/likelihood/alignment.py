@@ -21,7 +21,6 @@ _LEAST = 1e-6  # weight of a pair against a miss and a false detection, from whi
 _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the observer
 _LARGE = 1e200  # from which on a product becomes a logarithm
 _SURE = 6.0  # from which on the error function is one
-_NEEDLESS = 9.0  # nats below the best of a group, from which on a sum is not needed
 # How often messages are sent, and the relative change at which they are taken for settled.
 _ROUNDS, _SETTLED = 30, 3e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
@@ -87,7 +86,10 @@ def _densities(
 def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     part: NDArray[np.int64],
     group: int,
+    reached: float,
+    margin: float,
     log_weights: NDArray[np.float64],
+    log_prior: NDArray[np.float64],
     offsets: NDArray[np.int64],
     kinds: NDArray[np.int64],
     bearing_units: NDArray[np.uint16],
@@ -117,8 +119,9 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     """Sum over the one-to-one associations of a photo with what is seen from some places.
 
     Fills `totals`, shape (models, places, turns), with log-likelihoods and the `log_weights` of the
-    models, for the groups ``part[0]`` to ``part[1] - 1`` of so many places. What cannot come within
-    e^-9 of the best of its group and turn gets a bound. Objects of the places have class rows
+    models, for the groups ``part[0]`` to ``part[1] - 1`` of so many places. With the `log_prior`,
+    shape (places, turns), what must stay by a `margin` below what was `reached`, in its group or
+    before, gets a bound alone. Objects of the places have class rows
     `kinds` and bearings of `unit` degrees a unit; some are `beyond` the range. The photo, turned by
     `turns`, shape (places, turns), has detections by `bearings`, `ranges` (NaN if unknown) and, by
     model and class, `range_sigma`; it saw `sectors`, shape (s, 2), or all round, `width` of the
@@ -133,7 +136,8 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     models, longest = detected.shape[0], detected.shape[1] - 1
     size = len(bearings)
     most = 0
-    for place in range(part[0] * group, part[1] * group):
+    first, last = part[0] * group, min(part[1] * group, len(turns))
+    for place in range(first, last):
         most = max(most, offsets[place + 1] - offsets[place])
     pairs = most * size + 1
     ends = np.empty(most + 1, np.int64)  # the pairs of an object are ends[one]:ends[one + 1]
@@ -162,10 +166,10 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
         alike &= blur[model] == blur[0]
         alike &= np.array_equal(sigma[model], sigma[0])
         alike &= np.array_equal(range_sigma[model], range_sigma[0])
-    top = np.empty(turns.shape[1])
-    for place in range(part[0] * group, part[1] * group):
+    top = reached
+    for place in range(first, last):
         if place % group == 0:
-            top[:] = -np.inf
+            top = reached
         low = offsets[place]
         count = offsets[place + 1] - low
         length = min(count, longest)
@@ -260,7 +264,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 for one in range(count):
                     by_object *= at_left[one]
                 bound = total + math.log(min(by_detection, by_object))
-                if bound < top[way] - _NEEDLESS:
+                if bound + log_prior[place, way] < top - margin:
                     totals[model, place, way] = bound
                     continue
                 # Belief propagation, as in `associate`; as a function of its own it is slower. Each
@@ -299,7 +303,7 @@ def align(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                         total += math.log(product)
                         product = 1.0
                 totals[model, place, way] = total + math.log(product)
-                top[way] = max(top[way], totals[model, place, way])
+                top = max(top, totals[model, place, way] + log_prior[place, way])
 
 
 @compiled

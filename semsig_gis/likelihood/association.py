@@ -500,11 +500,20 @@ def _aligned(
         turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
         asked = PhotoTable.of(photo, index.table)
         everywhere = np.repeat(turns, len(places), axis=0)
-        logliks = photo_loglik(asked, seen, *models, turns=everywhere, group=len(places))
-        logliks = logliks.reshape(len(cells), len(places), -1)
+        chances = np.zeros(everywhere.shape)
         if heading is not None:
-            chances = turn_logs(turns, TURNS[1] - TURNS[0], own_sigma(photo, north_sigma))
-            logliks += chances[:, None]
+            step, sigma = TURNS[1] - TURNS[0], own_sigma(photo, north_sigma)
+            chances = turn_logs(everywhere, step, sigma)
+        logliks = chances + photo_loglik(
+            asked,
+            seen,
+            *models,
+            turns=everywhere,
+            log_prior=chances,
+            # A place that does not fit one photo may fit the others.
+            group=len(places) if len(scores.headings) == 1 else 1,
+        )
+        logliks = logliks.reshape(len(cells), len(places), -1)
         best = np.logaddexp.reduce(logliks, axis=1).argmax(axis=1)
         likeliest.append(turns[np.arange(len(cells)), best])
         total += np.logaddexp.reduce(logliks, axis=2)

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.noise.table import NoiseTable
 
 PLACES_A_PART = 32  # that are worth a thread
+FIRST = 128  # places of which the others must not stay too far behind
+LOST = 3e-3  # of a sum, that all terms together may be off which are not worked out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,12 +116,16 @@ def photo_loglik(
     weights: NDArray[np.float64],
     *,
     turns: NDArray[np.float64],
+    log_prior: NDArray[np.float64] | None = None,
     group: int = 1,
+    whole: bool = False,
 ) -> NDArray[np.float64]:
     """Return the log-likelihood of a photo by place and turn, shape (v, r).
 
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
-    So many places after each other are a `group`, of which only the sum is needed.
+    So many places after each other are a `group`, of which only the sum is needed, with a
+    `log_prior` of places and turns; or only the `whole` sum is, and likely places come first. What
+    is next to nothing in it (`LOST`) is not worked out: it gets a bound of its likelihood.
     """
     from semsig_gis.likelihood.alignment import align  # noqa: PLC0415 - numba loads slowly
 
@@ -129,6 +135,8 @@ def photo_loglik(
     # Half a unit is rounding.
     beyond = views.distances > first.ranges[kinds] + first.reach / DISTANCE_UNITS / 2.0
     logliks = np.empty((len(tables), *turns.shape))
+    summed = len(tables) * turns.shape[1] * (len(turns) if whole else group)
+    prior = np.zeros(turns.shape) if log_prior is None else np.ascontiguousarray(log_prior)
 
     def stacked(name: str) -> NDArray[np.float64]:
         return np.stack([getattr(table, name) for table in tables])
@@ -136,7 +144,9 @@ def photo_loglik(
     work = partial(
         align,
         group=group,
+        margin=math.log(summed / LOST),
         log_weights=np.log(weights),
+        log_prior=prior,
         offsets=views.offsets,
         kinds=kinds,
         bearing_units=bearing_units.astype(np.uint16),
@@ -163,5 +173,11 @@ def photo_loglik(
         distances=first.distances,
         totals=logliks,
     )
-    share_rows(work, len(turns) // group, least=max(PLACES_A_PART // group, 1))
+    groups, least = -(-len(turns) // group), max(PLACES_A_PART // group, 1)
+    ahead, reached = 0, -math.inf
+    if whole:
+        ahead = min(FIRST, groups)
+        share_rows(partial(work, reached=reached), ahead, least=least)
+        reached = float((logliks[:, :ahead] + prior[:ahead]).max(initial=reached))
+    share_rows(lambda rest: work(rest + ahead, reached=reached), groups - ahead, least=least)
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))

@@ -411,9 +411,19 @@ def refine(
             sigma = looked_for[number]
             steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if sigma > 0 else np.zeros(1)
             turns = turned[number][:, None] + steps
-            by_turn = photo_loglik(asked[number], views, wide, weights, turns=turns)
+            chances = np.zeros(turns.shape)
             if sigma > 0:
-                by_turn += turn_logs(turns, steps[1] - steps[0], sigma)
+                chances = turn_logs(turns, steps[1] - steps[0], sigma)
+            by_turn = chances + photo_loglik(
+                asked[number],
+                views,
+                wide,
+                weights,
+                turns=turns,
+                log_prior=chances + prior[:, None],
+                # A place that does not fit one photo may fit the others.
+                whole=len(photos) == 1,
+            )
             own = np.logaddexp.reduce(by_turn, axis=1)
             shares = np.exp(by_turn - own[:, None])
             turned[number] = (shares * turns).sum(axis=1)

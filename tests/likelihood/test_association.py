@@ -43,7 +43,7 @@ from semsig_gis.likelihood.explain import explain, explain_cell
 from semsig_gis.likelihood.index import build_index
 from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, cell_noise, named_noise
 from semsig_gis.likelihood.noise.table import database_tables, query_bearings
-from semsig_gis.likelihood.photo import PhotoTable, photo_loglik
+from semsig_gis.likelihood.photo import LOST, PhotoTable, photo_loglik
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
@@ -285,20 +285,30 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
     tables, shares = database_tables(town, cell_noise(noise, town.grid.step / side))
     photo = PhotoTable.of(query, tables[0])
     turns = np.repeat(rng.uniform(-5.0, 5.0, (len(cells), 2)), len(places), axis=0)
-    some = photo_loglik(photo, seen, tables, shares, turns=turns, group=len(places))
-    # One model and one place at a time, of which nothing is left out.
+    prior = rng.normal(0.0, 3.0, turns.shape)
+    some, others = (
+        photo_loglik(photo, seen, tables, shares, turns=turns, log_prior=prior, **what)
+        for what in ({"group": len(places)}, {"whole": True})
+    )
+    # One model, one place and one turn at a time, of which nothing is left out.
     each = [
-        photo_loglik(photo, seen, [table], np.array([share]), turns=turns)
+        np.hstack(
+            [
+                photo_loglik(photo, seen, [table], np.array([share]), turns=turn[:, None])
+                for turn in turns.T
+            ]
+        )
         for table, share in zip(tables, shares.tolist(), strict=True)
     ]
     whole = np.logaddexp.reduce(each, axis=0)
-    assert (some > whole - 1e-9).all()
-    assert (some > whole + 1e-3).mean() > 0.01  # which is left out
-    sums, expected = (
-        np.logaddexp.reduce(one.reshape(len(cells), len(places), -1), axis=1)
-        for one in (some, whole)
-    )
-    assert sums == pytest.approx(expected, abs=27 * math.exp(-9.0))
+    for bounds, many in ((some, len(places)), (others, len(turns))):
+        assert (bounds > whole - 1e-3).all()
+        assert (bounds > whole + 1e-3).mean() > 0.01  # which are not worked out
+        sums, expected = (
+            np.logaddexp.reduce((one + prior).reshape(-1, many * turns.shape[1]), axis=1)
+            for one in (bounds, whole)
+        )
+        assert sums == pytest.approx(expected, abs=LOST)
 
 
 def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:
