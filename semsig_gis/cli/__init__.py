@@ -11,6 +11,7 @@ from __future__ import annotations
 import _thread
 import atexit
 import contextlib
+import gc
 import os
 import platform
 import signal
@@ -29,12 +30,14 @@ FAULT, UNUSABLE = 1, 2
 # As a shell counts programs that SIGINT and SIGPIPE end.
 INTERRUPTED, UNREAD = 130, 141
 AGAIN_S = 0.05
+LOADED = 400_000  # objects that are made before garbage is looked for: modules, mostly
 LONGEST = 300  # characters of what an error says that nobody wrote for a user
 
 
 def main() -> None:
     """Run the command, and end with its exit code; what goes wrong is told in one sentence."""
     said = ""
+    _spare_what_is_loaded()
     passing = sys.unraisablehook
     sys.unraisablehook = _pass_over
     try:
@@ -63,7 +66,22 @@ def main() -> None:
     if threading.current_thread() is threading.main_thread():
         # The work is done; an interrupt of what Python tidies up now would only show its lines.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+        # Nor is what lives to the end looked through for garbage, time and again.
+        atexit.register(gc.freeze)
     sys.exit(code)
+
+
+def _spare_what_is_loaded() -> None:
+    """Look for garbage later for once: what a short command loads stays to its end."""
+
+    def go_on(*_: object) -> None:
+        gc.set_threshold(*usual)
+        gc.callbacks.remove(go_on)
+
+    usual = gc.get_threshold()
+    if usual[0] < LOADED:
+        gc.callbacks.append(go_on)
+        gc.set_threshold(LOADED, *usual[1:])
 
 
 def _run() -> int:
@@ -72,8 +90,8 @@ def _run() -> int:
         with contextlib.suppress(AttributeError):  # one that another program has put there
             stream.reconfigure(errors="backslashreplace")  # type: ignore[attr-defined]
     _require_place()
-    from semsig_gis.cli.commands import run
     from semsig_gis.cli.console import stop_with_supervisor, supervised
+    from semsig_gis.cli.run import run
 
     if supervised():
         stop_with_supervisor()

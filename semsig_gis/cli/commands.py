@@ -1,14 +1,6 @@
-"""All commands, and what goes before each of them."""
+"""All commands."""
 
-from __future__ import annotations
-
-import sys
-from typing import Annotated, Any
-
-import typer
-
-from semsig_gis import __version__
-from semsig_gis.cli.console import app, say
+from semsig_gis.cli.console import app
 
 # The order of these imports is that of the help.
 # isort: off
@@ -27,60 +19,4 @@ from semsig_gis.cli import (  # noqa: F401
     export,
 )
 
-# isort: on
-from semsig_gis.core.errors import InputError
-
-__all__ = ["app", "run"]
-
-INTERRUPTED = 130
-
-
-def run() -> int:
-    """Run the command that the arguments name, and return its exit code.
-
-    InputError if they name none, or an option has a value that it does not take.
-    """
-    try:
-        code = app(None if sys.argv[1:] else ["--help"], prog_name="semsig", standalone_mode=False)
-    except typer.TyperException as error:
-        context = getattr(error, "ctx", None)
-        command = "semsig" if context is None else context.command_path
-        fault = error.format_message().rstrip(".?").replace(". ", "; ")
-        msg = _out_of_range(error) or f"{fault}; see {command} --help."
-        raise InputError(msg) from error
-    except SystemExit as end:
-        if end.code:  # so typer ends where nobody reads the output any more
-            raise BrokenPipeError from end
-        return 0  # a script of completion, or what completes a line
-    if code == INTERRUPTED:  # which typer makes of the interrupt key
-        raise KeyboardInterrupt
-    return code if isinstance(code, int) else 0
-
-
-def _out_of_range(error: typer.TyperException) -> str:
-    """Return which number was given and which are accepted, or nothing if it is another fault."""
-    option: Any = getattr(error, "param", None)
-    least, most = getattr(option, "min", None), getattr(option, "max", None)
-    faults: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()  # of pydantic
-    if not faults or least is None or most is None:
-        return ""
-    kind, given = faults[0]["type"], faults[0]["input"]
-    number = "a whole number" if kind.startswith("int") else "a number"
-    shown = repr(given) if kind.endswith("parsing") else given
-    return f"{option.opts[0]} was given as {shown}; give {number} from {least:,} to {most:,}."
-
-
-def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
-    if wanted:
-        say(f"semsig {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _common(
-    *,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Find where in a city a view was taken, from the street objects in it."""
+__all__ = ["app"]

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import typer
 
+from semsig_gis import __version__
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.method import DEFAULT_METHOD, PAPER_METHOD
 from semsig_gis.core.terminal import visible
@@ -280,6 +281,23 @@ app = Commands(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
+    if wanted:
+        say(f"semsig {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Find where in a city a view was taken, from the street objects in it."""
+
 
 Database = Annotated[Path, typer.Argument(help="Signature database written by `semsig build`.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]

@@ -6,8 +6,6 @@ import contextlib
 import warnings
 from pathlib import Path
 
-import psutil
-
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.memory import address_space_left
 
@@ -26,6 +24,8 @@ LONG_S = 600.0
 
 def free_memory() -> int:
     """Return how many bytes this process may still take."""
+    import psutil  # noqa: PLC0415 - it loads slowly
+
     free = [psutil.virtual_memory().available]
     for used, most in GROUPS:
         with contextlib.suppress(OSError, ValueError):  # "max" is no number

@@ -6,8 +6,6 @@ import errno
 import os
 import sys
 
-import psutil
-
 if sys.platform != "win32":
     import resource
 
@@ -26,7 +24,11 @@ def address_space_left() -> int | None:
     if sys.platform == "win32":
         return None
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return None if limit == resource.RLIM_INFINITY else limit - psutil.Process().memory_info().vms
+    if limit == resource.RLIM_INFINITY:
+        return None
+    import psutil  # noqa: PLC0415 - it loads slowly
+
+    return limit - psutil.Process().memory_info().vms
 
 
 def require_address_space(size: int, what: str) -> None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from pyproj import CRS
 
 import semsig_gis
@@ -395,6 +394,8 @@ class SequenceTable:
         )
         encoded = rows.dictionary_encode()
         distinct = len(encoded.dictionary)
+        import pyarrow.compute as pc  # noqa: PLC0415 - it loads slowly
+
         lengths = whole_numbers(pc.binary_length(encoded.dictionary))
         order = np.argsort(lengths, kind="stable")
         rank = np.empty(distinct, np.int64)

@@ -261,9 +261,11 @@ def unplaced_parts(text: str) -> tuple[str, list[str], list[str]]:
 
 def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
     """Return what `unplaced_parts` does, with class codes in the place of words."""
+    sentence, *others = unplaced_parts(text)
+    if not any(others):
+        return sentence, (), ()
     from semsig_gis.objects.keywords import class_code  # noqa: PLC0415 - it loads slowly
 
-    sentence, *others = unplaced_parts(text)
     seen, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
     return sentence, seen, absent
 

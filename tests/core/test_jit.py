@@ -3,10 +3,10 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numba
 from machine import PATIENCE_S
+from numba.core.caching import CompileResultCacheImpl
 
 from semsig_gis.core.jit import compiled
 
@@ -17,15 +17,7 @@ if TYPE_CHECKING:
 def test_without_a_folder_for_the_code_it_is_compiled_for_this_process(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    njit = numba.njit
-
-    def refuse(*function: Any, cache: bool = False, **options: Any) -> Any:  # noqa: ANN401
-        if cache:
-            message = "cannot cache function: no locator available"
-            raise RuntimeError(message)
-        return njit(*function, **options)
-
-    monkeypatch.setattr(numba, "njit", refuse)
+    monkeypatch.setattr(CompileResultCacheImpl, "_locator_classes", [])
     assert compiled(lambda number: number + 1)(1) == 2
 
 
