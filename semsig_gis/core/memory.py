@@ -28,7 +28,8 @@ def address_space_left() -> int | None:
         return None
     import psutil  # noqa: PLC0415 - it loads slowly
 
-    return limit - psutil.Process().memory_info().vms
+    taken: int = psutil.Process().memory_info().vms
+    return limit - taken
 
 
 def require_address_space(size: int, what: str) -> None:

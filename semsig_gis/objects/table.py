@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 import semsig_gis
 from semsig_gis import __version__
@@ -368,9 +367,9 @@ def objects_of(
         _require_columns(arrow)
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         codes = whole_numbers(arrow[CLASS_CODE]).astype(np.uint8)
-        for code in pc.unique(arrow[CLASS_CODE]).to_pylist():
+        for code in arrow[CLASS_CODE].unique().to_pylist():
             taxonomy.by_code(code)
-        licenses = _licences(specs, pc.unique(arrow[SOURCE]).to_pylist())
+        licenses = _licences(specs, arrow[SOURCE].unique().to_pylist())
         notes = tuple(map(str, specs.get(NOTES, ())))
         xy = wkb_to_points(arrow[GEOMETRY])
     except (TypeError, ValueError, LookupError, pa.ArrowException) as error:

@@ -21,15 +21,17 @@ def test_without_a_folder_for_the_code_it_is_compiled_for_this_process(
     assert compiled(lambda number: number + 1)(1) == 2
 
 
-def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
+def test_code_is_kept_for_later_processes_which_load_no_compiler(tmp_path: Path) -> None:
     package = Path(__file__).parents[2]
     program = (
+        "import sys\n"
         "import numpy as np\n"
         "from semsig_gis.matching.metrics.edit import BitPlanes\n"
         "values = np.array([1, 2], np.uint8)\n"
         "print(BitPlanes.build(values, np.array([0, 2])).edit_distances([values]))\n"
         "from semsig_gis.matching.kernels import scan\n"
         "print(sum(scan.stats.cache_hits.values()), sum(scan.stats.cache_misses.values()))\n"
+        "print('numba.core.inline_closurecall' in sys.modules)\n"
     )
     seen = [
         subprocess.run(
@@ -43,4 +45,4 @@ def test_code_is_kept_for_later_processes(tmp_path: Path) -> None:
         ).stdout.split()
         for _ in range(2)
     ]
-    assert seen == [["[[0.]]", "0", "1"], ["[[0.]]", "1", "0"]]
+    assert seen == [["[[0.]]", "0", "1", "True"], ["[[0.]]", "1", "0", "False"]]
