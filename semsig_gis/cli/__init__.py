@@ -30,7 +30,7 @@ FAULT, UNUSABLE = 1, 2
 # As a shell counts programs that SIGINT and SIGPIPE end.
 INTERRUPTED, UNREAD = 130, 141
 AGAIN_S = 0.05
-LOADED = 400_000  # objects that are made before garbage is looked for: modules, mostly
+LOADED = 300_000  # objects that are made before garbage is looked for: modules, mostly
 LONGEST = 300  # characters of what an error says that nobody wrote for a user
 
 

@@ -353,6 +353,7 @@ def test_a_query_loads_no_tables_or_maps_and_writes_nothing(city: Path, options:
         "try: main()\n"
         "except SystemExit as end: assert end.code == 0\n"
         "heavy = {'pandas', 'geopandas', 'folium', 'dask', 'fiona', 'matplotlib', 'rasterio'}\n"
+        "heavy |= {'psutil', 'semsig_gis.cli.build', 'semsig_gis.sources.catalog'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     line = f"localize city.parquet --types DD --bearings 80,200 {options}".split()
