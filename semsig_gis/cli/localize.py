@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -172,7 +172,9 @@ def localize(options: LocalizeOptions) -> None:
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
-    _read(city, method)
+    # The database is read while another core loads what answers; what fails there fails here, too.
+    answering = "likelihood.kernels" if method is None else "matching.search"
+    ThreadPoolExecutor(1).submit(importlib.import_module, f"semsig_gis.{answering}")
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = seen_north(city, options.north, options.date)
 
@@ -184,18 +186,6 @@ def localize(options: LocalizeOptions) -> None:
         return
     queries = options.read_queries(city.dataset)
     _answer_lines(queries, _locator(options, city, method, north), options)
-
-
-def _read(city: City, method: Method | None) -> None:
-    """Read the database on one core, and load what answers on another."""
-    with ThreadPoolExecutor(1) as reader:
-        reading = reader.submit(copy_context().run, getattr, city, "dataset")
-        if method is None:
-            import semsig_gis.likelihood.kernels
-            import semsig_gis.likelihood.locate
-        else:
-            import semsig_gis.matching.search  # noqa: F401
-        reading.result()
 
 
 def _beside(
