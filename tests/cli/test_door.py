@@ -81,7 +81,7 @@ def test_each_end_has_a_code(
 CALLBACK = """
 import ctypes, signal, sys, time
 from semsig_gis import cli
-from semsig_gis.cli import commands
+from semsig_gis.cli import run as command
 
 @ctypes.CFUNCTYPE(None)
 def callback():
@@ -92,7 +92,7 @@ def run():
     time.sleep({seconds})
     return 0
 
-commands.run = run
+command.run = run
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's jobs may ignore it
 cli.main()
 """
@@ -119,11 +119,11 @@ def test_what_a_library_cannot_raise(error: str, seconds: int, code: int, said: 
 TIDYING = """
 import atexit, signal
 from semsig_gis import cli
-from semsig_gis.cli import commands
+from semsig_gis.cli import run as command
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 atexit.register(signal.raise_signal, signal.SIGINT)  # as when Python closes what is open
-commands.run = lambda: 0
+command.run = lambda: 0
 cli.main()
 """
 
