@@ -85,9 +85,8 @@ def _longer(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
     """Return the arrays with room for so many."""
     more = np.empty(size, np.uint8), np.empty(size), np.empty(size)
-    more[0][: len(codes)] = codes
-    more[1][: len(codes)] = turns
-    more[2][: len(codes)] = distances
+    for one in range(len(codes)):
+        more[0][one], more[1][one], more[2][one] = codes[one], turns[one], distances[one]
     return more
 
 
@@ -144,7 +143,13 @@ def _look(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     seen from each place, and the class code, bearing in degrees and distance of all that is.
     """
     here = np.empty(len(AROUND) + 1, np.int64)  # where the entries of each cell around start
-    most = len(AROUND) * np.max(offsets[1:] - offsets[:-1])
+    most = 0  # not by functions of numpy, which take their time to load
+    for cell in range(part[0], part[1]):
+        total = 0
+        for row in around[cell]:
+            if row >= 0:
+                total += offsets[row + 1] - offsets[row]
+        most = max(most, total)
     x, y, reach = np.empty(most), np.empty(most), np.empty(most)
     kinds = np.empty(most, np.uint8)
     sources = np.empty(4, np.int64)

@@ -450,6 +450,8 @@ class _Levels:
         """Return what is seen, by class code, bearing in bins and distance unit."""
         places = (self.level_of * BINS).astype(np.uint16)[units]
         places += bins
+        offsets = offsets.view()
+        offsets.flags.writeable = False  # as a file's are, or kernels are loaded twice
         return _Entries(offsets, self.table.row_of.astype(np.uint8)[codes], places)
 
     def rows(self, asked: PhotoTable) -> NDArray[np.float32]:
