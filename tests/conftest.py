@@ -39,7 +39,8 @@ BROWSER_COVERAGE = BrowserCoverage()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.pluginmanager.register(BROWSER_COVERAGE)
+    if config.getoption("cov_source", None):
+        config.pluginmanager.register(BROWSER_COVERAGE)
     unknown = required() - {*get_args(Part)}
     if unknown:
         msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {get_args(Part)}."
@@ -170,7 +171,9 @@ def carried() -> None:
 
 
 @pytest.fixture(scope="session")
-def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
+def _chromium(
+    pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Chrome]:
     from map_pages import UNPACKING
     from selenium import webdriver
 
@@ -195,10 +198,13 @@ def _chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chrome]:
     service = webdriver.ChromeService(executable_path=driver)
     browser = webdriver.Chrome(options=options, service=service)
     browser.set_script_timeout(PATIENCE_S)
-    BROWSER_COVERAGE.start(browser)
+    counted = pytestconfig.pluginmanager.is_registered(BROWSER_COVERAGE)
+    if counted:
+        BROWSER_COVERAGE.start(browser)
     browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": UNPACKING})
     yield browser
-    BROWSER_COVERAGE.take(browser)
+    if counted:
+        BROWSER_COVERAGE.take(browser)
     browser.quit()
 
 
