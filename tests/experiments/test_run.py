@@ -25,8 +25,8 @@ from semsig_gis.core.scratch import MACHINE
 from semsig_gis.evaluation.evaluate import evaluate, score_queries
 from semsig_gis.evaluation.methods import parse_method
 from semsig_gis.evaluation.spec import Districts, parse_experiment
+from semsig_gis.experiments import run
 from semsig_gis.experiments.run import (
-    PART_QUERIES,
     ExperimentWork,
     Part,
     open_results,
@@ -36,7 +36,7 @@ from semsig_gis.experiments.run import (
 from semsig_gis.matching.method import Method
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from distributed import LocalCluster
@@ -44,9 +44,10 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.spec import ExperimentSpec
     from semsig_gis.queries.draw import Query
 
+PART_QUERIES = 10
 SPEC = parse_experiment("""
 database = "city.parquet"
-queries = 130
+queries = 13
 top = [1, 3]
 [methods]
 paper = "edit+edit:5%"
@@ -79,6 +80,19 @@ def run_to_the_end(folder: Path, tmp_path: Path, results: Path) -> None:
 
 def never(*_: object, **__: object) -> None:
     raise AssertionError
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _small_parts() -> Iterator[None]:
+    """Answer few queries at a time, though no other process does."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "PART_QUERIES", PART_QUERIES)
+        yield
+
+
+@pytest.fixture
+def _parts_as_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "PART_QUERIES", 100)
 
 
 @pytest.fixture(scope="module")
@@ -148,12 +162,12 @@ def test_all_methods_see_the_same_queries(results: Path) -> None:
 def test_an_experiment_is_what_an_evaluation_is(results: Path) -> None:
     found = open_results(results)["none/paper-top3"]
     alone = evaluate(
-        TOWN.database, queries=130, method=Method.parse("edit+edit:5%"), distortion="", top=3
+        TOWN.database, queries=13, method=Method.parse("edit+edit:5%"), distortion="", top=3
     )
     assert_geodataframe_equal(found.queries, alone.queries)
 
 
-@pytest.mark.parametrize("done", [1, PART_QUERIES, 131, 400, 520])
+@pytest.mark.parametrize("done", [1, 21, 40, 52])
 def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
     done: int, folder: Path, results: Path, tmp_path: Path
 ) -> None:
@@ -162,6 +176,7 @@ def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+@pytest.mark.usefixtures("_parts_as_elsewhere")
 def test_a_run_that_was_killed_ends_with_the_same_bytes(
     folder: Path, results: Path, tmp_path: Path
 ) -> None:
@@ -170,17 +185,18 @@ def test_a_run_that_was_killed_ends_with_the_same_bytes(
     command = [sys.executable, *f"-m semsig_gis.cli experiment {spec} --out".split()]
     with subprocess.Popen(
         [*command, tmp_path / "out"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-    ) as run:
+    ) as process:
         parts = tmp_path / "out.partial" / "_parts"
-        while run.poll() is None:
+        while process.poll() is None:
             if any(parts.glob("*.parquet")):
-                run.send_signal(signal.SIGKILL)
+                process.send_signal(signal.SIGKILL)
                 break
             time.sleep(0.002)
-        run.wait()
+        process.wait()
     run_to_the_end(folder, tmp_path, results)
 
 
+@pytest.mark.usefixtures("_parts_as_elsewhere")
 def test_workers_write_the_same_files_as_one_process(
     folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
 ) -> None:
@@ -189,14 +205,14 @@ def test_workers_write_the_same_files_as_one_process(
     address = cluster.scheduler_address
     run_experiment(SPEC, tmp_path / "out", folder=folder, scheduler=address, **options)
     assert contents(tmp_path / "out") == contents(results)
-    assert len(seen) == 4
-    assert seen[-1] == 520
+    assert sorted(seen) == [26, 52]
 
 
+@pytest.mark.usefixtures("_parts_as_elsewhere")
 def test_several_experiments_at_once_are_as_one_by_one(
     folder: Path, results: Path, tmp_path: Path
 ) -> None:
-    other = replace(SPEC, queries=20, seeds=(3, 4))
+    other = replace(SPEC, queries=5, seeds=(3, 4))
     run_experiment(other, tmp_path / "alone", folder=folder)
     specs = {tmp_path / "a": SPEC, tmp_path / "b": other}
     found = run_experiments(specs, folder=folder, workers=2)
@@ -239,7 +255,7 @@ def test_killed_at_the_very_beginning(folder: Path, results: Path, tmp_path: Pat
 
 
 def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_path: Path) -> None:
-    interrupt(SPEC, tmp_path / "out", folder, after=520)
+    interrupt(SPEC, tmp_path / "out", folder, after=52)
     parts = tmp_path / "out.partial" / "_parts"
     first, second, *_ = sorted(parts.iterdir())
     first.write_bytes(first.read_bytes()[:-50])
@@ -261,7 +277,7 @@ def test_results_that_are_there_are_not_made_again(
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        ({"queries": 131}, "queries"),
+        ({"queries": 14}, "queries"),
         ({"seeds": (1,)}, "seeds"),
         ({"methods": {"paper": Method()}}, "methods"),
         ({"seen_from": "anywhere"}, "seen_from"),
@@ -279,13 +295,13 @@ def test_results_of_another_experiment_are_refused(
 
 def test_an_unfinished_run_of_another_experiment_is_refused(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    interrupt(SPEC, out, folder, after=101)
-    other = replace(SPEC, queries=20)
+    interrupt(SPEC, out, folder, after=1)
+    other = replace(SPEC, queries=5)
     with refused(InputError, "out.partial", "queries"):
         run_experiment(other, out, folder=folder)
     shutil.rmtree(tmp_path / "out.partial" / "_parts")  # nothing is lost
     run_experiment(other, out, folder=folder)
-    assert len(open_results(out)["none/paper-top1"].queries) == 20
+    assert len(open_results(out)["none/paper-top1"].queries) == 5
 
 
 def test_other_inputs_and_versions_are_refused(
@@ -363,7 +379,7 @@ def test_a_later_city_is_looked_at_from_anywhere(folder: Path, tmp_path: Path) -
 def test_progress_counts_every_answer(folder: Path, tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
     run_experiment(SPEC, tmp_path / "out", folder=folder, progress=lambda *step: seen.append(step))
-    assert seen == [(done, 520) for done in (200, 260, 460, 520)]
+    assert seen == [(done, 52) for done in (20, 26, 46, 52)]
 
 
 def test_an_evaluation_that_is_missing(results: Path, tmp_path: Path) -> None:
@@ -375,7 +391,7 @@ def test_an_evaluation_that_is_missing(results: Path, tmp_path: Path) -> None:
 
 MANY_METHODS = parse_experiment("""
 database = "city.parquet"
-queries = 130
+queries = 13
 seeds = [0, 5]
 [methods]
 fusion = "edit+edit"
@@ -390,7 +406,7 @@ medium = "medium"
 def test_the_parts_are_all_the_work(folder: Path) -> None:
     work = ExperimentWork(MANY_METHODS, folder)
     assert work.parts == tuple(Part(name, n) for name in ("none", "medium") for n in range(3))
-    assert [work.queries_in(part) for part in work.parts] == [100, 100, 60] * 2
+    assert [work.queries_in(part) for part in work.parts] == [10, 10, 6] * 2
 
 
 def test_methods_that_share_distances_answer_as_alone(
@@ -407,7 +423,7 @@ def test_methods_that_share_distances_answer_as_alone(
     together = answers(tmp_path / "together")
     assert list(together) == [f"medium.{name}.00001.parquet" for name in sorted(work.spec.methods)]
     seeds = together["medium.fusion.00001.parquet"]["seed"]
-    assert seeds.value_counts().to_dict() == {0: 30, 5: 70}
+    assert seeds.value_counts().to_dict() == {0: 3, 5: 7}
     monkeypatch.setattr("semsig_gis.experiments.run.MEMO_BYTES", 1)
     one_by_one = answers(tmp_path / "one_by_one")
     for name, table in together.items():
