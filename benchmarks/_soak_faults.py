@@ -36,6 +36,7 @@ PARTS = {
 }
 _PROCESSES = 8
 _PIPE = 128 + signal.SIGPIPE  # the exit code of `yes | head`, for its first part
+_START = "from benchmarks._soak_runs import main; main()"
 _ENVIRONMENTS: tuple[dict[str, str | None], ...] = (
     {"HOME": None},
     {"HOME": "/nowhere", "XDG_CACHE_HOME": None},
@@ -167,9 +168,9 @@ def _neither(command: Command, place: Path) -> list[str]:
 
 def _started(command: str, folder: Path, environment: Mapping[str, str | None]) -> Ending:
     """Run a command in a Python of its own, because some of the environment is read only once."""
-    own = {"PYTHONPATH": str(Path(__file__).parents[1]), **os.environ, **environment}
+    own = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1]), **environment}
     done = subprocess.run(  # noqa: S603 - as the table says
-        [sys.executable, "-m", "semsig_gis.cli", *command.split()],
+        [sys.executable, "-c", _START, *command.split()],
         cwd=folder,
         env={name: value for name, value in own.items() if value is not None},
         stdin=subprocess.DEVNULL,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import gc
 import importlib
 import json
@@ -20,6 +21,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import semsig_gis
 from semsig_gis.cli import main as semsig
+from semsig_gis.evaluation.identify import identify as identifying
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -76,7 +78,19 @@ def load_all() -> None:
     for name in (*modules, "rich.progress", "rich.table"):
         if not name.endswith("__main__"):
             importlib.import_module(name)
+    shorten()
     gc.freeze()  # or else every process would copy what it looks through
+
+
+def shorten() -> None:
+    """Let `identify` try less often: what it writes is as large."""
+    identifying.identify = functools.partial(identifying.identify, trials=60, class_trials=5)
+
+
+def main() -> None:
+    """Run the command that this process was started with."""
+    shorten()
+    semsig()
 
 
 def run(
