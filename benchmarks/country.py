@@ -91,7 +91,8 @@ def comparisons(size: str) -> Iterator[Comparison]:
         if one.manifest != two.manifest:
             msg = "two processes have built something else than one."
             raise ArithmeticError(msg)
-        updates = list(_updates(folder, scale))
+        with _cluster(2) as (_, address):
+            updates = list(_updates(folder, scale, address))
     what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
     print(
         f"{what}: {two.manifest.cells / two.seconds:,.0f} cells a second; the files of one process "
@@ -124,7 +125,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
     yield from updates
 
 
-def _updates(folder: Path, scale: _Size) -> Iterator[Comparison]:
+def _updates(folder: Path, scale: _Size, scheduler: str) -> Iterator[Comparison]:
     """Move some objects, of one town and of all, and update the country beside a fresh build."""
     objects = open_objects(folder / "country.parquet")
     xy, count = objects.xy, int(_CHANGED * len(objects))
@@ -139,16 +140,16 @@ def _updates(folder: Path, scale: _Size) -> Iterator[Comparison]:
         shifts[chosen] = rng.uniform(-5.0, 5.0, (count, 2))
         table.geometry = gpd.GeoSeries.from_xy(*(xy + shifts).T, index=table.index, crs=table.crs)
         save_objects(replace(objects, table=table), folder / "later.parquet")
-        fresh = _build(folder, "later", scale, workers=2)
-        with _cluster(2) as (_, address):
-            start = time.perf_counter()
-            update_tiles(
-                folder / "country",
-                folder / "later.parquet",
-                out=folder / "updated",
-                scheduler=address,
-            )
-            seconds = time.perf_counter() - start
+        start = time.perf_counter()
+        fresh = _built(folder, "later", scale, scheduler)
+        built = time.perf_counter()
+        update_tiles(
+            folder / "country",
+            folder / "later.parquet",
+            out=folder / "updated",
+            scheduler=scheduler,
+        )
+        updated = time.perf_counter()
         for file in sorted((folder / "later").rglob("*.*")):
             part = file.relative_to(folder / "later")
             if file.read_bytes() != (folder / "updated" / part).read_bytes():
@@ -157,10 +158,10 @@ def _updates(folder: Path, scale: _Size) -> Iterator[Comparison]:
         for name in ("later", "updated"):
             shutil.rmtree(folder / name)
         yield Comparison(
-            name=f"updating {fresh.manifest.cells:,} cells where {count:,} objects {where} moved",
+            name=f"updating {fresh.cells:,} cells where {count:,} objects {where} moved",
             unit="s",
-            ours=seconds,
-            peer=fresh.seconds,
+            ours=updated - built,
+            peer=built - start,
             peer_name="a fresh build",
             bar=None,
         )
@@ -200,14 +201,16 @@ def _build(folder: Path, name: str, scale: _Size, *, workers: int) -> _Run:
     """Build a country on new processes."""
     with _cluster(workers) as (client, address):
         start = time.perf_counter()
-        manifest = build_tiles(
-            folder / f"{name}.parquet",
-            folder / name,
-            tile=TileSpec(scale.tile),
-            scheduler=address,
-        )
+        manifest = _built(folder, name, scale, address)
         seconds = time.perf_counter() - start
         return _Run(manifest, seconds, max(client.run(own_peak).values()))
+
+
+def _built(folder: Path, name: str, scale: _Size, scheduler: str) -> Manifest:
+    """Build a country in tiles."""
+    return build_tiles(
+        folder / f"{name}.parquet", folder / name, tile=TileSpec(scale.tile), scheduler=scheduler
+    )
 
 
 def _check_sample(folder: Path, name: str, scale: _Size) -> int:
