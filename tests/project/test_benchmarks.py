@@ -120,7 +120,7 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("browser", "carried")
-@pytest.mark.parametrize(("name", "each"), [("ambiguity", 1), ("drift", 1), ("workbench", 2)])
+@pytest.mark.parametrize(("name", "each"), [("drift", 1), ("workbench", 2)])
 def test_pictures_of_a_page_are_taken(tmp_path: Path, name: str, each: int) -> None:
     subprocess.run(
         f"{sys.executable} -m benchmarks.pictures --size small --map {name} "
