@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from machine import PATIENCE_S
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
@@ -57,7 +58,7 @@ def press(page: MapPage, x: float, y: float) -> None:
 
 def wait_for(page: MapPage, key: str | None) -> None:
     told = "return map.semsigPanel.told?.key ?? null"
-    WebDriverWait(page.browser, 10.0, 0.02).until(lambda _: page.ask(told) == key, str(key))
+    WebDriverWait(page.browser, PATIENCE_S, 0.02).until(lambda _: page.ask(told) == key, str(key))
 
 
 def is_beside_the_panel(page: MapPage) -> bool:
@@ -74,7 +75,7 @@ def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int
     with still(page, *screen):
         page.open(ambiguity_map(CITY))
         page.ask("map.setView(arguments[0], 18, {animate: false})", PLACES.mean(axis=0).tolist())
-        for _ in range(40):
+        for _ in range(20):
             some = rng.permutation(len(CITY))[:60]
             where = page.ask(ON_TOP, PLACES[some].tolist())
             at = next(at for at, (_, _, on_top) in enumerate(where) if on_top)
@@ -215,7 +216,7 @@ def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
         sign = page.all(".semsig-object")[0]
         ActionChains(page.browser).move_to_element(sign).click().perform()
         told = "return map.semsigPanel.told.key"
-        WebDriverWait(page.browser, 10.0).until(lambda _: page.ask(told) != key)
+        WebDriverWait(page.browser, PATIENCE_S).until(lambda _: page.ask(told) != key)
         page.click(CITY, cell)
         objects = page.all(".semsig-wheels figure:first-child .object")
         # By keyboard, round and back.

@@ -16,6 +16,7 @@ import shapely
 from folium.template import Template
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from machine import PATIENCE_S
 from map_pages import HOSTILE, LEGEND, hostile_database
 from pyproj import CRS, Transformer
 from selenium.webdriver.common.by import By
@@ -254,7 +255,7 @@ def test_a_small_screen_is_not_covered(page: MapPage, screen: tuple[int, int]) -
 
 def test_boxes_fold_when_the_window_becomes_small(evaluated: MapPage) -> None:
     boxes = ".semsig-legend[open], .leaflet-control-layers-expanded"
-    wait = WebDriverWait(evaluated.browser, 10.0)
+    wait = WebDriverWait(evaluated.browser, PATIENCE_S)
     assert len(evaluated.all(boxes)) == 2
     with evaluated.screen(500, 900, mobile=False):
         wait.until(lambda _: evaluated.all(boxes) == [])
