@@ -101,7 +101,7 @@ def test_tiles_that_are_too_small_or_too_many_are_refused(
         touched_tiles(objects_file, grid=GridSpec(), side=2, reach=30.0)
 
 
-@given(world=worlds(), side=st.sampled_from([5.0, 30.0, 77.0, 1000.0]))
+@given(world=worlds(), side=st.sampled_from([12.0, 30.0, 77.0, 1000.0]))
 @settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 def test_tiles_are_the_same_as_the_whole(world: World, side: float) -> None:
     # Ranges go up to 40 m, more than some tiles.

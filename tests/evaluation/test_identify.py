@@ -52,7 +52,7 @@ DATABASE = random_database(5, cells=90, longest=8)
 INDEX = build_index(DATABASE, named_noise("medium"))
 COLUMNS = symbol_columns(INDEX)
 TOLD = chances_of(DATABASE)
-REPEATS = 40
+REPEATS, FEW = 40, 50
 SHARP = NoiseSpec(detection=0.9, misnamed=0.05, clutter=0.5, bearing_sigma=4.0)
 
 
@@ -67,14 +67,14 @@ def test_chances_are_those_of_very_many_queries(
     seed: int, kind: tuple[int, int], noise: NoiseSpec
 ) -> None:
     longest, classes = kind
-    database = random_database(seed, cells=80, longest=longest, classes=classes)
+    database = random_database(seed, cells=FEW, longest=longest, classes=classes)
     index = build_index(database, noise)
     told = identify(index, radius=20.0, trials=800, class_trials=2)
-    tried = try_cells(index, np.tile(np.arange(80), REPEATS), radius=20.0, seed=99)
+    tried = try_cells(index, np.tile(np.arange(FEW), REPEATS), radius=20.0, seed=99)
 
-    for name, most in (("itself", 1.0), ("near", 1.0), ("found", 1.0), ("bits", np.log2(80))):
+    for name, most in (("itself", 1.0), ("near", 1.0), ("found", 1.0), ("bits", np.log2(FEW))):
         ours = getattr(told, name) / most
-        truth = getattr(tried, name).reshape(REPEATS, 80).mean(axis=0) / most
+        truth = getattr(tried, name).reshape(REPEATS, FEW).mean(axis=0) / most
         assert abs(ours.mean() - truth.mean()) < 0.05
         # The means of so few queries are off by 0.08 themselves.
         assert np.sqrt(((ours - truth) ** 2).mean()) < 0.15
@@ -107,18 +107,18 @@ def test_cities_of_any_size(cells: int, classes: int, radius: float) -> None:
 
 
 def test_chances_of_photos_are_those_of_very_many_photos() -> None:
-    database = random_database(11, cells=80, longest=14)
+    database = random_database(11, cells=FEW, longest=14)
     index = build_index(database, SHARP)
     told = identify(index, radius=20.0, view=90.0, trials=600, class_trials=4)
-    check_ranges(told, 80, len(database.present_codes))
+    check_ranges(told, FEW, len(database.present_codes))
     assert told.view == 90.0
-    cells = np.tile(np.arange(80), REPEATS)
+    cells = np.tile(np.arange(FEW), REPEATS)
     headings = np.random.default_rng(1).uniform(0.0, 360.0, len(cells)).tolist()
     photos = [Photo.looking(heading=heading, fov=90.0) for heading in headings]
     queries = draw_trials(index, cells, photos=photos, seed=99)
     tried = try_cells(index, cells, queries=queries, radius=20.0)
     for name in ("itself", "near", "found"):
-        truth = getattr(tried, name).reshape(REPEATS, 80).mean(axis=0)
+        truth = getattr(tried, name).reshape(REPEATS, FEW).mean(axis=0)
         assert abs(getattr(told, name).mean() - truth.mean()) < 0.06
         assert np.sqrt(((getattr(told, name) - truth) ** 2).mean()) < 0.15
     whole = identify(index, radius=20.0, trials=200, class_trials=4)

@@ -87,7 +87,7 @@ def test_the_field_is_the_same_at_every_zoom(page: MapPage) -> None:
     page.open(evaluation_map(spread, CITY, smooth=radius))
     xy = np.stack([spread.queries.geometry.x, spread.queries.geometry.y], axis=1)
     inner = (np.abs(xy - xy.mean(axis=0)) < 1200.0).all(axis=1)
-    places = spread.queries.geometry[inner][:20]
+    places = spread.queries.geometry[inner][:12]
     here = np.stack([places.x, places.y], axis=1)
     away = ((here[:, None] - xy) ** 2).sum(axis=2)
     weights = np.maximum(0.0, 1.0 - away / radius**2) ** 2
@@ -99,7 +99,7 @@ def test_the_field_is_the_same_at_every_zoom(page: MapPage) -> None:
     degrees = places.to_crs("EPSG:4326")
     latlon = np.stack([degrees.y, degrees.x], axis=1).tolist()
     colours = [list(bytes.fromhex(colour[1:])) for colour in FAILURES.values()]
-    for zoom in (12, 14, 16, 18):
+    for zoom in (12, 15, 18):
         told = page.ask_later("fieldAt(...arguments)", latlon, zoom)
         levels = np.array([colours.index(colour) for colour in told])
         assert np.abs(levels - expected).max() <= 1
