@@ -7,7 +7,9 @@ function below is called.
 from __future__ import annotations
 
 import os
+import sys
 import warnings
+from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,7 +51,7 @@ def _installed(
 ) -> dict[str, Any]:
     """Load the entries of a group, by name."""
     entries: dict[str, EntryPoint] = {}
-    for entry in sorted(entry_points(group=group), key=lambda entry: (entry.name, _package(entry))):
+    for entry in _announced(group, tuple(sys.path)):
         if entry.name in taken or entry.name in entries:
             other = _package(entries[entry.name]) if entry.name in entries else "semsig_gis itself"
             msg = (
@@ -71,6 +73,12 @@ def _installed(
                 stacklevel=3,  # the caller of the public function
             )
     return found
+
+
+@cache  # because all that is installed is looked through
+def _announced(group: str, _path: tuple[str, ...]) -> list[EntryPoint]:
+    """Return the entries of a group that packages on the import path announce."""
+    return sorted(entry_points(group=group), key=lambda entry: (entry.name, _package(entry)))
 
 
 def _package(entry: EntryPoint) -> str:
