@@ -36,7 +36,14 @@ NAMED = {
     '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
 }
-COLOURS = 128  # enough for figures and maps
+COLOURS = 64  # enough for figures and maps
+# What pictures of matplotlib and the style of notebooks have without showing it.
+UNSEEN = {
+    ".svg": re.compile(
+        r'<path d="M [\d.]+ [\d.]+ \n"[^>]*/>|\n *(?=<)|(?<=[\d][.]\d\d)\d+(?=[ "])'
+    ),
+    ".css": re.compile(r"^div\.highlight \.-Color.*?\}\n", re.MULTILINE | re.DOTALL),
+}
 RANGE = re.compile(r"(\S+)<=x<=(\S+)")
 COMMANDS = """# Commands
 
@@ -74,6 +81,12 @@ def _finish(app: Sphinx, error: Exception | None) -> None:
             named = named.replace(part, name)
         if named != text:
             path.write_text(named, encoding="utf-8")
+    for path in [
+        *Path(app.outdir).glob("_images/*.svg"),
+        *Path(app.outdir).glob("_static/mystnb*.css"),
+    ]:
+        text = path.read_text(encoding="utf-8")
+        path.write_text(UNSEEN[path.suffix].sub("", text), encoding="utf-8")
     for path in Path(app.outdir, "_images").glob("*.png"):
         with Image.open(path) as picture:
             if picture.mode != "P":

@@ -256,7 +256,7 @@ def merge(
 
 @app.command()
 def info(database: Database, *, as_json: AsJson = False) -> None:
-    """Print the properties of a database, beside the paper's."""
+    """Print the properties of a database next to those in the paper."""
     if as_json:
         print_json(_info(database))
         return

@@ -88,7 +88,7 @@ def evaluate(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure how far off answers to queries of known places are."""
+    """Measure how often, and how closely, queries from known places are located."""
     require_suffix(".html", report)
     keep_inputs(report, read=[database, drift_report])
     ranking = chosen_method(method, paper=paper)
@@ -236,7 +236,7 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="Folder to write the report and results to.")],
     size: Annotated[
         Literal["full", "small"],
-        typer.Option(help="Ask the paper's 10,000 queries, or 300 of a small city."),
+        typer.Option(help="Run the paper's 10,000 queries, or 300 in a small city."),
     ] = "full",
     queries: Annotated[
         int | None,
@@ -254,7 +254,7 @@ def reproduce(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Repeat the paper's experiments and compare the figures."""
+    """Repeat the paper's experiments and compare the results."""
     import contextlib
 
     from semsig_gis.experiments.paper.report import reproduction_report
@@ -324,14 +324,14 @@ def identify(
     on_grid: OnGrid = False,
     radius: Annotated[
         float,
-        typer.Option(min=0, max=MOST_METRES, help="Distance in metres that counts as found."),
+        typer.Option(min=0, max=MOST_METRES, help="Largest error in metres that counts as found."),
     ] = 50.0,
     view: Annotated[
         float,
         typer.Option(
             min=10,
             max=360,
-            help="Field of view of a query in degrees, in any direction; default: all round.",
+            help="Field of view of a query in degrees, in any direction; default: full turn.",
         ),
     ] = 360.0,
     seed: Annotated[
@@ -346,7 +346,7 @@ def identify(
         typer.Option(
             min=1,
             max=1_000_000,
-            help="Number of new queries to verify the predictions with.",
+            help="Number of new queries to check the predictions with.",
         ),
     ] = None,
     out: Annotated[

@@ -64,7 +64,7 @@ def learn(
 ) -> None:
     """Learn how a detector fails from detections of known places.
 
-    Misses and false objects that the age of the map explains are not counted.
+    Missed and false objects that the age of the map explains do not count.
     """
     from dataclasses import replace
 
@@ -182,7 +182,7 @@ def calibrate(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose the chance from which an answer is given."""
+    """Choose how likely a place must be to be given as an answer."""
     from dataclasses import asdict
 
     import numpy as np

@@ -41,7 +41,7 @@ def _catalogs(incomplete: str) -> list[str]:
 Objects = Annotated[Path, typer.Option(help="Street objects to write (.parquet).")]
 Layers = Annotated[
     list[str] | None,
-    typer.Option(help="Read only this layer, or with +NAME this one as well; may be repeated."),
+    typer.Option(help="Read only this layer, or with +NAME also this one; may be repeated."),
 ]
 AllLayers = Annotated[
     bool, typer.Option("--all-layers", help="Read the optional layers of objects as well.")
@@ -58,7 +58,7 @@ MaxDistortion = Annotated[
     typer.Option(
         min=0,
         max=180,
-        help="Largest distortion of the CRS: degrees of bearings, percent of lengths.",
+        help="Largest distortion allowed for the CRS: degrees of bearings, percent of lengths.",
     ),
 ]
 Filters = Annotated[
@@ -98,14 +98,15 @@ def load(
     all_layers: AllLayers = False,
     paper_classes: PaperClasses = False,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of files that state none, such as EPSG:2154.")
+        str | None,
+        typer.Option(help="CRS of files that do not state their own, such as EPSG:2154."),
     ] = None,
     metric_crs: MetricCrs = None,
     clip: Annotated[
         str | None,
         typer.Option(
             help="Keep only what is in WEST,SOUTH,EAST,NORTH in degrees, in the polygons of a "
-            "file, or in the 'box' that OpenStreetMap files say they cover."
+            "file, or with 'box' in the area that OpenStreetMap files state."
         ),
     ] = None,
     max_distortion: MaxDistortion = 6.0,
@@ -305,7 +306,8 @@ def draft(
     file: Annotated[Path, typer.Argument(help="Vector file to draft a catalogue for.")],
     *,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of a file that states none, such as EPSG:2154.")
+        str | None,
+        typer.Option(help="CRS of a file that does not state its own, such as EPSG:2154."),
     ] = None,
 ) -> None:
     """Draft a catalogue for a vector file, for you to edit."""

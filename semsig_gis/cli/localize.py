@@ -96,8 +96,9 @@ class LocalizeOptions(SearchOptions, RankedOptions):
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Search regions to write: with candidates for QGIS (.gpkg) or in degrees "
-            "(.geojson, .kml), or alone (.parquet, .fgb, .csv); or the chance of every cell (.tif)."
+            help="File to write: search regions and candidates for QGIS (.gpkg) or in degrees "
+            "(.geojson, .kml), only the regions (.parquet, .fgb, .csv), or the chance of every "
+            "cell (.tif)."
         ),
     ] = None
     share: Annotated[
@@ -105,7 +106,7 @@ class LocalizeOptions(SearchOptions, RankedOptions):
         typer.Option(
             min=0.001,
             max=1,
-            help="Share of the chance that the regions of --out hold.  [default: 0.9]",
+            help="Total chance of the regions of --out.  [default: 0.9]",
         ),
     ] = None
     within: Annotated[
@@ -162,7 +163,8 @@ class LocalizeOptions(SearchOptions, RankedOptions):
 def localize(options: LocalizeOptions) -> None:
     """Find where a view was seen from, or many views.
 
-    The options --explain, --share and those from --noise to --objects are for likelihood alone.
+    --explain, --share and the options from --noise to --objects work only with the likelihood
+    method.
     """
     from semsig_gis.database.city import open_city
 

@@ -45,7 +45,8 @@ NorthText = Literal["grid", "true", "magnetic"]
 NorthName = Annotated[
     NorthText,
     typer.Option(
-        "--north", help="North that bearings count from; default: that of the database's grid."
+        "--north",
+        help="North from which bearings are measured; default: grid north of the database.",
     ),
 ]
 Day = Annotated[
@@ -59,7 +60,7 @@ NoiseName = Annotated[
     str,
     typer.Option(
         "--noise",
-        help="How the detector fails: light, medium, strong, generic (any of them), by-hand (a "
+        help="Errors of the detector: light, medium, strong, generic (any of them), by-hand (a "
         "person, who leaves some out), or a file written by `semsig learn`.",
     ),
 ]
@@ -69,15 +70,16 @@ MapAge = Annotated[
         "--map-age",
         min=0,
         max=100,
-        help="Age of the map in years: how long before the queries its objects were gathered.",
+        help="Age of the map in years, from the survey of its objects to the query.",
     ),
 ]
 DriftReport = Annotated[
     Path | None,
     typer.Option(
         "--drift-report",
-        help="How fast a city changes, for --map-age: what `semsig update --years N --json` "
-        "prints, or a .toml file of that form.  [default: as Monaco in OpenStreetMap]",
+        help="Rate at which the city changes, for --map-age: output of `semsig update --years N "
+        "--json`, or a .toml file with the same keys.  [default: that of Monaco in "
+        "OpenStreetMap]",
         show_default=False,
     ),
 ]
@@ -85,15 +87,16 @@ Heading = Annotated[
     str,
     typer.Option(
         "--heading",
-        help="North of the query: known, unknown, or its standard deviation, 0.001 to 360 degrees.",
+        help="Whether north is known: known, unknown, or its standard deviation in degrees, "
+        "0.001 to 360.",
     ),
 ]
 OnGrid = Annotated[
     bool,
     typer.Option(
         "--on-grid",
-        help="Assume that queries are seen from the centre of a cell, as in the paper, not "
-        "from anywhere in it.",
+        help="Assume that views are from the centre of a cell, as in the paper, instead of from "
+        "anywhere in it.",
     ),
 ]
 Refine = Annotated[
@@ -199,7 +202,9 @@ class QueryOptions:
     ] = None
     sectors: Annotated[
         str | None,
-        typer.Option(help="Sectors that were looked at, if not all round, such as 20-90,180-250."),
+        typer.Option(
+            help="Sectors that were looked at, if not the full turn, such as 20-90,180-250."
+        ),
     ] = None
     north: NorthName = "grid"
     date: Day = None
@@ -263,14 +268,17 @@ class SearchOptions:
 
     require: Annotated[
         str | None,
-        typer.Option(help="What must be in sight: M (one), 2B (two or more), B=0, ?<=10 (in all)."),
+        typer.Option(
+            help="Search only cells that see this: M (one or more), 2B (two or more), B=0 (none), "
+            "?<=10 (at most ten objects)."
+        ),
     ] = None
     noise: Annotated[
         str | None,
         typer.Option(
-            help="How the detector fails, or a person: light, medium, strong, generic (any of "
-            "them), by-hand, or a file written by `semsig learn`.  [default: by-hand for what is "
-            "said in words, else generic]",
+            help="Errors of the detector or person: light, medium, strong, generic (any of "
+            "them), by-hand, or a file written by `semsig learn`.  [default: by-hand for a view "
+            "in words, otherwise generic]",
             show_default=False,
         ),
     ] = None
@@ -288,17 +296,17 @@ class SearchOptions:
     area: Annotated[
         Path | None,
         typer.Option(
-            help="Area that the place lies in: WEST,SOUTH,EAST,NORTH in degrees, or polygons."
+            help="Search only in WEST,SOUTH,EAST,NORTH in degrees, or in the polygons of a file."
         ),
     ] = None
     popularity: Annotated[
         Path | None,
-        typer.Option(help="Raster that says how likely each place is, such as of population."),
+        typer.Option(help="Raster of how likely each place is beforehand, such as population."),
     ] = None
     rule: Annotated[
         Path | None,
         typer.Option(
-            help="When to answer: a file written by `semsig calibrate`.  [default: from a chance "
+            help="Rule for when to answer, written by `semsig calibrate`.  [default: from a chance "
             "of 0.9]"
         ),
     ] = None

@@ -37,14 +37,15 @@ class ViewOptions:
         str,
         typer.Argument(
             help="Views in their order: a CSV or JSON lines file, or - for JSON lines from "
-            "standard input. Each after the first has dx,dy or distance,bearing (metres, degrees) "
-            "from the one before, and its sigma; or use --track."
+            "standard input. Each after the first has its step from the one before, dx,dy or "
+            "distance,bearing (metres, degrees), and the sigma of that step; or use --track."
         ),
     ]
     track: Annotated[
         Path | None,
         typer.Option(
-            help="GPX track of the way, by the time of each view, or one point for each view."
+            help="GPX track of the route, matched by the time of each view, or with one point "
+            "for each view."
         ),
     ] = None
     north: NorthName = "grid"

@@ -50,16 +50,15 @@ def view(
     database: Annotated[
         Path | None,
         typer.Option(
-            help="Signature database that the views are for, which has the classes.  "
-            "[default: those of "
-            "all built-in catalogues]"
+            help="Signature database to localize in; labels are mapped to its classes.  "
+            "[default: the classes of all built-in catalogues]"
         ),
     ] = None,
     images: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of the pictures, whose EXIF has focal length and heading.  [default: "
-            "beside the files]"
+            help="Folder of the pictures, to read focal length and heading from EXIF.  "
+            "[default: that of the files]"
         ),
     ] = None,
     photos: Annotated[
@@ -71,31 +70,33 @@ def view(
     ] = None,
     camera: Annotated[
         Literal["pinhole", "equirectangular", "cylindrical", "fisheye"] | None,
-        typer.Option(help="How the pictures show the world.  [default: pinhole]"),
+        typer.Option(help="Projection of the pictures.  [default: pinhole]"),
     ] = None,
     fov: Annotated[
         float | None,
         typer.Option(
             min=0.1,
             max=360,
-            help="Field of view over the width in degrees.  [default: by EXIF; 360 for a panorama]",
+            help="Horizontal field of view in degrees.  [default: from EXIF; 360 for a panorama]",
         ),
     ] = None,
     heading: Annotated[
         float | None,
         typer.Option(
-            min=-360, max=360, help="Where the camera looks, clockwise from north; else by EXIF."
+            min=-360,
+            max=360,
+            help="Direction of the camera, clockwise from north; default: from EXIF.",
         ),
     ] = None,
     heading_error: Annotated[
         str | None,
         typer.Option(
-            help="Standard deviation of the heading in degrees, or unknown.  [default: 10 for "
-            "EXIF; else that of semsig localize]"
+            help="Standard deviation of the heading in degrees, or unknown.  [default: 10 from "
+            "EXIF; otherwise left to semsig localize]"
         ),
     ] = None,
     pitch: Annotated[
-        float | None, typer.Option(min=-90, max=90, help="Degrees that the camera looks up.")
+        float | None, typer.Option(min=-90, max=90, help="Degrees that the camera points upwards.")
     ] = None,
     roll: Annotated[
         float | None,
@@ -107,8 +108,8 @@ def view(
     place: Annotated[
         Literal["each", "gps", "all"],
         typer.Option(
-            help="Which pictures form one view: none, those of one GPS place (5 m), or all; a "
-            "place in --photos takes precedence."
+            help="Pictures to join into one view: none (each), those of one GPS position within "
+            "5 m, or all; a place in --photos takes precedence."
         ),
     ] = "each",
     min_score: Annotated[
@@ -116,7 +117,7 @@ def view(
     ] = 0.3,
     as_json: AsJson = False,
 ) -> None:
-    """Turn the boxes of an object detector into views to localize."""
+    """Turn the boxes of an object detector into views for semsig localize."""
     from semsig_gis.queries.detections.formats import read_pictures
     from semsig_gis.queries.detections.labels import LabelMap
     from semsig_gis.queries.detections.pictures import Shot

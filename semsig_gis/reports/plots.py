@@ -63,6 +63,7 @@ SETTINGS = {
     "svg.hashsalt": "semsig_gis",
     "text.parse_math": False,
     "font.size": 9.5,
+    "font.sans-serif": ["DejaVu Sans"],  # an SVG names all of them with every text
     "text.color": INK,
     "axes.labelcolor": INK,
     "axes.edgecolor": AXIS,
