@@ -22,14 +22,13 @@ HERE = Path(__file__).parent
 PROJECT = nox.project.load_toml("pyproject.toml")
 PYTHONS = nox.project.python_versions(PROJECT)
 CONSTRAINTS = {"oldest": "constraints-oldest.txt", "newest": "constraints.txt"}
-EXTRAS = "cluster,raster,serve,stac"
+EXTRAS = "cluster,plot,raster,serve,stac"
 TOOLS = ("hypothesis", "jsonschema", "pytest", "pytest-xdist", "scipy", "selenium")
 TESTS = ("core", "database", "likelihood", "matching", "objects", "sources", "storage")
 RESULTS = HERE / "benchmarks" / "installs.json"
 PAGE = HERE / "docs" / "install.md"
 MARKS = ("<!-- make test-all -->\n", "<!-- end -->")
-COLUMNS = ("Python", "dependencies", "archive", "installed", "seconds", "tests passed", "failed",
-           "skipped", "seconds")  # fmt: skip
+COLUMNS = ("Python", "versions", "archive", "installed", "passed", "failed", "skipped", "tested")
 
 
 @nox.session(python=False)
@@ -122,12 +121,11 @@ def _keep(row: dict[str, object]) -> None:
     RESULTS.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     table = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
     for item in rows:
-        measured = [item.get(name, "") for name in ("install_s", "passed", "failed", "skipped")]
         cells = [
             *_kind(item),
-            "yes" if item["installed"] else "no",
-            *measured,
-            item.get("test_s", ""),
+            f"{item['install_s']} s" if item["installed"] else "no",
+            *(item.get(name, "") for name in ("passed", "failed", "skipped")),
+            f"{item['test_s']} s" if "test_s" in item else "",
         ]
         table.append("| " + " | ".join(map(str, cells)) + " |")
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(MARKS[0])

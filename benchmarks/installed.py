@@ -1,12 +1,15 @@
 """What the plain installation takes: ``python -m benchmarks.installed``, with nothing but Python.
 
-A fresh environment is made, the checkout is installed there with the versions of
-``constraints.txt``, and the packages are listed by the room that they take with their compiled
-modules. Archives that pip has fetched before come from its cache.
+The checkout is installed into a fresh environment with the versions of ``constraints.txt``, and so
+are what it is built on: the libraries that were chosen for it at the start, and these with two
+more that it cannot do without. Packages are listed by the room that they take with their compiled
+modules, and as a table in ``docs/install.md``. Archives that pip has fetched before come from its
+cache.
 """
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -15,30 +18,64 @@ import venv
 from pathlib import Path
 
 HERE = Path(__file__).parents[1]
+PAGE = HERE / "docs" / "install.md"
+MARKS = ("<!-- make size -->\n", "<!-- end -->")
 MEGABYTE = 2**20
 LEAST_SHOWN_MB = 10.0
-OF_PIP = ("pip", "setuptools", "pkg_resources", "_distutils_hack")
+CHOSEN = ("geopandas", "shapely", "pyproj", "rtree", "fiona", "folium", "rapidfuzz")
+INSTALLED = {
+    "the seven": CHOSEN,
+    "with numba and pyarrow": (*CHOSEN, "numba", "pyarrow"),
+    "semsig_gis": (".",),
+}
+SIZES = """
+import importlib.metadata, json
+sizes = {}
+for one in importlib.metadata.distributions():
+    files = [one.locate_file(file) for file in one.files or ()]
+    sizes[one.name] = sum(file.stat().st_size for file in files if file.is_file())
+print(json.dumps(sizes))
+"""
+OF_PIP = {"pip", "setuptools"}
 
 
 def main() -> None:
-    """Install, and print megabytes and seconds."""
+    """Install, print megabytes and seconds, and write the table."""
+    sizes, seconds = {}, {}
+    for name, packages in INSTALLED.items():
+        sizes[name], seconds[name] = install(packages)
+        print(f"{sum(sizes[name].values()):8.0f} MB  in {seconds[name]:.0f} s  {name}")
+    ours = sizes["semsig_gis"]
+    large = sorted((one for one in ours if ours[one] >= LEAST_SHOWN_MB), key=lambda one: -ours[one])
+    rows = [[one, *(f"{sizes[name].get(one, 0):.0f}" for name in INSTALLED)] for one in large]
+    others = [sum(s for one, s in part.items() if one not in large) for part in sizes.values()]
+    rows += [
+        ["all others", *(f"{size:.0f}" for size in others)],
+        ["MB in all", *(f"{sum(part.values()):.0f}" for part in sizes.values())],
+        ["seconds", *(f"{taken:.0f}" for taken in seconds.values())],
+    ]
+    head = [["package", *INSTALLED], ["---", *("---:" for _ in INSTALLED)]]
+    table = "".join(
+        f"| {' | '.join('' if cell == '0' else cell for cell in row)} |\n" for row in head + rows
+    )
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(MARKS[0])
+    after = rest.partition(MARKS[1])[2]
+    PAGE.write_text(f"{before}{MARKS[0]}\n{table}\n{MARKS[1]}{after}", encoding="utf-8")
+    print(table, end="")
+
+
+def install(packages: tuple[str, ...]) -> tuple[dict[str, float], float]:
+    """Install packages into a fresh environment; return the MB of each, and the seconds."""
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         venv.create(folder, with_pip=True)
-        python = Path(folder, "Scripts" if sys.platform == "win32" else "bin", "python")
-        pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        subprocess.run([*pip, "-c", "constraints.txt", "."], check=True, cwd=HERE)  # noqa: S603
+        python = str(Path(folder, "Scripts" if sys.platform == "win32" else "bin", "python"))
+        pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        subprocess.run([*pip, "-c", "constraints.txt", *packages], check=True, cwd=HERE)  # noqa: S603
         seconds = time.perf_counter() - start
-        (packages,) = Path(folder).rglob("site-packages")
-        sizes: dict[str, float] = {}
-        for file in packages.rglob("*"):
-            top = file.relative_to(packages).parts[0].removesuffix(".libs")
-            if file.is_file() and not top.startswith(OF_PIP):
-                sizes[top] = sizes.get(top, 0.0) + file.stat().st_size / MEGABYTE
-    for name, size in sorted(sizes.items(), key=lambda item: -item[1]):
-        if size >= LEAST_SHOWN_MB:
-            print(f"{size:8.0f} MB  {name}")
-    print(f"{sum(sizes.values()):8.0f} MB  in all, in {seconds:.0f} s")
+        listed = subprocess.check_output([python, "-c", SIZES], cwd=folder)  # noqa: S603
+    sizes = json.loads(listed)
+    return {name: sizes[name] / MEGABYTE for name in sizes if name not in OF_PIP}, seconds
 
 
 if __name__ == "__main__":

@@ -127,10 +127,10 @@ def _require_place() -> None:
         try:
             argument.encode()
         except UnicodeEncodeError as error:
-            msg = f"{argument!r} is not text in UTF-8; give the file a name that is."
+            msg = f"{argument!r} is not valid UTF-8; rename the file."
             raise InputError(msg) from error
         if "\0" in argument:
-            msg = f"{argument!r} holds a null byte, which no name has; leave it out."
+            msg = f"{argument!r} contains a null byte, which a file name cannot have; leave it out."
             raise InputError(msg)
 
 

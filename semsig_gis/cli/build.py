@@ -198,7 +198,7 @@ def update(
     had_columns = open_city(database).has_columns
     tiled = database.is_dir()
     if not tiled and (workers or scheduler):
-        msg = f"{database} is not in tiles; leave out --workers and --scheduler."
+        msg = f"{database} is a single file, not tiles; leave out --workers and --scheduler."
         raise InputError(msg)
     with progress("updating") as advance:
         if not tiled:

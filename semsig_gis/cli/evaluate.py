@@ -99,7 +99,10 @@ def evaluate(
             "--drift-report": drift_report,
         }
         for option in (name for name, value in given.items() if value):
-            msg = f"{option} is for the method likelihood, not for {ranking!r}; leave it out."
+            msg = (
+                f"{option} works only with the likelihood method, not with {ranking!r}; leave it "
+                "out."
+            )
             raise InputError(msg)
     import dataclasses
 
@@ -112,6 +115,9 @@ def evaluate(
     from semsig_gis.queries.distortions import Distortion
     from semsig_gis.reports.evaluation import evaluation_headline, evaluation_tables
 
+    if report is not None:  # what draws, and is missed before the work rather than after it
+        from semsig_gis.reports.evaluation_page import evaluation_page
+        from semsig_gis.reports.page import write_page
     chain = [
         dataclasses.replace(
             one,
@@ -144,9 +150,6 @@ def evaluate(
     if out is not None:
         save_evaluation(evaluation, out)
     if report is not None:
-        from semsig_gis.reports.evaluation_page import evaluation_page  # it loads what draws
-        from semsig_gis.reports.page import write_page
-
         with progress("drawing the report"):
             page = evaluation_page(
                 evaluation, city.database, name=city_name(database), command=command_line()
@@ -422,7 +425,10 @@ def identify(
 
 
 def _require_check(check: int | None, out: Path | None) -> None:
-    """Refuse a folder for a report that nobody asked for."""
-    if out is not None and check is None:
+    """Refuse a folder for a report of a check that is not made, or that cannot be drawn."""
+    if out is None:
+        return
+    if check is None:
         msg = "--out was given without --check; give both or neither."
         raise InputError(msg)
+    import semsig_gis.reports.plots  # noqa: F401 - before the work, which takes long

@@ -121,7 +121,7 @@ def import_(
     require_suffix(".parquet", out, objects)
     contents = read_geopackage(geopackage)
     if objects is not None and contents.objects is None:
-        msg = f"{geopackage} holds no street objects; leave out --objects."
+        msg = f"{geopackage} contains no street objects; leave out --objects."
         raise InputError(msg)
     for note in contents.notes:
         remark(note)

@@ -382,7 +382,7 @@ def sources(
             for spec in catalog.layers
         ),
     )
-    say(f"place: {catalog.place or 'not said'}; needs {_needs_text(catalog)}")
+    say(f"place: {catalog.place or 'not stated'}; needs {_needs_text(catalog)}")
     if common:
         say(f"left out of every layer of objects: {', '.join(_rules(common))}")
     print_rows(

@@ -124,15 +124,15 @@ class LocalizeOptions(SearchOptions, RankedOptions):
             msg = f"--queries was given with {' and '.join(given)}; give a file or one query."
             raise InputError(msg)
         if self.out is None and (self.share is not None or self.within):
-            msg = "--share and --within are for the regions of --out; give that too."
+            msg = "--share and --within apply to the regions of --out; give --out as well."
             raise InputError(msg)
         read = (self.database, self.objects, self.area, self.popularity, self.rule, self.noise)
         keep_inputs(self.map_, self.out, read=(*read, self.drift_report))
         require_suffix(".html", self.map_)
         if self.writes_chances and (self.share is not None or self.within):
             msg = (
-                f"{self.out} holds the chances of all cells, not the regions that --share and "
-                "--within are for; leave them out, or write a GeoPackage."
+                f"{self.out} would contain the chance of every cell, but --share and --within "
+                "apply to regions; leave them out, or write a GeoPackage."
             )
             raise InputError(msg)
         if self.ranking != LIKELIHOOD:
@@ -153,8 +153,8 @@ class LocalizeOptions(SearchOptions, RankedOptions):
         ]
         if options:
             msg = (
-                f"{' and '.join(options)} {'is' if len(options) == 1 else 'are'} for the method "
-                f"likelihood, not for {self.ranking!r}; leave out the one or the other."
+                f"{' and '.join(options)} {'works' if len(options) == 1 else 'work'} only with the "
+                f"likelihood method, not with {self.ranking!r}; leave out one or the other."
             )
             raise InputError(msg)
 
@@ -273,7 +273,7 @@ def _answer_lines(
         raise InputError(msg)
     if failed:
         of = f"{failed:,} of {answered + failed:,} queries of {source}"
-        remark(f"{of} could not be answered; their lines say why in the field error.")
+        remark(f"{of} could not be answered; the field 'error' of each says why.")
 
 
 def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: View) -> None:

@@ -75,7 +75,7 @@ def _require_content(evaluation: Path | None, smooth: float | None, *, other: bo
         )
         raise InputError(msg)
     if smooth is not None and evaluation is None:
-        msg = "--smooth is only for an evaluation; give --evaluation as well, or leave it out."
+        msg = "--smooth works only with an evaluation; give --evaluation as well, or leave it out."
         raise InputError(msg)
 
 

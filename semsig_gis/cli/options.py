@@ -78,8 +78,7 @@ DriftReport = Annotated[
     typer.Option(
         "--drift-report",
         help="Rate at which the city changes, for --map-age: output of `semsig update --years N "
-        "--json`, or a .toml file with the same keys.  [default: that of Monaco in "
-        "OpenStreetMap]",
+        "--json`, or a .toml file with the same keys.  [default: that of Monaco in OpenStreetMap]",
         show_default=False,
     ),
 ]
@@ -429,7 +428,9 @@ def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
     if drift_report is None:
         return None
     if map_age == 0:
-        msg = "--drift-report was given without --map-age; give the age of the map in years, too."
+        msg = (
+            "--drift-report was given without --map-age; give the age of the map in years as well."
+        )
         raise InputError(msg)
     from semsig_gis.likelihood.noise.age import open_drift
 

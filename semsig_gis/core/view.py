@@ -238,7 +238,9 @@ class View(Signature):
         if self.scores is not None and len(self):
             sums = self.scores.sum(axis=1)
             if not ((self.scores >= 0).all() and np.allclose(sums, 1.0, atol=ROUNDING)):
-                msg = "the scores of an object are no chances; give numbers from 0 that sum to 1."
+                msg = (
+                    "the scores of an object are not chances; give numbers from 0 that add up to 1."
+                )
                 raise InputError(msg)
         if not self.photos:
             msg = "a view of no photo was given; give at least one, or leave photos out."

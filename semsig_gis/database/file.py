@@ -384,7 +384,7 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
             raise DatabaseError(msg)
     others = {path.name for path in folder.glob("*.parquet")} - {p.file for p in manifest.parts}
     if others:
-        msg = f"{folder / min(others)} is no part of the database in {folder}; move it elsewhere."
+        msg = f"{folder / min(others)} is not part of the database in {folder}; move it elsewhere."
         raise DatabaseError(msg)
     if not manifest.parts:
         msg = f"{folder / MANIFEST} lists no parts; build the database again."

@@ -163,7 +163,10 @@ def _joined_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
     if len(views) == 1:
         return views[0]
     if not views or any(view.bearings is None for view in views):
-        msg = "photos are none, or objects in them lack bearings; give photos with all bearings."
+        msg = (
+            "there are no photos, or objects in them have no bearing; give at least one photo, "
+            "and a bearing for each object."
+        )
         raise InputError(msg)
     return View.joined(views).turned(0.0)
 
@@ -191,7 +194,7 @@ def _column_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
         msg = f"photo was given as {told['photo']!r}; give numbers from 0 to {len(photos) - 1}."
         raise InputError(msg)
     if len(photos) > 1 and "photo" not in told:
-        msg = "several photos were given, but not which one each object is in; give photo, too."
+        msg = "several photos were given, but not which one each object is in; give photo as well."
         raise InputError(msg)
     known = np.full(len(plain), WILDCARD) if codes is None else codes
     ranges, errors = _ranges(told, taxonomy.ranges(radius)[known])
@@ -219,14 +222,14 @@ def _columns(items: Sequence[Row], told: Row, taxonomy: Taxonomy) -> Row:
     if not ways and items:
         return columns
     if any((one.get("bearing") is None) == (one.get("offset") is None) for one in items):
-        msg = "a detection has no bearing, or two; give each its bearing, or its offset."
+        msg = "a detection has neither a bearing nor an offset, or both; give it one of them."
         raise InputError(msg)
     heading = told.get("heading")
     if "offset" in ways and heading is None:
         if "bearing" in ways or told.get("heading_error", "unknown") != "unknown":
             msg = (
                 "offsets were given with bearings or an error of the heading, but without the "
-                "heading that they count from; give it, too."
+                "heading that they are measured from; give it as well."
             )
             raise InputError(msg)
         heading = 0.0
@@ -312,7 +315,7 @@ def _scores(told: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
         scores[class_code(word, taxonomy)] += _number(f"the score of {word!r}", chance)
     rest = 1.0 - scores.sum()
     if not ((scores >= 0).all() and rest >= -ROUNDING):  # false for NaN too
-        msg = f"scores {told!r} are no chances; give numbers from 0 that sum to 1 at most."
+        msg = f"scores {told!r} are not chances; give numbers from 0 that add up to at most 1."
         raise InputError(msg)
     scores[WILDCARD] += rest if rest > ROUNDING else 0.0
     return scores
@@ -395,8 +398,8 @@ def _photo(look: Row) -> Photo:
         raise InputError(msg)
     if heading is None:
         msg = (
-            "a field of view was given without the heading of the camera (--look); give that, too, "
-            "or sectors alone."
+            "a field of view was given without the heading of the camera (--look); give the "
+            "heading as well, or give sectors instead."
         )
         raise InputError(msg)
     heading, fov = _number("heading", heading), _number("fov", fov)

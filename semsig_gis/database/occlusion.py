@@ -68,7 +68,7 @@ class Footprints(Displayed):
         self._cores: dict[int, NDArray[np.object_]] = {}
         self._polygons, self.repaired = _usable(np.asarray(polygons, dtype=object).reshape(-1))
         if len(self._polygons) == 0:
-            msg = "there is no building footprint that encloses an area; give some polygons."
+            msg = "no building footprint encloses an area; give polygons."
             raise InputError(msg)
 
     def __len__(self) -> int:  # noqa: D105

@@ -261,7 +261,10 @@ def store_path(database: str | Path) -> Path:
     """
     file = Path(os.path.realpath(database))
     if file.suffix == STORE_SUFFIX:
-        msg = f"{database} is a name for an object store; give a database another ending."
+        msg = (
+            f"{database} is the name of an object store; give the database a name with another "
+            "suffix."
+        )
         raise InputError(msg)
     return file.with_suffix(STORE_SUFFIX)
 
@@ -294,7 +297,10 @@ def _manifest(folder: Path) -> dict[str, Any]:
         msg = f"{path} is missing or damaged; build the database again."
         raise DatabaseError(msg) from error
     if not known:
-        msg = f"{folder} is of another version of semsig ({version}); build the database again."
+        msg = (
+            f"{folder} was written by another version of semsig ({version}); build the database "
+            "again."
+        )
         raise DatabaseError(msg)
     return dict(manifest)
 

@@ -92,8 +92,8 @@ EMPTY = ".empty"
 RUN = RunKind(
     content="unfinished run",
     another=(
-        "{folder} holds an unfinished run that differs in {difference}; delete that folder to "
-        "start anew, or finish it with the same command and inputs as before."
+        "{folder} contains an unfinished run that differs in {difference}; delete that folder "
+        "to start anew, or finish it with the same command and inputs as before."
     ),
     read=lambda folder: read_json(folder / RECIPE),
     write=lambda folder, recipe: write_json(folder / RECIPE, recipe),
@@ -453,7 +453,7 @@ def tile_cells(
     are the same as when everything is.
     """
     if not plan.folder.is_dir():
-        msg = f"{plan.folder} is not there any more; run the same command again."
+        msg = f"{plan.folder} no longer exists; run the same command again."
         raise InputError(msg)
     around = plan.box(tile, plan.reach + MARGIN_M)
     objects = open_objects(plan.objects, box=around)
@@ -531,8 +531,8 @@ def _require_replaceable(target: Path) -> None:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:
         msg = (
-            f"{target} holds {min(others)!r}, which is no part of a signature database; give the "
-            "name of a new folder, or move that elsewhere."
+            f"{target} holds {min(others)!r}, which is not part of a signature database; give the "
+            "name of a new folder, or move that file elsewhere."
         )
         raise InputError(msg)
 

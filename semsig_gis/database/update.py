@@ -261,7 +261,7 @@ def update_database(
         furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
         msg = (
             f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
-            f"database ({database.reach:g} m), which concerns every cell; build the database again."
+            f"database ({database.reach:g} m), which affects every cell; build the database again."
         )
         raise InputError(msg)
     changes = compare_objects(store.objects, merged)
@@ -363,7 +363,7 @@ def update_tiles(
     if after.reach != first.reach:  # the unit in which all distances are stored
         msg = (
             f"the longest visibility range of {objects} is {after.reach:g} m and that of {path} "
-            f"{first.reach:g} m, which concerns every cell; build the database again."
+            f"{first.reach:g} m, which affects every cell; build the database again."
         )
         raise InputError(msg)
     changes = compare_objects(old, joined)

@@ -101,7 +101,7 @@ def _lines(
         except (TypeError, ValueError):
             own = np.zeros(0)
         if own.shape != given.shape or (own <= 0).any():
-            msg = "the half-widths of streets are not all above 0; give one in metres a street."
+            msg = "the half-widths of streets are not all above 0; give metres for each street."
             raise InputError(msg)
         reaches = np.where(np.isfinite(own), own, width)
     drawn = ~(shapely.is_missing(given) | shapely.is_empty(given))

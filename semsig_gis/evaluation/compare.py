@@ -126,7 +126,7 @@ def common_cases(
     if not common:
         msg = (
             f"the first results have {_listed(first)} and the second {_listed(second)}, none in "
-            "common; give two that have, or the folders of two evaluations."
+            "common; give two with results in common, or the folders of two evaluations."
         )
         raise InputError(msg)
     return common

@@ -142,8 +142,8 @@ def error_field(
     least = max(2.0 * across / MOST_PIXELS, database.grid.step)
     if radius is not None and not (math.isfinite(radius) and radius >= least):
         msg = (
-            f"queries within {radius:g} m were to be combined; give metres, {least:,.0f} or "
-            "more in this city."
+            f"a smoothing radius of {radius:g} m was given; give {least:,.0f} m or more in this "
+            "city."
         )
         raise InputError(msg)
     errors = np.minimum(queries["error_m"].to_numpy(np.float64), guess_error(database))

@@ -230,7 +230,7 @@ class Evaluation(Displayed):
         for value in thresholds:
             if value not in THRESHOLDS:
                 kept = ", ".join(str(one) for one in THRESHOLDS)
-                msg = f"No probability is kept for an error of {value} m; give some of {kept} m."
+                msg = f"No probability is stored for an error of {value} m; choose from {kept} m."
                 raise InputError(msg)
         columns = [f"p{int(value)}" for value in thresholds]
         return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))

@@ -127,9 +127,7 @@ class ExperimentSpec:
                 raise InputError(msg)
             for name in named:
                 if not re.fullmatch("[A-Za-z0-9_-]+", name):
-                    msg = (
-                        f"{name!r} cannot be a name in {what}; use letters, digits, _ and - alone."
-                    )
+                    msg = f"{name!r} cannot be a name in {what}; use only letters, digits, _ and -."
                     raise InputError(msg)
         if not self.top or len(set(self.top)) < len(self.top) or min(self.top) < 1:
             msg = f"top is {list(self.top)}; give different whole numbers from 1."

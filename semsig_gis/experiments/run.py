@@ -86,8 +86,8 @@ def _write_recipe(folder: Path, recipe: dict[str, Any]) -> None:
 RUN = RunKind(
     content="results of an experiment",
     another=(
-        "{folder} holds the results of another experiment, which differs in {difference}; choose "
-        "another folder, or delete that one."
+        "{folder} contains the results of another experiment, which differs in {difference}; "
+        "choose another folder, or delete that one."
     ),
     read=_read_recipe,
     write=_write_recipe,
@@ -136,7 +136,7 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     >>> open_results("nowhere")
     Traceback (most recent call last):
     ...
-    semsig_gis.core.errors.DatabaseError: nowhere holds no results;
+    semsig_gis.core.errors.DatabaseError: nowhere contains no results;
     give a folder that `semsig evaluate`
     wrote.
     """
@@ -146,7 +146,7 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     try:
         text = read_text(place / SPEC)
     except OSError as error:
-        msg = f"{place} holds no results; give a folder that `semsig evaluate` wrote."
+        msg = f"{place} contains no results; give a folder that `semsig evaluate` wrote."
         raise DatabaseError(msg) from error
     spec = parse_experiment(text, where=str(place / SPEC))
     return {case.name: open_evaluation(place / case.name) for case in spec.cases}

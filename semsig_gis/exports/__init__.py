@@ -269,7 +269,7 @@ def _require_one_city(
     """Refuse what is empty, and what is of another city."""
     if len(database) == 0 or (objects is not None and len(objects) == 0):
         what = "object" if len(database) else "cell"
-        msg = f"there is no {what} to be written to {path}; give some."
+        msg = f"there is no {what} to write to {path}; give at least one."
         raise EmptyResultError(msg)
     if objects is not None and objects.crs != database.crs:
         msg = (
@@ -294,8 +294,8 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     many = suffix in _MANY_LAYERS
     if len(names) > 1 and not many:
         msg = (
-            f"{path} holds one layer, but {' and '.join(names)} were asked for; name one of them, "
-            "or write a GeoPackage."
+            f"{path} can hold only one layer, but {' and '.join(names)} were given; give one of "
+            "them, or write a GeoPackage."
         )
         raise InputError(msg)
     possible = [name for name in accepted if _NEEDS.get(name) in {None, *given}]
@@ -304,7 +304,7 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     content = list(dict.fromkeys(names)) or (possible if many else [*default, accepted[0]][:1])
     for name in content:
         if name not in possible:
-            msg = f"{path} is to hold the {name}, but there is no {_NEEDS[name]}; give that too."
+            msg = f"{path} needs the {name}, but no {_NEEDS[name]} was given; give it as well."
             raise InputError(msg)
     # Identifiability is part of a database, wherever it is not asked for.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
@@ -313,8 +313,8 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     unused = sorted(given - used)
     if unused:
         msg = (
-            f"{path} holds the {' and '.join(content)} alone, and no {' or '.join(unused)}; leave "
-            f"that out or name another layer{'' if many else ', or write a GeoPackage'}."
+            f"{path} contains only the {' and '.join(content)}, not the {' or '.join(unused)}; "
+            f"leave that out or choose another layer{'' if many else ', or write a GeoPackage'}."
         )
         raise InputError(msg)
     return content
@@ -420,8 +420,8 @@ def export_answer(
     suffix = _suffix(path, [*dict.fromkeys((*_ANSWER, *_ONE_LAYER)), *sorted(_RASTER)])
     if suffix in _RASTER and answer.chances is None:
         msg = (
-            f"{path} is to hold the chance of every cell, which the method does not tell; use the "
-            "likelihood method, or write a GeoPackage."
+            f"{path} would contain the chance of every cell, which this method does not compute; "
+            "use the likelihood method, or write a GeoPackage."
         )
         raise InputError(msg)
     from semsig_gis.exports.regions import search_regions  # noqa: PLC0415 - only where it is used
@@ -445,6 +445,6 @@ def _suffix(path: str | Path, accepted: Collection[str]) -> str:
         # One of each format.
         *names, last = [name for name in accepted if name != ".tiff"]
         listed = f"{', '.join(names)} or {last}" if names else last
-        msg = f"{path} does not end in {listed}; give a name that says the format."
+        msg = f"{path} does not end in {listed}; give a name with one of these suffixes."
         raise InputError(msg)
     return suffix

@@ -42,7 +42,7 @@ def hexagons_layer(
     ``queries`` those of the evaluation and ``found`` is the share of these that succeeded.
     """
     if not 0 <= resolution <= FINEST:
-        msg = f"hexagons of resolution {resolution} were asked for; give 0 to {FINEST} (finest)."
+        msg = f"resolution {resolution} was given for hexagons; give 0 to {FINEST} (finest)."
         raise InputError(msg)
     to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
 

@@ -109,10 +109,10 @@ def search_regions(
     5
     """
     if not 0 < share <= 1:
-        msg = f"regions of a share of {share} were asked for; give a number above 0, at most 1."
+        msg = f"a share of {share} was given for regions; give a number above 0 and at most 1."
         raise InputError(msg)
     if not (math.isfinite(within) and within >= 0):
-        msg = f"regions within {within} m were asked for; give metres, 0 or more."
+        msg = f"a margin of {within} m was given for regions; give metres, 0 or more."
         raise InputError(msg)
     chances, cells = answer.chances, answer.region_cells(database, share)
     if within > 0:

@@ -224,7 +224,9 @@ class LikelihoodLocator:
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
         if self.refined and self.store is None:
-            msg = "a place between the viewpoints was asked for; give the store of the database."
+            msg = (
+                "searching between the viewpoints needs the object store of the database; give it."
+            )
             raise InputError(msg)
 
     def locate(

@@ -63,7 +63,7 @@ class LikelihoodMethod:
         if noise not in noises:
             names = ", ".join(noises)
             hint = nearest_name(noise, noises)
-            msg = f"method {text!r} has a noise model that is not known{hint}; give one of {names}."
+            msg = f"method {text!r} has an unknown noise model{hint}; give one of {names}."
             raise UnknownNameError(msg)
         misread = (
             f"method {text!r} cannot be read; give 'likelihood:NOISE' and, if wanted, ':refined', "

@@ -66,7 +66,7 @@ class PhotoTable:
     def of(cls, photo: View, table: NoiseTable) -> PhotoTable:
         """Return the table of a view of one photo, whose objects may all be of classes known."""
         if photo.bearings is None:
-            msg = "the query has no bearings, on which its place rests; give them."
+            msg = "the query has no bearings, which the search between cells needs; give them."
             raise InputError(msg)
         size = len(photo)
         unknown = np.full(size, math.nan)

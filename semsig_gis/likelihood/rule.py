@@ -254,7 +254,7 @@ def open_rule(path: str | Path) -> AnswerRule:
         values: Mapping[str, Any] = parse_json(read_whole(path), finite=True)
         names = {field.name for field in fields(AnswerRule)}
         if not isinstance(values, dict) or not {"threshold"} <= set(values) <= names:
-            msg = f"it does not hold just the fields {', '.join(sorted(names))}"
+            msg = f"its fields are not exactly {', '.join(sorted(names))}"
             raise InputError(msg)
         threshold = values["threshold"]
         return AnswerRule(**{**values, "threshold": math.inf if threshold is None else threshold})

@@ -87,7 +87,7 @@ def _shapes(path: Path, database: SignatureDatabase) -> gpd.GeoDataFrame:
         raise InputError(msg) from error
     ranked = [table for table in tables if "rank" in table]
     if not any("best_cell_id" in table for table in ranked):
-        msg = f"{path} holds no answer; give a file that semsig localize --out wrote."
+        msg = f"{path} contains no answer; give a file that semsig localize --out wrote."
         raise InputError(msg)
     known = [
         table.set_crs(database.crs) if table.crs is None else table.to_crs(database.crs)

@@ -177,7 +177,7 @@ def _tile_provider(name: str) -> xyzservices.TileProvider:
         )
         raise InputError(msg) from error
     if provider.requires_token():
-        msg = f"Tiles {name!r} need a key of their provider; give {WITHOUT_KEY}."
+        msg = f"Tiles {name!r} need a key from their provider; give {WITHOUT_KEY}."
         raise InputError(msg)
     return provider
 

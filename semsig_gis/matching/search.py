@@ -182,7 +182,7 @@ class DistanceLocator:
                 shortlist.add(part.select(met), scores[met])
         if shortlist.cells == 0:
             cells = len(self.database)
-            msg = f"none of the {cells:,} cells meets the requirement; ask for less."
+            msg = f"none of the {cells:,} cells meets the requirement; require less."
             raise EmptyResultError(msg)
         return shortlist, part.select(slice(0))
 

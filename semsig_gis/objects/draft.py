@@ -126,7 +126,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     items = samples_of(path)
     layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
     if not layers:
-        msg = f"{path} holds no layer with positions; give a file that does."
+        msg = f"{path} has no layer with positions; give a file that has one."
         raise SourceError(msg)
     drafts = [_draft(path, item, crs) for item in layers]
     lines = [
@@ -163,7 +163,7 @@ def _require_loads(text: str, path: Path) -> None:
             if any(layer.spec.role == "objects" for layer in layers):
                 assemble(layers, catalog)
         except EmptyResultError as error:
-            msg = f"{path} holds no layer with positions; give a file that does."
+            msg = f"{path} has no layer with positions; give a file that has one."
             raise SourceError(msg) from error
         except SemsigError as error:
             msg = f"no catalogue can be drafted for {path}: {str(error).rstrip('.')}."

@@ -359,8 +359,8 @@ def _require_plane(
         what = f"lies in {len(extents)} places far apart" if len(extents) > 1 else "is too wide"
         msg = (
             f"the data {what} ({listed} in degrees), over which {off}; at most {most:g} is "
-            "allowed, so load a part of it, as with --clip and such a box, or give a larger "
-            "--max-distortion."
+            "allowed, so load part of it, for example with --clip and one of these boxes, or give "
+            "a larger --max-distortion."
         )
         raise CrsError(msg)
     notes = []

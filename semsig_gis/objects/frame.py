@@ -89,7 +89,7 @@ def objects_from_frame(
     """
     _require_frame(frame)
     if tags and (class_column is not None or catalog is not None):
-        msg = "tags are asked for, and a column of classes or a catalogue is given; give one."
+        msg = "tags were given together with a column of classes or a catalogue; give one of them."
         raise InputError(msg)
     known = load_catalog(catalog) if isinstance(catalog, str | Path) else catalog
     if class_column is not None:
@@ -107,7 +107,7 @@ def objects_from_frame(
     if not any(len(layer.table) for layer in raw):
         msg = (
             f"none of the {len(frame):,} rows of the table is a street object of catalogue "
-            f"{known.name!r}; look at their tags or fields (`semsig sources` tells what counts)."
+            f"{known.name!r}; check their tags or fields (`semsig sources` lists what is read)."
         )
         raise EmptyResultError(msg)
     return assemble(raw, known, metric_crs=metric_crs).objects
@@ -117,7 +117,7 @@ def _require_frame(frame: object) -> None:
     """Refuse what is no table of places."""
     if not isinstance(frame, gpd.GeoDataFrame):
         msg = (
-            f"a {type(frame).__name__} is given; give a GeoDataFrame, or street objects such as "
+            f"a {type(frame).__name__} was given; give a GeoDataFrame, or street objects such as "
             "open_objects returns."
         )
         raise InputError(msg)
@@ -165,9 +165,9 @@ def _by_column(
     unknown = next((str(v) for v in frame[column].dropna().unique() if v not in names), None)
     if unknown is not None:
         msg = (
-            f"column {column!r} holds {unknown!r}, which is no class"
-            f"{nearest_name(unknown, names)}; the classes are "
-            f"{', '.join(names)}, and rows without one are left out."
+            f"column {column!r} holds {unknown!r}, which is not a "
+            f"class{nearest_name(unknown, names)}; the classes are {', '.join(names)}, and rows "
+            "without one are left out."
         )
         raise InputError(msg)
     layer = replace(layer, notes=())  # that rows have no class is meant
@@ -185,8 +185,8 @@ def _by_fields(frame: gpd.GeoDataFrame, specs: Sequence[LayerSpec], catalog: Cat
         what = "several of them" if fitting else "none of them"
         named = ", ".join(spec.name for spec in (fitting or specs))
         msg = (
-            f"the table fits {what} of the layers of catalogue {catalog.name!r} ({named}); name "
-            "the one that it is in layers, or the column of its classes in class_column."
+            f"the table fits {what} of the layers of catalogue {catalog.name!r} ({named}); give "
+            "the right one as layers, or the column of its classes as class_column."
         )
         raise InputError(msg)
     return _by_rules(frame, fitting[0])

@@ -361,8 +361,8 @@ def choose_layers(
     added = {catalog.layer(name[1:]).name for name in names if name.startswith("+")}
     if alone and selection != "default":
         msg = (
-            f"layer {min(alone)!r} is named alone, and {selection} layers are asked for; "
-            f"write '+{min(alone)}' to read it as well, or name the layers only."
+            f"layer {min(alone)!r} was given without a plus sign together with {selection} layers; "
+            f"write '+{min(alone)}' to read it as well, or give only the layers to read."
         )
         raise InputError(msg)
     chosen: list[LayerSpec | None] = []

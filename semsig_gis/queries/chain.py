@@ -136,8 +136,8 @@ def _parsed(text: str, noises: Mapping[str, Noise]) -> QueryDistortion:
             key, value = keys[0], setting
         if key not in keys:
             msg = (
-                f"distortion {text!r} cannot be read: {key!r} means nothing"
-                f"{nearest_name(key, keys)}; the settings of {name} are {', '.join(keys)}."
+                f"distortion {text!r} cannot be read: {key!r} is not a "
+                f"setting{nearest_name(key, keys)}; the settings of {name} are {', '.join(keys)}."
             )
             raise UnknownNameError(msg)
         if key in values:
@@ -152,7 +152,7 @@ def _value(word: str, like: object, noises: Mapping[str, Noise], text: str) -> A
     if isinstance(like, NoiseSpec | NoiseMixture):
         if word not in noises:
             names = ", ".join(noises)
-            msg = f"{word!r} is no noise model{nearest_name(word, noises)}; give one of {names}."
+            msg = f"{word!r} is not a noise model{nearest_name(word, noises)}; give one of {names}."
             raise UnknownNameError(msg)
         return noises[word]
     try:

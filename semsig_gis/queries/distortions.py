@@ -409,7 +409,7 @@ class Distortion:
         if self.false_class not in get_args(FalseClass):
             hint = nearest_name(str(self.false_class), get_args(FalseClass))
             msg = (
-                f"{self.false_class!r} is no way to draw a false class{hint}; give "
+                f"{self.false_class!r} is not a way to choose a false class{hint}; give "
                 f"{' or '.join(get_args(FalseClass))}."
             )
             raise UnknownNameError(msg)
@@ -471,7 +471,7 @@ def distortion_of(name: str, distortions: Mapping[str, D]) -> D:
     if name not in distortions:
         *most, last = distortions
         hint = nearest_name(name, distortions)
-        msg = f"{name!r} is no distortion{hint}; give {', '.join(most)} or {last}."
+        msg = f"{name!r} is not a distortion{hint}; give {', '.join(most)} or {last}."
         raise UnknownNameError(msg)
     return distortions[name]
 

@@ -49,9 +49,8 @@ class Track:
         if not known:
             if len(times) != len(self.xy):
                 msg = (
-                    f"{self.source} has {len(self.xy):,} points for {len(times):,} views that do "
-                    "not tell their time; give each view its time, or a track of one point for "
-                    "each view."
+                    f"{self.source} has {len(self.xy):,} points for {len(times):,} views without a "
+                    "time; give each view its time, or a track with one point for each view."
                 )
                 raise InputError(msg)
             return self.xy
@@ -61,8 +60,8 @@ class Track:
             raise InputError(msg)
         if self.times is None:
             msg = (
-                f"{self.source} does not tell when it was at each point; leave out the times of "
-                "the views, and give one point for each."
+                f"{self.source} has no times; leave out the times of the views, and give one point "
+                "for each."
             )
             raise InputError(msg)
         asked = np.array(known)

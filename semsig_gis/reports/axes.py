@@ -10,13 +10,14 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, ListedColormap
-from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse
-from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
-from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError, nearest_name
+from semsig_gis.core.errors import (
+    EmptyResultError,
+    InputError,
+    UnknownNameError,
+    extra,
+    nearest_name,
+)
 from semsig_gis.core.signs import (
     ANSWERS,
     CANDIDATE_RAMP,
@@ -35,6 +36,13 @@ from semsig_gis.queries.chain import chain_text
 from semsig_gis.reports.plots import INK, cell_pixels, draw_curve, draw_frame, label
 from semsig_gis.reports.scenes import MARKERS
 from semsig_gis.reports.shares import curve_of, plot_of
+
+with extra("plot", "a report or a figure"):
+    from matplotlib.colors import LinearSegmentedColormap, ListedColormap
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Ellipse
+    from matplotlib.ticker import MaxNLocator
+    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -127,7 +135,7 @@ def plot_database(
         name = column or "length"
         if name not in COLUMNS:
             msg = (
-                f"{name!r} is no column of the cells; give {', '.join(COLUMNS)} or a number for "
+                f"{name!r} is not a column of the cells; give {', '.join(COLUMNS)} or a number for "
                 f"each cell{nearest_name(name, COLUMNS)}."
             )
             raise UnknownNameError(msg)
@@ -344,7 +352,7 @@ def plot_evaluation(
     """
     if kind not in get_args(PlotKind):
         kinds = ", ".join(get_args(PlotKind))
-        msg = f"{kind!r} is no drawing of an evaluation; give {kinds}{nearest_name(kind, CURVES)}."
+        msg = f"{kind!r} is not a plot of an evaluation; give {kinds}{nearest_name(kind, CURVES)}."
         raise UnknownNameError(msg)
     if kind == "map":
         return _draw_outcomes(evaluation, map_axes(ax))

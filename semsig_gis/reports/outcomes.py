@@ -6,13 +6,16 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import to_rgba
-from matplotlib.lines import Line2D
 
+from semsig_gis.core.errors import extra
 from semsig_gis.core.signs import OUTCOMES, WHITE
 from semsig_gis.reports.parts import OutcomeMap
 from semsig_gis.reports.plots import SOFT, blank_figure, cell_pixels, draw_legend, label, saved
 from semsig_gis.reports.scenes import MARKERS, draw_north, draw_scale
+
+with extra("plot", "a report or a figure"):
+    from matplotlib.colors import to_rgba
+    from matplotlib.lines import Line2D
 
 if TYPE_CHECKING:
     from semsig_gis.core.signs import Mark

@@ -15,13 +15,16 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
+from semsig_gis.core.errors import extra
 from semsig_gis.core.signs import one_line
+
+with extra("plot", "a report or a figure"):
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

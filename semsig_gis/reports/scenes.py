@@ -9,18 +9,20 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
-from matplotlib.path import Path
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core.errors import InputError, extra
 from semsig_gis.core.geometry import to_degrees
 from semsig_gis.core.signs import OUTCOMES, ClassSign, class_signs, one_line
 from semsig_gis.queries.sight import Sight
 from semsig_gis.reports.parts import Pair, Scene, SceneObject
 from semsig_gis.reports.plots import GROUND, INK, SOFT, blank_figure, draw_legend, label, saved
 from semsig_gis.reports.tables import length
+
+with extra("plot", "a report or a figure"):
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle
+    from matplotlib.path import Path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

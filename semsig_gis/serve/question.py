@@ -327,7 +327,7 @@ def _codes(told: object, taxonomy: Taxonomy) -> tuple[int, ...]:
         raise InputError(msg)
     for name in told:
         if name not in codes:
-            msg = f"{name!r} is no class of this city{nearest_name(name, codes)}."
+            msg = f"{name!r} is not a class of this city{nearest_name(name, codes)}."
             raise UnknownNameError(msg)
     return tuple(dict.fromkeys(codes[name] for name in told))
 

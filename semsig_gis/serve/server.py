@@ -70,7 +70,7 @@ class _Guard:
         """Return the code and the sentence with which a request is refused."""
         headers: dict[bytes, bytes] = dict(scope["headers"])
         if headers.get(b"host") not in self.hosts:
-            return 421, "this server answers to its own address alone; open the one it printed."
+            return 421, "this server answers only at its own address; open the one it printed."
         origin, site = headers.get(b"origin"), headers.get(b"sec-fetch-site", b"none")
         own = origin is None or origin in self.origins
         if not own or site not in {b"none", b"same-origin"}:
@@ -175,7 +175,7 @@ async def _json(request: Request) -> Mapping[str, Any]:
         msg = f"the request is not JSON ({error}); send a mapping of names to values."
         raise InputError(msg) from error
     if not isinstance(told, dict):
-        msg = "the request is no mapping of names to values; send one as JSON."
+        msg = "the request is not a mapping of names to values; send one as JSON."
         raise InputError(msg)
     return told
 

@@ -244,7 +244,10 @@ class Workbench:
                 found.setdefault(key, []).extend(self._marks(detector, picture, tally))
         if not found:
             listed = ", ".join(sorted({picture.name for picture in pictures})[:3]) or "no picture"
-            msg = f"{name} has boxes of {listed}, and none of the photos here; give those."
+            msg = (
+                f"{name} has boxes of {listed}, and none of these photos is open here; open them "
+                "first."
+            )
             raise InputError(msg)
         return {"photos": found, "notes": _left_out(tally)}
 
@@ -309,7 +312,7 @@ class Workbench:
     def _known_noise(self, name: object) -> str:
         if not (isinstance(name, str) and name in self.noises):
             hint = nearest_name(str(name), self.noises)
-            msg = f"{name!r} is no noise model here; give one of {', '.join(self.noises)}{hint}."
+            msg = f"{name!r} is not a noise model here; give one of {', '.join(self.noises)}{hint}."
             raise UnknownNameError(msg)
         return name
 

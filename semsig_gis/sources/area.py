@@ -160,7 +160,7 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
         polygon = join_areas(np.array(boxes, dtype=object))
         if polygon is None:
             msg = (
-                f"none of the files says which box it covers, so that there is no {BOX!r} to clip "
+                f"none of the files states the area that it covers, so there is no {BOX!r} to clip "
                 "to; write west,south,east,north in degrees, or the path of a file with polygons."
             )
             raise InputError(msg)
@@ -232,9 +232,9 @@ def _box(text: str) -> Area:
         -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
     ):
         msg = (
-            f"bounding box {text!r} is no area; write west,south,east,north in degrees, with west "
-            "below east within -180 to 180, or above it across 180 degrees, and south below north "
-            "within -90 to 90."
+            f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
+            "west below east within -180 to 180, or above it across 180 degrees, and south below "
+            "north within -90 to 90."
         )
         raise InputError(msg)
     spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]

@@ -59,7 +59,7 @@ class Condition:
                 comparisons.append((comparison[1], float(comparison[2])))
             elif COMPARES.match(text):
                 msg = (
-                    f"{text!r} is no comparison; write one such as '>=0' or '>=0 or none', or "
+                    f"{text!r} is not a comparison; write one such as '>=0' or '>=0 or none', or "
                     f"'/{re.escape(text)}/' for that very text."
                 )
                 raise CatalogError(msg)

@@ -178,6 +178,4 @@ def _is_text(head: bytes, encoding: str) -> bool:
 
 
 def _unknown(what: str) -> SourceError:
-    return SourceError(
-        f"{what} is not a text in an encoding that can be told; save it as CSV in UTF-8."
-    )
+    return SourceError(f"{what} is in an unknown encoding; save it as CSV in UTF-8.")

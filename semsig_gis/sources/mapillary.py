@@ -93,7 +93,7 @@ def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:
             return features
     except (AttributeError, KeyError, OSError, TypeError, ValueError):
         pass
-    msg = f"{where or path} is not what Mapillary sends of map features; get it again."
+    msg = f"{where or path} is not an answer of Mapillary about map features; download it again."
     raise SourceError(msg)
 
 
@@ -136,7 +136,7 @@ def fetch_layers(
             full = len(load_features(path)) >= MOST_FEATURES
         except HttpError as error:
             if error.status in UNAUTHORIZED:
-                msg = f"{error}".rstrip(".") + "; look whether the access token still holds."
+                msg = f"{error}".rstrip(".") + "; check whether the access token is still valid."
                 raise HttpError(msg, error.status) from error
             if error.status != TOO_MUCH or last:
                 raise

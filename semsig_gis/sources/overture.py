@@ -177,7 +177,7 @@ def _slices(
                 mask = pc.and_(_in_boxes(table, boxes), _may_have_tags(table, specs))
                 yield table.filter(mask)
     except (OSError, pa.ArrowException) as error:
-        msg = f"{path} cannot be read as GeoParquet ({_cause(error)}); get it again."
+        msg = f"{path} cannot be read as GeoParquet ({_cause(error)}); download it again."
         raise SourceError(msg) from error
 
 
@@ -186,8 +186,8 @@ def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> li
     keys = {key for spec in specs for tags in spec.tags for key, _ in tags}
     if not {"id", GEOMETRY} <= {*schema.names} or keys.isdisjoint(schema.names):
         msg = (
-            f"{where} is no file of Overture Maps, which has the columns id, geometry and class; "
-            f"its columns are {', '.join(schema.names) or 'none at all'}."
+            f"{where} is not a file of Overture Maps, which would have the columns id, geometry "
+            f"and class; its columns are {', '.join(schema.names) or 'none at all'}."
         )
         raise SourceError(msg)
     keys |= {field for spec in specs for _, field in spec.fields}
@@ -317,7 +317,10 @@ def _open_store(address: str, spec: HttpSpec) -> tuple[fs.FileSystem, str]:
     parts = urlsplit(address)
     if parts.scheme != STORE:
         if "://" in address:
-            msg = f"{address!r} is no store; write s3://bucket/folder, or a folder of this machine."
+            msg = (
+                f"{address!r} is not a store; write s3://bucket/folder, or a folder of this "
+                "machine."
+            )
             raise CatalogError(msg)
         return fs.LocalFileSystem(), str(Path(address))
     options = dict(parse_qsl(parts.query))
@@ -376,7 +379,7 @@ def _listing(
         )
         raise SourceError(msg) from error
     if not files:
-        msg = f"{release} holds no files of {', '.join(kinds)}; name another store in endpoints."
+        msg = f"{release} contains no files of {', '.join(kinds)}; name another store in endpoints."
         raise SourceError(msg)
     with cache.locked(key) as entry:
         body = entry.scratch(".json")
@@ -389,7 +392,7 @@ def _latest(system: fs.FileSystem, folder: str) -> str:
     """Return the folder of the latest release, which is the folder itself if it has themes."""
     names = sorted(info.path for info in system.get_file_info(fs.FileSelector(folder)))
     if not names:
-        msg = "it holds nothing"
+        msg = "it contains nothing"
         raise FileNotFoundError(msg)
     return folder if any(PARTITION.search(Path(name).name) for name in names) else names[-1]
 

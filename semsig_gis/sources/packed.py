@@ -31,8 +31,8 @@ def swells(packed: int, unpacked: int) -> bool:
 def bomb(what: object, remedy: str = "if you trust it, give what is inside") -> SourceError:
     """Return the plain sentence for a packed file out of which too much comes."""
     return SourceError(
-        f"{what} unpacks to more than {MOST_RATIO} times its size, as files do that are made to "
-        f"fill a disk; {remedy}."
+        f"{what} unpacks to more than {MOST_RATIO} times its size, as archives made to fill a disk "
+        f"do; {remedy}."
     )
 
 

@@ -25,7 +25,7 @@ def column_names(path: Path) -> list[str]:
     try:
         names: list[str] = pq.read_schema(path).names
     except UNREADABLE as error:
-        msg = f"{path} is damaged or is no Parquet file; get it again."
+        msg = f"{path} is damaged or is not a Parquet file; download it again."
         raise SourceError(msg) from error
     return names
 

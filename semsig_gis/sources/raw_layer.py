@@ -49,7 +49,7 @@ def parse_crs(text: str) -> CRS:
         raise CrsError(msg) from error
     if crs.is_geocentric or crs.is_vertical:
         kind = crs.type_name.removesuffix(" CRS").lower()
-        msg = f"CRS {text!r} is {kind}, so that two coordinates are no place in it; {advice}."
+        msg = f"CRS {text!r} is {kind}, in which two coordinates do not give a place; {advice}."
         raise CrsError(msg)
     return crs
 

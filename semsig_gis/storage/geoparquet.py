@@ -297,7 +297,7 @@ def require_intact(path: Path) -> None:
         start, footer = _footer(file)
         file.seek(max(start - len(SEAL) - SUM_BYTES, 0))
         if file.read(len(SEAL)) == SEAL and file.read(SUM_BYTES) != _sum(footer):
-            msg = "the sum of its footer is another"
+            msg = "the checksum of its footer does not match"
             raise ValueError(msg)
 
 

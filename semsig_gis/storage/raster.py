@@ -129,7 +129,7 @@ def write_cells(
     if width * height > MOST_PIXELS:
         msg = (
             f"the cells span {width:,} by {height:,} pixels, which is too wide for a raster; "
-            "export the parts of the city that lie far apart each on its own."
+            "export the distant parts of the city separately."
         )
         raise InputError(msg)
     west, north = grid.origin[0] + left * grid.step, grid.origin[1] + (top + 1) * grid.step

@@ -61,7 +61,7 @@ def parse_json(text: str | bytes, *, finite: bool = False) -> Any:  # noqa: ANN4
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        msg = f"{text[:20]} is no finite number"
+        msg = f"{text[:20]} is not a finite number"
         raise ValueError(msg)
     return value
 

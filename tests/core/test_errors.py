@@ -53,6 +53,7 @@ def test_what_is_offered_is_one_of_the_names(name: str, names: list[str]) -> Non
     ("name", "package", "use"),
     [
         ("cluster", "distributed", "list(parallel.run_tasks(abs, [1], workers=2))"),
+        ("plot", "matplotlib", "import semsig_gis.reports.axes"),
         ("raster", "rasterio", "import semsig_gis.storage.raster"),
     ],
 )

@@ -127,7 +127,7 @@ class Identifiability(Displayed):
     def require_cells_of(self, database: SignatureDatabase) -> None:
         """Raise InputError where another database has other cells."""
         if not np.array_equal(self.database.cell_ids, database.cell_ids):
-            msg = "the identifiability is that of other cells; give that of this database."
+            msg = "the identifiability belongs to other cells; give that of this database."
             raise InputError(msg)
 
     def table(self, rows: slice = slice(None)) -> pa.Table:
@@ -308,7 +308,7 @@ def identifiability_of(
         raise DatabaseError(msg) from error
     if identifiability is None:
         msg = (
-            f"the identifiability in {path} is that of other signatures, or of another version of "
+            f"the identifiability in {path} belongs to other signatures or to another version of "
             "semsig; run semsig identify again."
         )
         raise DatabaseError(msg)

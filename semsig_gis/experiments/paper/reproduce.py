@@ -168,8 +168,8 @@ def _read_settings(folder: Path) -> dict[str, Any]:
 RUN = RunKind(
     content="results of `semsig reproduce`",
     another=(
-        "{folder} holds results of other settings, which differ in {difference}; choose another "
-        "folder, or delete that one."
+        "{folder} contains results of other settings, which differ in {difference}; choose "
+        "another folder, or delete that one."
     ),
     read=_read_settings,
     write=lambda folder, settings: write_json(folder / SETTINGS, settings),

@@ -78,7 +78,10 @@ class Drift(Displayed):
                 )
                 raise InputError(msg)
         if not sum(item.before for item in self.classes):
-            msg = "the drift has no objects before; give a report of a city with some."
+            msg = (
+                "the drift report has no objects from before the change; give the report of a "
+                "city that had some."
+            )
             raise InputError(msg)
 
     def _facts(self) -> dict[str, object]:
@@ -147,8 +150,8 @@ def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
         raise InputError(msg)
     if "years" not in values:
         msg = (
-            f"{where} does not say in how many years that changed; add years, or let "
-            "`semsig update --years N --json` write it."
+            f"{where} does not say over how many years that changed; add years, or write the "
+            "report with `semsig update --years N --json`."
         )
         raise InputError(msg)
     names = {field.name for field in fields(ClassChange)}

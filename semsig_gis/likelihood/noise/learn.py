@@ -307,7 +307,7 @@ def _true_views(
     else:
         xy = np.array([sample.xy for sample in samples if sample.xy is not None])
         if len(xy) < len(samples):
-            msg = "a sample gives its cell alone; give x and y, or a database instead of objects."
+            msg = "a sample gives only its cell; give x and y, or a database instead of objects."
             raise InputError(msg)
         index = ObjectIndex(city.xy)
         looks = np.repeat(xy, photos, axis=0)

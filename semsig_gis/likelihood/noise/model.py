@@ -199,7 +199,7 @@ class NoiseMixture(Displayed):
         named = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
         _check_shares("weights of the mixture", named)
         if not all(weight > 0 for weight in self.weights):
-            msg = f"weights of the mixture are {self.weights}; leave models of no weight out."
+            msg = f"weights of the mixture are {self.weights}; leave out models without weight."
             raise InputError(msg)
 
     def _facts(self) -> dict[str, object]:
@@ -249,7 +249,7 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     except InputError:
         raise
     except (KeyError, TypeError, ValueError) as error:
-        msg = f"a mixture of noise models is not usable ({error}); give lists specs and weights."
+        msg = f"a mixture of noise models cannot be used ({error}); give lists specs and weights."
         raise InputError(msg) from error
     specs = tuple(model for model in models if isinstance(model, NoiseSpec))
     if len(specs) < len(models):
@@ -335,7 +335,7 @@ def named_noise(name: str) -> Noise:
     if name not in NOISES:
         *most, last = NOISES
         hint = nearest_name(name, NOISES)
-        msg = f"{name!r} is no noise model; give {', '.join(most)} or {last}{hint}."
+        msg = f"{name!r} is not a noise model; give {', '.join(most)} or {last}{hint}."
         raise UnknownNameError(msg)
     return NOISES[name]
 

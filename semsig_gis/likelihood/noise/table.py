@@ -220,7 +220,7 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
 def query_bearings(query: Signature) -> NDArray[np.float64]:
     """Return the bearings of a query, or refuse a query without."""
     if query.bearings is None:
-        msg = "the query has no bearings, on which its place rests; give them."
+        msg = "the query has no bearings, which the search between cells needs; give them."
         raise InputError(msg)
     return query.bearings
 
@@ -305,8 +305,8 @@ def _row(name: str, rows: Mapping[str, int]) -> int:
     """Return the row of a class that a noise model names."""
     if name not in rows:
         msg = (
-            f"the noise model names a class {name!r} that the database does not know"
-            f"{nearest_name(name, rows)}; its classes are {', '.join(rows)}."
+            f"the noise model names a class {name!r} that the database does not "
+            f"have{nearest_name(name, rows)}; its classes are {', '.join(rows)}."
         )
         raise InputError(msg)
     return rows[name]

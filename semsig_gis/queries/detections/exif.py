@@ -44,7 +44,7 @@ def read_exif(path: str | Path) -> Shot:
             with Image.open(path) as image:
                 return _shot_of(image)
     except UNREADABLE as error:
-        reason = getattr(error, "strerror", None) or "it is no picture"
+        reason = getattr(error, "strerror", None) or "it is not a picture"
         msg = f"{path} cannot be read ({reason}); give a picture, or leave it out."
         raise InputError(msg) from error
 
@@ -55,7 +55,7 @@ def picture_shot(content: bytes, name: str) -> Shot:
     It is decoded, too: InputError if it is of another format, damaged, or larger than Pillow takes.
     """
     if content[4:8] == b"ftyp" and content[8:12] in HEIC_BRANDS:
-        msg = f"{name} is a HEIC picture, which is not read; save it as JPEG and give that."
+        msg = f"{name} is a HEIC picture, which is not supported; save it as JPEG."
         raise InputError(msg)
     try:
         with warnings.catch_warnings():
@@ -68,7 +68,7 @@ def picture_shot(content: bytes, name: str) -> Shot:
         msg = f"{name} has too many pixels to be decoded safely; give a smaller copy of it."
         raise InputError(msg) from error
     except UNREADABLE as error:
-        msg = f"{name} is no picture that can be read; give JPEG, PNG, WebP or GIF."
+        msg = f"{name} cannot be read as a picture; give JPEG, PNG, WebP or GIF."
         raise InputError(msg) from error
     return shot
 

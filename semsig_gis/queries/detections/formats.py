@@ -58,7 +58,7 @@ def read_pictures(paths: Iterable[str | Path]) -> list[Picture]:
         elif suffix == ".json" and not (results and documents[file] is images):
             pictures += _of_json(documents[file], str(file), images)
         elif suffix != ".json":
-            msg = f"{file} is of no format that is read; {ACCEPTED}."
+            msg = f"{file} is not in a supported format; {ACCEPTED}."
             raise InputError(msg)
     return pictures
 
@@ -68,7 +68,7 @@ def _files(path: Path) -> list[Path]:
         return [path]
     found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
     if not found:
-        msg = f"the folder {path} holds no file of detections; {ACCEPTED}."
+        msg = f"the folder {path} contains no file of detections; {ACCEPTED}."
         raise InputError(msg)
     return found
 
@@ -104,8 +104,8 @@ def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa:
         if _is_results(document):
             if images is None:
                 msg = (
-                    f"{source} holds COCO results without images and categories; give the file of "
-                    "its annotations, which has them, too."
+                    f"{source} contains COCO results without images and categories; give the file "
+                    "of its annotations as well, which has them."
                 )
                 raise InputError(msg)
             return _coco(images, document, source)
@@ -117,9 +117,9 @@ def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa:
         if isinstance(error, InputError):
             raise
         lacks = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
-        msg = f"{source} is not as its format is ({lacks}); export it again."
+        msg = f"{source} does not follow its format ({lacks}); export it again."
         raise InputError(msg) from error
-    msg = f"{source} holds no detections of a known format; {ACCEPTED}."
+    msg = f"{source} contains no detections in a known format; {ACCEPTED}."
     raise InputError(msg)
 
 
@@ -185,7 +185,10 @@ def _yolo(file: Path, names: Path | None) -> Picture:
             continue
         where = f"{file}, line {number}"
         if len(values) < BOX or not values[0].isdecimal():
-            msg = f"{where} is no line of YOLO; write class, x, y, width, height (and score)."
+            msg = (
+                f"{where} is not a line of YOLO labels; write class, x, y, width, height (and "
+                "score)."
+            )
             raise InputError(msg)
         if int(values[0]) not in labels:
             msg = f"{where} is of class {values[0]}, which has no name; list it in data.yaml."
@@ -200,7 +203,7 @@ def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None
     try:
         values = [float(text) for text in texts]
     except ValueError as error:
-        msg = f"{where} has a value that is no number; write class, x, y, width, height."
+        msg = f"{where} has a value that is not a number; write class, x, y, width, height."
         raise InputError(msg) from error
     score = texts[-1] if len(texts) % 2 else None
     if len(texts) <= BOX:
@@ -291,7 +294,7 @@ def _cvat(file: Path) -> list[Picture]:
         msg = f"{file} is not XML that can be read ({error}); export it as CVAT for images 1.1."
         raise InputError(msg) from error
     if root.tag != "annotations" or root.find("track") is not None:
-        what = "holds tracks of a video" if root.tag == "annotations" else "is no file of CVAT"
+        what = "contains tracks of a video" if root.tag == "annotations" else "is not a CVAT file"
         msg = f"{file} {what}; export it as CVAT for images 1.1."
         raise InputError(msg)
     try:
@@ -300,7 +303,7 @@ def _cvat(file: Path) -> list[Picture]:
         if isinstance(error, InputError):
             raise
         lacks = f"an image or shape lacks {error}" if isinstance(error, KeyError) else str(error)
-        msg = f"{file} is not as its format is ({lacks}); export it as CVAT for images 1.1."
+        msg = f"{file} does not follow its format ({lacks}); export it as CVAT for images 1.1."
         raise InputError(msg) from error
 
 

@@ -102,7 +102,7 @@ def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401
         try:
             return bounds(_tile_points(base64.b64decode(geometry, validate=True))), True
         except (binascii.Error, ValueError, IndexError, TypeError, ZeroDivisionError) as error:
-            msg = f"{where} has a geometry that is no vector tile in base64; ask for it again."
+            msg = f"{where} has a geometry that is not a vector tile in base64; download it again."
             raise InputError(msg) from error
     points = list(_points(geometry.get("coordinates") if isinstance(geometry, dict) else geometry))
     corners = bounds(points)
@@ -183,7 +183,7 @@ def _values(message: Any, field: int) -> Iterator[Any]:  # noqa: ANN401 - bytes 
         elif kind in {WIDE, NARROW}:
             value, place = None, place + (8 if kind == WIDE else 4)
         else:
-            msg = f"{kind} is no kind of value"
+            msg = f"{kind} is an unknown kind of value"
             raise ValueError(msg)
         if key >> 3 == field:
             yield value

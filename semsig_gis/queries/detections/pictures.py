@@ -94,7 +94,7 @@ def box_of(
         left, top, right, bottom = (float(value) for value in corners)
         sure = 1.0 if score is None else float(str(score))
     except (TypeError, ValueError) as error:
-        msg = f"{where} has a box or a score that is no number; correct it or take it out."
+        msg = f"{where} has a box or a score that is not a number; correct it or take it out."
         raise InputError(msg) from error
     numbers = left, top, right, bottom
     near = all(abs(number) <= MOST_PIXELS for number in numbers)  # false for NaN

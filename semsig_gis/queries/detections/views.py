@@ -206,7 +206,7 @@ class Detector:
         if fov is None:
             msg = (
                 f"the field of view of the picture {picture.name} is not known; give --fov in "
-                "degrees, or with --images the folder of the pictures, whose EXIF may tell."
+                "degrees, or with --images the folder of the pictures, whose EXIF may contain it."
             )
             raise InputError(msg)
         return Camera(

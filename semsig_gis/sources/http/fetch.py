@@ -208,7 +208,7 @@ def _failure(error: Exception, url: str) -> Exception:
         return PassingError("did not answer in time", slow=True)
     if isinstance(error, requests.exceptions.ConnectionError):
         return PassingError("could not be reached or hung up")
-    msg = f"{url} cannot be asked for ({' '.join(str(error).split()).rstrip('.')}); correct it."
+    msg = f"{url} cannot be requested ({' '.join(str(error).split()).rstrip('.')}); correct it."
     return HttpError(msg)
 
 
@@ -518,7 +518,9 @@ def _receive(response: requests.Response, job: _Job, have: int) -> None:
     blocks = blocks_of(response)
     if job.spec.secret is not None:
         if Edition.of(response.headers).encoding:
-            msg = f"{host_of(job.request.url)} sent a packed answer where none was asked for."
+            msg = (
+                f"{host_of(job.request.url)} sent a compressed answer although none was requested."
+            )
             raise HttpError(msg)
         blocks = job.spec.secret.strained(blocks)
     with job.entry.part.open("ab") as stream:

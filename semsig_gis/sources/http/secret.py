@@ -30,7 +30,11 @@ class Secret:
         """Return what an environment variable holds; InputError if that is no token."""
         value = os.environ.get(variable, "").strip()
         if not re.fullmatch(r"[!-~]+", value):
-            what = "holds blanks or letters that no token has" if value else "is not set"
+            what = (
+                "contains blanks or other characters that a token cannot have"
+                if value
+                else "is not set"
+            )
             msg = (
                 f"the environment variable {variable} {what}; set it to the access token that the "
                 "service gave you."

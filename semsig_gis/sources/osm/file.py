@@ -132,7 +132,7 @@ def _file(path: Path) -> osmium.io.File:
         msg = f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}."
         raise SourceError(msg)
     if path.stat().st_size == 0:
-        msg = f"{path} is empty; get it again."
+        msg = f"{path} is empty; download it again."
         raise SourceError(msg)
     require_modest(path)
     # The whole path, because libosmium takes "-" for standard input and "http:" for an address.

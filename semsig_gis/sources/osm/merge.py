@@ -31,8 +31,8 @@ def readable(what: object) -> Iterator[None]:
     except (osmium.InvalidLocationError, RuntimeError, ValueError) as error:
         cause = " ".join(str(error).split()).rstrip(".")
         msg = (
-            f"{what} cannot be read ({cause}); "
-            "it is damaged or not the kind of file that its name says, get it again."
+            f"{what} cannot be read ({cause}); it is damaged or not the kind of file that its name "
+            "says, so download it again."
         )
         raise SourceError(msg) from error
 

@@ -92,7 +92,7 @@ def load_document(path: Path, *, where: str) -> Document:
         msg = f"{where} cannot be read ({error.strerror}); give a JSON file of an Overpass server."
         raise SourceError(msg) from error
     except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
-        msg = f"{where} is not what Overpass servers send in JSON; get it again."
+        msg = f"{where} is not JSON as Overpass servers send it; download it again."
         raise SourceError(msg) from error
 
 

@@ -67,8 +67,9 @@ def _address(client: Client) -> str:
     found = SERVER.fullmatch(f"{client.endpoint}/{quote(client.dataset, safe='/')}".rstrip("/"))
     if found is None:
         msg = (
-            f"layer {client.layer.name!r} has the dataset {client.dataset!r}, which is no layer "
-            "of an ArcGIS server; write 'SERVICE/FeatureServer/LAYER', the layer by number or name."
+            f"layer {client.layer.name!r} has the dataset {client.dataset!r}, which is not a layer "
+            "of an ArcGIS server; write 'SERVICE/FeatureServer/LAYER', the layer by number or "
+            "name."
         )
         raise CatalogError(msg)
     service = found[1]
@@ -95,7 +96,7 @@ def _tables(root: dict[str, Any]) -> list[dict[str, Any]]:
         return [*root["layers"], *root.get("tables", ())]
     except (KeyError, TypeError) as error:
         msg = (
-            "what the server sends is no description of a FeatureServer or MapServer; check the "
+            "the server did not send the description of a FeatureServer or MapServer; check the "
             "address."
         )
         raise SourceError(msg) from error

@@ -61,7 +61,8 @@ def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 
     if client.layer.server_where:
         msg = (
             f"layer {client.layer.name!r} has a server_where, and the datastore of "
-            f"{host_of(client.endpoint)} does not hold it; write it as `where`, which holds here."
+            f"{host_of(client.endpoint)} does not accept it; write it as `where`, which is applied "
+            "here."
         )
         raise CatalogError(msg)
     address = urljoin(f"{client.endpoint}/", str(resource.get("url") or ""))
@@ -92,7 +93,7 @@ def _package(client: Client) -> dict[str, Any]:
     package = reply.get("result")
     if not isinstance(package, dict):
         msg = (
-            "what the portal sends is no description of a dataset; check that the address is that "
+            "the portal did not send the description of a dataset; check that the address is that "
             "of a CKAN portal."
         )
         raise SourceError(msg)

@@ -32,8 +32,8 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     classes = [str(name) for name in conformance.get("conformsTo") or ()]
     if not any(CORE in name for name in classes):
         msg = (
-            f"{host_of(client.endpoint)} does not say that it speaks OGC API - Features; check the "
-            f"address {client.endpoint}."
+            f"{host_of(client.endpoint)} does not declare that it supports OGC API - Features; "
+            f"check the address {client.endpoint}."
         )
         raise SourceError(msg)
     params: dict[str, str | float] = {"limit": PAGE_ROWS}
@@ -41,7 +41,7 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
         if not any(FILTER in name for name in classes):
             msg = (
                 f"layer {client.layer.name!r} has a server_where, and {host_of(client.endpoint)} "
-                "takes no filter; write it as `where`, which holds here."
+                "accepts no filter; write it as `where`, which is applied here."
             )
             raise CatalogError(msg)
         params |= {"filter": client.layer.server_where, "filter-lang": "cql2-text"}

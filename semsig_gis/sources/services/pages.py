@@ -252,7 +252,7 @@ def json_object(content: bytes, url: str) -> dict[str, Any]:
     """Return a JSON object that a service sent, as `json_value` does; SourceError if it is none."""
     reply = json_value(content, url)
     if not isinstance(reply, dict):
-        msg = f"{host_of(url)} sent JSON that is no object; check the address {url}."
+        msg = f"{host_of(url)} sent JSON that is not an object; check the address {url}."
         raise SourceError(msg)
     return reply
 

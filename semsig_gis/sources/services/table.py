@@ -90,7 +90,7 @@ def _json(path: Path) -> Table:
     except UnicodeDecodeError as error:
         raise _not_utf8(path) from error
     except (ValueError, RecursionError) as error:
-        msg = f"{path} is not whole JSON ({error}); get it again."
+        msg = f"{path} is not whole JSON ({error}); download it again."
         raise SourceError(msg) from error
     if isinstance(content, dict) and isinstance(content.get("result"), dict):
         content = content["result"]  # of CKAN, in an envelope
@@ -186,7 +186,7 @@ def _gml(path: Path) -> Table:
     try:
         root = parse_xml(content)
     except ValueError as error:
-        msg = f"{path} is not whole GML ({error}); get it again."
+        msg = f"{path} is not whole GML ({error}); download it again."
         raise SourceError(msg) from error
     said = error_text(content)
     found = list(features(root))
@@ -251,4 +251,4 @@ def _parquet_records(path: Path, fields: Sequence[str], primary: str | None) -> 
 
 def _broken_parquet(path: Path, error: Exception) -> SourceError:
     cause = " ".join(str(error).split()).partition(". ")[0].rstrip(".")
-    return SourceError(f"{path} is not a whole Parquet file ({cause}); get it again.")
+    return SourceError(f"{path} is not a whole Parquet file ({cause}); download it again.")

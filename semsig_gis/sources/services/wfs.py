@@ -92,7 +92,7 @@ def _capabilities(content: bytes, client: Client) -> _Capabilities:
     version = root.get("version", "")
     if local_name(root) != "WFS_Capabilities" or not version.startswith("2."):
         msg = (
-            f"{host_of(client.endpoint)} is no Web Feature Service of version 2.0 (it sent "
+            f"{host_of(client.endpoint)} is not a Web Feature Service of version 2.0 (it sent "
             f"{local_name(root)} {version}".rstrip()
             + f"); check the address {client.endpoint}."
         )

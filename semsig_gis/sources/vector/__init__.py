@@ -247,7 +247,7 @@ def _pick(path: Path, wanted: str | None) -> Member:
             f"its layers are {', '.join(names)}."
         )
         raise UnknownNameError(msg)
-    msg = f"{path} holds {len(matches)} layers ({', '.join(names)}); name the one that is meant."
+    msg = f"{path} holds {len(matches)} layers ({', '.join(names)}); give the name of one."
     raise SourceError(msg)
 
 

@@ -107,7 +107,7 @@ def layer_names(member: Member) -> list[str]:
     except Exception as error:
         raise unreadable(member, error) from error
     if not names:
-        msg = f"{member} holds no layer; get it again."
+        msg = f"{member} contains no layer; download it again."
         raise SourceError(msg)
     return names
 

@@ -101,7 +101,7 @@ class Member:
 
 def not_of_its_kind(what: object) -> SourceError:
     """Return the plain sentence for a file whose content belies its name."""
-    return SourceError(f"{what} is not the kind of file that its name says; get it again.")
+    return SourceError(f"{what} is not the kind of file that its name says; download it again.")
 
 
 def unreadable(what: object, error: BaseException) -> SourceError:
@@ -111,7 +111,7 @@ def unreadable(what: object, error: BaseException) -> SourceError:
     cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
     if "not recognized" in cause:
         return not_of_its_kind(what)
-    return SourceError(f"{what} cannot be read ({cause}); it may be damaged, get it again.")
+    return SourceError(f"{what} cannot be read ({cause}); it may be damaged, so download it again.")
 
 
 def members(path: Path) -> tuple[Member, ...]:
@@ -149,7 +149,7 @@ def _archived(path: Path) -> tuple[str, ...]:
     except _ZIP_FAULTS as error:
         raise unreadable(path, error) from error
     if broken is not None:
-        msg = f"archive {path} is damaged at {broken}; get it again."
+        msg = f"archive {path} is damaged at {broken}; download it again."
         raise SourceError(msg)
     usable = [
         name
@@ -158,8 +158,8 @@ def _archived(path: Path) -> tuple[str, ...]:
     ]
     if not usable:
         msg = (
-            f"archive {path} holds no vector file, only {', '.join(names) or 'nothing'}; "
-            f"one of {', '.join(sorted(DRIVERS))} is needed."
+            f"archive {path} contains no vector file, only {', '.join(names) or 'nothing'}; one of "
+            f"{', '.join(sorted(DRIVERS))} is needed."
         )
         raise SourceError(msg)
     data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
@@ -179,6 +179,7 @@ def _refuse_damaged(path: Path) -> None:
         verdict = str(error)
     if verdict != "ok":
         msg = (
-            f"{path} cannot be read ({' '.join(verdict.split())}); it may be damaged, get it again."
+            f"{path} cannot be read ({' '.join(verdict.split())}); it may be damaged, so download "
+            "it again."
         )
         raise SourceError(msg)
