@@ -33,8 +33,8 @@ def drawings() -> Iterable[sg.Plot]:
     ranges = {f"R = {metres} m": metres for metres in (20, 30, 40)}
     scales = {f"Q = {levels}": levels for levels in (8, 16, 24, 32)}
     for name, section, places, title, x_label in (
-        ("ranges", "ranges", ranges, "How far one sees", "visibility range (m)"),
-        ("scales", "scales", scales, "How exactly bearings are told", "angle levels"),
+        ("ranges", "ranges", ranges, "Visibility range", "visibility range (m)"),
+        ("scales", "scales", scales, "Angle levels", "angle levels"),
     ):
         yield _beside(rows, name, section=section, places=places, title=title, x_label=x_label)
     for city in ("Paris-like", "Montpellier"):
@@ -115,7 +115,7 @@ def _rivals(rows: Sequence[dict[str, Any]], city: str) -> sg.Plot:
     errors = ("1 error", "7 errors", "13 errors")
     return sg.Plot(
         name=f"rivals-{city.lower()}",
-        title=f"{city}: queries placed within 50 m, by what the detector got wrong",
+        title=f"{city}: queries placed within 50 m, by errors of the detector",
         x_label="errors of the detector in one query",
         y_label="share within 50 m",
         curves=curves,
