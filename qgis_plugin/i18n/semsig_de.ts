@@ -728,7 +728,7 @@
         <translation>Was von der Stadt für die Anfrage abgesucht werden muss, in einem GeoPackage.</translation>
     </message>
     <message>
-        <source>What the files hold. With several, objects that two of them have are merged; the first is taken for the best source.</source>
+        <source>What the files hold. With several, objects that two of them have are merged; the first is treated as the best source.</source>
         <translation>Was die Dateien enthalten. Bei mehreren werden Objekte, die zwei davon haben, zusammengelegt; der erste gilt als beste Quelle.</translation>
     </message>
     <message>

@@ -728,7 +728,7 @@
         <translation>Ce qu’il faut chercher de la ville pour la requête, dans un GeoPackage.</translation>
     </message>
     <message>
-        <source>What the files hold. With several, objects that two of them have are merged; the first is taken for the best source.</source>
+        <source>What the files hold. With several, objects that two of them have are merged; the first is treated as the best source.</source>
         <translation>Ce que contiennent les fichiers. S’il y en a plusieurs, les objets communs sont fusionnés ; le premier passe pour la meilleure source.</translation>
     </message>
     <message>

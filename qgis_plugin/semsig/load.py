@@ -74,7 +74,7 @@ The log tells what became of every row: how many are objects, how many were left
             described(
                 catalogs,
                 "What the files hold. With several, objects that two of them have are merged; the "
-                "first is taken for the best source.",
+                "first is treated as the best source.",
             ),
             file_to_read(
                 "CATALOG_FILE",

@@ -366,8 +366,8 @@ def print_answer(result: dict[str, Any]) -> None:
     if north["name"] != "grid":
         day = f" of {north['date']}" if north["date"] else ""
         say(
-            f"Bearings count from {north['name']} north{day}, at {north['turn'] % 360.0:.1f}° from "
-            "grid north."
+            f"Bearings are measured from {north['name']} north{day}, at "
+            f"{north['turn'] % 360.0:.1f}° from grid north."
         )
     for note in result["notes"]:
         say(f"Note: {note}")
@@ -418,11 +418,11 @@ def _print_known(prior: dict[str, Any]) -> None:
             f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
         )
     if area := prior.get("area"):
-        say(f"Known: in {area['file']}, which has {area['cells']:,} cells.")
+        say(f"Known: in the area {area['file']}, which has {area['cells']:,} cells.")
     if popularity := prior.get("popularity"):
-        say(f"Known: as likely as {popularity['file']} says.")
+        say(f"Known: places are weighted by {popularity['file']}.")
     if require := prior.get("require"):
-        say(f"Known: sees {require['text']}, as {require['cells']:,} cells do.")
+        say(f"Known: {require['text']} is in sight, as in {require['cells']:,} cells.")
 
 
 def print_place(result: dict[str, Any]) -> None:

@@ -209,10 +209,13 @@ def _tell(tally: Tally) -> None:
             remark(f"left out: {boxes} {what}: {_listed(labels)}")
     if tally.unknown_heading:
         pictures = _many(tally.unknown_heading, "picture")
-        remark(f"the heading is not known of {pictures}; bearings count from the viewing direction")
+        remark(
+            f"the heading of {pictures} is unknown; bearings are measured from the viewing "
+            "direction"
+        )
     for north, count in tally.north.items():
         headings = _many(count, "heading")
-        remark(f"counted from {north} north: {headings}; localize with --north {north}")
+        remark(f"measured from {north} north: {headings}; localize with --north {north}")
 
 
 def _many(number: int, one: str, several: str = "") -> str:

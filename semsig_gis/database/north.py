@@ -99,7 +99,7 @@ class North:
             return ()
         note = (
             f"{self.name} north differs by up to {self.spread:.1f}° from its bearing in the middle "
-            "of the city, which was taken for all of it."
+            "of the city, which is used for the whole city."
         )
         return (note,)
 

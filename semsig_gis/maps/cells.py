@@ -407,7 +407,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
         f"<p><b>{percent(facts['chance_found'])}</b> chance to answer a {asked} {within}<br>"
         f"Mean of {facts['cells']:,} cells, "
         f"{made_by(isolated(facts['noise']) + ' noise')}<br>"
-        "Click a cell to see what it is taken for</p>"
+        "Click a cell to see what it is mistaken for</p>"
         f"{part_of('Chance to be found', scale)}"
         f"{folded('Figures', figures)}{sources(identifiability.database.licenses)}"
     )

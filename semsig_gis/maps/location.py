@@ -377,7 +377,7 @@ def _notes(answer: Answer) -> str:
     """Return what there is to say of the query and its answer, as HTML."""
     notes = [f"Note: {note}" for note in answer.notes]
     if answer.north != GRID_NORTH:
-        notes.insert(0, f"Bearings of the query count from {answer.north}.")
+        notes.insert(0, f"Bearings of the query are measured from {answer.north}.")
     return "".join(f"<p>{escape(note)}</p>" for note in notes)
 
 

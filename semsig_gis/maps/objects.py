@@ -296,6 +296,6 @@ def objects_legend(objects: StreetObjects) -> str:
     return (
         "<summary>Street objects</summary>"
         f"<p><b>{len(objects):,}</b> objects of {len(counts)} classes<br>"
-        f"Click one to see what is known of it</p><table>{rows}</table>"
+        f"Click one for details</p><table>{rows}</table>"
         f"{sources(map(str, objects.licenses))}"
     )

@@ -371,7 +371,7 @@ def _require_plane(
     if distortion.angle > most:
         notes.append(
             f"grid north of {crs_label(metric)} is up to {distortion.angle:.3g} degrees off true "
-            "north; give --north where bearings of queries do not count from grid north"
+            "north; give --north if bearings of queries are not measured from grid north"
         )
     return tuple(notes)
 

@@ -44,7 +44,7 @@ def told_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[s
         for file in files:
             name, what = TOLD[str(_reader(file))]
             names.append(name)
-            lines.append(f"{file} is taken for {what}; its catalogue is {name}")
+            lines.append(f"{file} is read as {what}, with the catalogue {name}")
     return tuple(dict.fromkeys(names)), tuple(lines)
 
 

@@ -179,8 +179,8 @@ def _route(rows: list[tuple[int, _Stop]], source: str, track: Track | None) -> R
         advice = "give dx and dy, or distance and bearing, on every line of a route but the first"
     for number, (line, stop) in enumerate(rows):
         if (stop.leg is None) != (number == 0 or track is not None):
-            told = "tells a way" if number == 0 or track else ""
-            fault = told or "does not tell the way from the line before"
+            gives = number == 0 or track
+            fault = "gives a step" if gives else "does not give the step from the line before"
             msg = f"line {line} of {source} {fault}; {advice}."
             raise InputError(msg)
     if track is None:

@@ -256,7 +256,7 @@ def _failure_sections(evaluation: Evaluation, database: SignatureDatabase) -> It
             title="The worst failures",
             text=(
                 (
-                    "The true cell, and beside it the cell that it was taken for. Letters "
+                    "The true cell, next to the cell that it was mistaken for. Letters "
                     "around the circle are the distorted query."
                 ),
             ),

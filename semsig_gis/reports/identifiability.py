@@ -120,7 +120,7 @@ def identifiability_page(
                 "Before any query, every cell gets the chance that a "
                 f"{shot(facts['view_degrees'])} from it will be placed "
                 f"within {facts['radius_m']:g} m, by {facts['trials']:,} simulated queries and by "
-                f"how like the other cells are. {check.queries:,} fresh queries tell whether the "
+                f"how like the other cells are. {check.queries:,} new queries show whether the "
                 "chances come true."
             ),
         ),

@@ -124,7 +124,7 @@ def failure_pairs(
             replace(cell_scene(database, cell, title=title), name=f"{name}-{place}", asked=asked)
             for cell, title, name in (
                 (int(row["cell"]), "Where it was", "true"),
-                (taken, "What it was taken for", "taken"),
+                (taken, "What it was mistaken for", "taken"),
             )
         )
         equals = int(row["tied"])
@@ -459,7 +459,7 @@ def _described(scene: Scene, signs: dict[int, ClassSign]) -> str:
     parts = (
         scene.title,
         f"{types} {place}{f': {counts}' if counts else ''}",
-        f"The query told {told}" if told else "",
+        f"The query had {told}" if told else "",
         _error(scene),
     )
     return " ".join(f"{part[:1].upper()}{part[1:]}." for part in parts if part)

@@ -194,7 +194,7 @@ class Workbench:
         fov = field_of_view(shot)
         notes = []
         if panorama:
-            notes.append("It is twice as wide as high, so it is taken for a panorama all round.")
+            notes.append("It is twice as wide as high, so it is treated as a full panorama.")
         heading = shot.heading
         if heading is not None and shot.north is not None:
             north = North.of("magnetic" if shot.north == "magnetic" else "true", self.database)

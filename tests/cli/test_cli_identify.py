@@ -115,5 +115,5 @@ def test_columns_that_do_not_fit_are_named_and_left_out(run: Run, done: Done) ->
         "identifiability", columns, cell_ids=whole.cell_ids[9:], facts=facts
     )
     code, out, err = run("info other.parquet")
-    assert (code, "that of other signatures" in err) == (0, True)
+    assert (code, "belongs to other signatures" in err) == (0, True)
     assert "Identifiability" not in out

@@ -235,7 +235,7 @@ def test_a_track_tells_the_way_of_a_route(city: Path, run: Run, timed: bool) -> 
         slipped = written(city.with_name("slip.jsonl"), [*told[:2], {**told[2], **change}])
         sentence(run("route", city, slipped, "--track", track), *words)
     short = gpx(city.with_name("short.gpx"), places[:2], timed=False)
-    words = ["does not tell when"] if timed else ["2 points for 3 views"]
+    words = ["has no times"] if timed else ["2 points for 3 views"]
     sentence(run("route", city, file, "--track", short), *words)
 
 
@@ -444,7 +444,7 @@ def test_bearings_from_another_north(city: Path, run: Run) -> None:
     out = run(*query, "--heading", "unknown", "--map", city.with_name("map.html"))[1]
     assert "° from magnetic north." in out
     page = city.with_name("map.html").read_text(encoding="utf-8")
-    assert "count from magnetic north of 2024-05-31" in page
+    assert "are measured from magnetic north of 2024-05-31" in page
 
 
 def test_nobody_stands_where_nothing_is_possible(city: Path, run: Run) -> None:

@@ -145,7 +145,7 @@ def test_an_interrupt_after_the_work_is_done() -> None:
         ("build", ["Missing argument 'objects'", "see semsig build --help"]),
         ("bulid", ["Did you mean 'build'", "see semsig --help"]),
         ("build o --out c --frob", ["--frob"]),
-        ("info \udcff.parquet", ["not text in UTF-8"]),
+        ("info \udcff.parquet", ["not valid UTF-8"]),
         ("info a\0.parquet", ["null byte"]),
         (f"load {'n' * 300} --catalog openstreetmap --out o.parquet", ["File name too long"]),
         (f"draft {'n' * 300}", ["File name too long"]),

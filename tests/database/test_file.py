@@ -270,7 +270,7 @@ def test_a_folder_that_is_not_whole_is_named(
             opened(parts)
     path.write_bytes(content)
     shutil.copy(path, parts / "tile_0_0.parquet")
-    with refused(DatabaseError, "tile_0_0.parquet", "is no part of the database"):
+    with refused(DatabaseError, "tile_0_0.parquet", "is not part of the database"):
         opened(parts)
     (parts / "tile_0_0.parquet").unlink()
     opened(parts)

@@ -339,7 +339,7 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
     target = tmp_path / "home"
     target.mkdir()
     (target / "letter.txt").touch()
-    with refused(InputError, "'letter.txt'", "no part of a signature database"):
+    with refused(InputError, "'letter.txt'", "not part of a signature database"):
         begin(target, RECIPE)
     (target / "letter.txt").unlink()
     folder = begin(target, RECIPE)

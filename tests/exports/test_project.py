@@ -115,7 +115,7 @@ def test_a_city_opens_as_a_project(opened: dict[str, Any]) -> None:
     assert opened["hostile"]["layers"]["Signature cells"]["seen"] == [50_000, 10_000, 5_000, 1_000]
     assert cells["styles"] == ["Ambiguity", "Identifiability"]
     assert cells["aliases"]["gain_street_light"] == "Gain by: Street light"
-    assert cells["form"]["What it is taken for"][:2] == ["lookalike_1", "lookalike_2"]
+    assert cells["form"]["What it is mistaken for"][:2] == ["lookalike_1", "lookalike_2"]
     assert wheel(cells["tip"]) == [*CITY.types(0)]
     assert cells["name"] == f"cell {CITY.cell_ids[0]}, {CITY.types(0)}"
     assert wheel(asked["tip"]) == [*EVALUATION.queries["query_types"].iloc[0]]

@@ -247,7 +247,7 @@ def test_cells_before_and_now(page: MapPage) -> None:
     for city, cell, title, first, then in (
         (OLD, before, "A cell that sees something else", OLD.types(before), NEW.types(now)),
         (NEW, come, "A new cell: it saw nothing", "nothing", NEW.types(come)),
-        (OLD, gone, "A cell that sees nothing any more", OLD.types(gone), "nothing"),
+        (OLD, gone, "A cell that no longer sees anything", OLD.types(gone), "nothing"),
     ):
         said = page.click(city, cell)
         assert (said["title"], said["Cell"]) == (title, str(city.cell_ids[cell]))

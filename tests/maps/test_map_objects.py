@@ -166,7 +166,7 @@ def test_the_search_is_used_by_keyboard(page: MapPage) -> None:
     for nothing in ("no such thing", "0, 0", "1e400", "99999999999999999999"):
         assert page.search(nothing, Keys.ENTER) == []
         said = page.one(".semsig-search [role=status]")
-        assert said.text == "Nothing on this map is called so, or lies there."
+        assert said.text == "Nothing on this map has that name, number or place."
 
 
 @pytest.mark.usefixtures("carried")

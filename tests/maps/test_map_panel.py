@@ -119,7 +119,7 @@ def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
         page.open(ambiguity_map(CITY))
         panel = page.one(".semsig-panel")
         names = [panel.get_attribute(name) for name in ("role", "aria-live", "aria-label")]
-        assert names == ["region", "polite", "What is known of this place"]
+        assert names == ["region", "polite", "About this place"]
         number = str(CITY.cell_ids[0])
         key = f"cell:{number}"
         # By keyboard it gets the focus, and gives it back.

@@ -90,7 +90,7 @@ def test_a_click_tells_of_what_is_coloured(page: MapPage) -> None:
     assert {"It sees", "Found within 30 m"} <= set(both)
     assert any(line.startswith("Same types: ") for line in page.jumps())
     page.switch("What has changed")
-    assert page.click(CITY, 950)["title"] == "A cell that sees nothing any more"
+    assert page.click(CITY, 950)["title"] == "A cell that no longer sees anything"
     page.switch("Same types")
     assert page.click(CITY, 950)["title"] == both["title"]
 

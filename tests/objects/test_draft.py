@@ -191,7 +191,7 @@ NOWHERE = b"""{"type": "FeatureCollection", "features": [
         ("town.osm", b"<osm/>", ("OpenStreetMap", "'openstreetmap'")),
         ("town.csv", b"x;y\n770000;6280000\n", ("(770000, 6280000)", "--crs EPSG:2154")),
         ("town.csv", b"x;y\n;\n", ("no layer with positions",)),
-        ("town.geojson", NOWHERE, ("town.geojson holds no layer with positions",)),
+        ("town.geojson", NOWHERE, ("town.geojson has no layer with positions",)),
         ("town.csv", b"name;size\na;1\n", ("no field that looks like a position", "name, size")),
         ("town.json", b'[{"a": 1}]', ("no field that looks like a position",)),
         ("town.json", b"[", ("town.json",)),

@@ -71,7 +71,7 @@ def test_layers_are_chosen() -> None:
     assert chosen("+clocks", selection="paper") == paper | {"clocks"}
     with refused(UnknownNameError, "'clock'", "the nearest is 'clocks'"):
         chosen("+clock")
-    with refused(InputError, "'clocks' is named alone", "all layers", "'+clocks'"):
+    with refused(InputError, "'clocks' was given without a plus sign", "all layers", "'+clocks'"):
         chosen("clocks", selection="all")
     roles = {spec.role for spec in choose_layers(osm, ["trees"], surroundings=True)}
     assert roles == {"objects", "buildings", "streets"}

@@ -74,5 +74,5 @@ def test_no_catalogue_need_be_named_of_a_file_that_tells_it(run: Run, tmp_path: 
     osm, trees = write(tmp_path, "town.osm"), write(tmp_path, "trees.gpkg")
     code, _, err = run("load", osm, "--out", out)
     assert (code, out.exists()) == (0, True)
-    assert f"{osm} is taken for an extract of OpenStreetMap; its catalogue is openstreetmap" in err
+    assert f"{osm} is read as an extract of OpenStreetMap, with the catalogue openstreetmap" in err
     sentence(run("load", trees, "--out", tmp_path / "none.parquet"), "trees.gpkg", "--catalog")

@@ -390,7 +390,7 @@ def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> N
 
 def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> None:
     expected = (
-        ("--heading and --area are for the method likelihood",),
+        ("--heading and --area work only with the likelihood method",),
         ("Place was given with the method types:edit",),
         ("Detector was given with the method edit+edit",),
         ("b.shp does not end in .gpkg",),

@@ -294,8 +294,8 @@ def annotation(**values: object) -> str:
     ("name", "text", "words"),
     [
         ("a.json", "{", "a.json is not JSON"),
-        ("a.json", "{}", "holds no detections of a known format; give JSON (COCO"),
-        ("a.json", "[1]", "holds no detections"),
+        ("a.json", "{}", "contains no detections in a known format; give JSON (COCO"),
+        ("a.json", "[1]", "contains no detections"),
         ("a.json", json.dumps(COCO["annotations"]), "without images and categories"),
         ("a.json", annotation(bbox=[1, 2, 3]), "not as its format is"),
         ("a.json", annotation(bbox=[1, 2, "x", 4]), "not as its format is"),
@@ -311,13 +311,13 @@ def annotation(**values: object) -> str:
         ("a.json", changed(categories=[{"id": 1}]), "lacks 'name'"),
         ("a.json", json.dumps([{"data": {}, "annotations": [{"result": [3]}]}]), "not as its"),
         ("a.json", json.dumps({**IMAGE, "detections": [{"value": "x", "geometry": "?"}]}),
-         "image street, detection 1 has a geometry that is no vector tile"),
+         "image street, detection 1 has a geometry that is not a vector tile"),
         ("a.json", json.dumps({**IMAGE, "detections": [{"value": "x", "geometry": "Gv8="}]}),
          "no vector tile"),
         ("a.json", json.dumps({"data": [{"value": "x", "geometry": [[9, 9]]}]}), "unknown size"),
-        ("a.txt", "0 0.5 0.5 0.1\n", "line 1 is no line of YOLO"),
-        ("a.txt", "bench 0.5 0.5 0.1 0.1\n", "line 1 is no line of YOLO"),
-        ("a.txt", "0 0.5 x 0.1 0.1\n", "line 1 has a value that is no number"),
+        ("a.txt", "0 0.5 0.5 0.1\n", "line 1 is not a line of YOLO"),
+        ("a.txt", "bench 0.5 0.5 0.1 0.1\n", "line 1 is not a line of YOLO"),
+        ("a.txt", "0 0.5 x 0.1 0.1\n", "line 1 has a value that is not a number"),
         ("a.txt", "0 400 200 10 10\n", "is not in shares of the picture"),
         ("a.txt", "9 0.5 0.5 0.1 0.1\n", "is of class 9, which has no name"),
         ("a.xml", "<a", "not XML that can be read"),
@@ -354,7 +354,7 @@ def test_classes_of_yolo_need_names(names: str | None, words: str, tmp_path: Pat
 
 
 def test_a_folder_without_detections_is_refused(tmp_path: Path) -> None:
-    with refused(InputError, "holds no file of detections"):
+    with refused(InputError, "contains no file of detections"):
         read_pictures([tmp_path])
     with refused(InputError, "absent.json cannot be read"):
         read_pictures([tmp_path / "absent.json"])

@@ -87,7 +87,7 @@ def test_what_a_query_told_stands_around_the_circle() -> None:
     shown = texts(made.svg)
     assert (shown.count("D"), shown.count("B")) == (2, 1)
     assert "around the circle: the query" in shown
-    assert "The query told DDB." in made.description
+    assert "The query had DDB." in made.description
 
 
 def test_a_scene_of_a_cell() -> None:

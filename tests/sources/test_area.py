@@ -80,7 +80,7 @@ def test_a_box_may_cross_180_degrees(
         ("190,48,-170,49", "across 180 degrees"),
         ("2.3,48.9,2.4,48.8", "south below north"),
         ("600000,6800000,600100,6800100", "in degrees"),
-        ("2.3,48.8,2.3,48.9", "is no area"),
+        ("2.3,48.8,2.3,48.9", "is not an area"),
         ("Helsinki", "neither a bounding box nor a file"),
         ("nan,1,2,3", "neither a bounding box nor a file"),
     ],
@@ -133,7 +133,7 @@ def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
     [
         (shapely.Point(3, 43), "holds Point"),
         (shapely.LineString([(3, 43), (4, 43)]), "holds LineString"),
-        (None, "holds nothing"),
+        (None, "contains nothing"),
         (shapely.Polygon([(0, 0), (1, 1), (0, 0)]), "encloses no area"),
     ],
 )

@@ -117,5 +117,5 @@ def test_of_what_is_no_number_nothing_is_known() -> None:
     "text", [">=x", "=>0", "=0", "!=no", "≥0", ">=0 or <", "<unknown>", "> =1"]
 )
 def test_a_comparison_that_is_none(text: str) -> None:
-    with refused(CatalogError, "is no comparison", "'>=0 or none'", "'/"):
+    with refused(CatalogError, "is not a comparison", "'>=0 or none'", "'/"):
         Condition.parse([text])

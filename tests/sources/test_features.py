@@ -153,7 +153,7 @@ def test_files_without_tags_are_no_files_of_openstreetmap(tmp_path: Path) -> Non
         find_files(SPECS, [folder])
     damaged = tmp_path / "damaged.parquet"
     damaged.write_text("PAR1")
-    with refused(SourceError, "damaged.parquet", "get it again"):
+    with refused(SourceError, "damaged.parquet", "download it again"):
         find_files(SPECS, [damaged])
 
 

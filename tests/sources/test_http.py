@@ -382,7 +382,7 @@ def test_what_the_caller_does_not_want_is_not_kept(server: Server, cache: Cache,
     assert checks.call_count == 2
 
 
-NO_ADDRESSES = {"http://127.0.0.1:port/x": "/x cannot be asked for"} | dict.fromkeys(
+NO_ADDRESSES = {"http://127.0.0.1:port/x": "/x cannot be requested"} | dict.fromkeys(
     ("ftp://a.example/x", "file:///a", "a.example", "https://a:b@c.example/", "http://[::1", ""),
     "is not an address",
 )

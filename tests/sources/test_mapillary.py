@@ -137,7 +137,7 @@ def test_a_full_box_is_asked_for_in_quarters(
 def test_a_refused_token_is_not_told(server: Server, cache: Cache) -> None:
     server.on("/map_features", Service([]))
     spec = HttpSpec(attempts=1, secret=Secret("MLY|1|other"))
-    words = ("401", "Invalid token OAuth (token)", "access token still holds")
+    words = ("401", "Invalid token OAuth (token)", "access token is still valid")
     with refused(HttpError, *words):
         fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
     assert not any("other" in text for text in texts(cache.folder))

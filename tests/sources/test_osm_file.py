@@ -543,7 +543,7 @@ def test_a_file_that_is_cut_or_of_another_kind_is_refused(
 ) -> None:
     path = tmp_path / f"city{suffix}"
     path.write_bytes(big[kind][: int(part * len(big[kind]))])
-    with refused(SourceError, str(path), "get it again"):
+    with refused(SourceError, str(path), "download it again"):
         read_layers(path, [TREES])
 
 

@@ -382,8 +382,8 @@ def test_an_incomplete_element_is_counted(
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        *((bad, "is not what Overpass servers send") for bad in (b"", b"\xff\xfe", b"null")),
-        (b"[" * 100_000, "is not what Overpass servers send"),
+        *((bad, "is not JSON as Overpass servers send it") for bad in (b"", b"\xff\xfe", b"null")),
+        (b"[" * 100_000, "is not JSON as Overpass servers send it"),
         (sent(BENCHES, TIMED_OUT), "is incomplete (runtime error: Query timed out"),
         (None, "cannot be read (No such file"),
     ],

@@ -184,7 +184,7 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
         ("s3://maps?zone=1", CatalogError, ("'zone'", "region=REGION")),
         ("s3:///maps", CatalogError, ("no bucket",)),
         ("nowhere", SourceError, ("nowhere", "cannot be listed", "check the address")),
-        ("empty", SourceError, ("holds no files of base/land", "endpoints")),
+        ("empty", SourceError, ("contains no files of base/land", "endpoints")),
     ],
 )
 def test_a_store_that_is_none_is_refused(

@@ -124,8 +124,8 @@ def test_an_interrupted_run_goes_on_where_it_ended(service: StandIn, fetched: Fe
     ("fault", "words"),
     [
         ({"circles": True}, ["sends the same page again after 2 rows"]),
-        ({"surplus": 1}, ["sends 5 rows where it tells of 6"]),
-        ({"surplus": -2}, ["sends 4 rows where it tells of 3"]),
+        ({"surplus": 1}, ["sends 5 rows where it announced 6"]),
+        ({"surplus": -2}, ["sends 4 rows where it announced 3"]),
     ],
 )
 def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(

@@ -218,7 +218,7 @@ def test_corrupt_records_are_counted(fountains: Path, engine: str) -> None:
 )
 def test_useless_shapefile(fountains: Path, suffix: str, message: str) -> None:
     cut(fountains.with_suffix(suffix), 50)
-    with refused(SourceError, message, "get it again"):
+    with refused(SourceError, message, "download it again"):
         read(fountains)
 
 
@@ -387,7 +387,7 @@ def test_other_truncated_files(suffix: str, tmp_path: Path) -> None:
         assert (rows, len(layer.errors)) == (2000, 10)
         assert 0 < kept < 2000
     else:
-        with refused(SourceError, f"{path.name} cannot be read (", "get it again"):
+        with refused(SourceError, f"{path.name} cannot be read (", "download it again"):
             read(path)
 
 
@@ -663,7 +663,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         (tmp_path / "none.shp", "none.shp does not exist; give a vector file"),
         (tmp_path, "is a folder"),
         (text, "readme.txt is not a vector file; give one of .csv"),
-        (pack(tmp_path / "a.zip", text), "holds no vector file, only readme.txt; one of .csv"),
+        (pack(tmp_path / "a.zip", text), "contains no vector file, only readme.txt; one of .csv"),
         (pack(tmp_path / "b.zip"), "only nothing"),
         (empty, "empty.gpkg"),
     ):
@@ -684,14 +684,14 @@ def test_content_that_belies_its_name(suffix: str, text: str, tmp_path: Path) ->
 def test_geojson_that_only_gdal_takes_for_json(damage: bytes, tmp_path: Path) -> None:
     path = write(frame([(0, 0)]), tmp_path, "geojson")
     path.write_bytes(path.read_bytes().rstrip().removesuffix(b"}") + b', "a": ' + damage)
-    with refused(SourceError, path.name, "get it again"):
+    with refused(SourceError, path.name, "download it again"):
         read_layer(path, spec_of())
 
 
 def test_geopackage_with_names_that_are_no_text(tmp_path: Path) -> None:
     path = write(frame([(0, 0)]), tmp_path, "gpkg")
     path.write_bytes(path.read_bytes().replace(b"CREATE TRIGGER", b"CREATE T\xffIGGER"))
-    with refused(SourceError, f"{path.name} cannot be read (", "get it again"):
+    with refused(SourceError, f"{path.name} cannot be read (", "download it again"):
         read_layer(path, spec_of())
 
 

@@ -113,7 +113,7 @@ COMPARISONS = (
         title="Fusion of types and angles",
         text=(
             "Half of the edit distance of the types and half of a distance of the angles. The "
-            f"paper's text tells 0.92 and 0.93 without distortion. Best of {MANY} candidates."
+            "paper's text reports 0.92 and 0.93 without distortion. Best of {MANY} candidates."
         ),
         subject="Fusion",
         labels={**FUSION_LABELS, **EDIT_LABELS},
@@ -149,7 +149,7 @@ COMPARISONS = (
         title="Fusion in two stages",
         text=(
             "The edit distance of the types keeps so many per cent of the cells, and the fusion "
-            "ranks these. 100 % is the fusion. The first candidate alone counts. The paper finds "
+            "ranks these. 100 % is the fusion. Only the first candidate counts. The paper finds "
             "the errors of up to 10 % almost those of 100 %, and the recall lower."
         ),
         subject="Two stages",

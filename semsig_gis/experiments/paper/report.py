@@ -303,7 +303,7 @@ def _level_section(results: Reproduction) -> Section:
         "levels",
         "The recommended method: edit + edit, 5 %",
         (
-            "The first candidate alone counts. For medium the paper prints figures. Of the "
+            "Only the first candidate counts. For medium the paper prints figures. Of the "
             "levels together its text says that small errors range from 0.25 to 0.70, and "
             "recalls of top ranks from 0.50 to more than 0.90, without saying of which level, "
             "error and rank. The highest may be of light distortion or of none; both have it."
@@ -347,7 +347,7 @@ def _alone_section(results: Reproduction) -> Section:
         "alone",
         "Unambiguous queries",
         "The same, of the queries whose cell shares its types with no other cell before "
-        "the distortion. The paper shows these as plots alone.",
+        "the distortion. The paper shows these only as plots.",
         numbers=numbers,
         plots=_plots("alone", "unambiguous queries", cases, {}, alone=True),
     )
@@ -481,7 +481,7 @@ def _likelihood_section(results: Reproduction) -> Section:
         "likelihood",
         "The likelihood method",
         "Not in the paper. A model of how detectors fail takes the place of the distances; "
-        "it is not told the level of the distortion. Beside it, the method that the paper "
+        "it does not know the level of the distortion. Beside it, the method that the paper "
         f"recommends. {len(case.queries):,} queries, the first candidate alone.",
         numbers=numbers,
         plots=(

@@ -2,7 +2,7 @@ semsig.cellFacts.change = (city, cell) => {
   const kind = city.grid.kinds[city.data.kind[cell] - 1];
   const [before, after] = ["before", "now"].map((part) => city.signature(part, cell));
   const title = {same: "A cell that sees what it saw", changed: "A cell that sees something else",
-    appeared: "A new cell: it saw nothing", vanished: "A cell that sees nothing any more"}[kind];
+    appeared: "A new cell: it saw nothing", vanished: "A cell that no longer sees anything"}[kind];
   if (kind === "same") return {title, rows: [["It sees", before]]};
   const count = {};
   for (const symbol of after[0]) count[symbol] = (count[symbol] || 0) + 1;

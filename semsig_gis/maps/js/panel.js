@@ -15,7 +15,7 @@ semsig.panel = (map) => {
   const container = map.getContainer();
   const panel = L.DomUtil.create("section", "semsig-panel", container);
   for (const [name, value] of Object.entries(
-    {role: "region", "aria-label": "What is known of this place", "aria-live": "polite",
+    {role: "region", "aria-label": "About this place", "aria-live": "polite",
       tabindex: "-1"})) panel.setAttribute(name, value);
   L.DomEvent.disableClickPropagation(panel);
   // Leaflet asks what is around a button, which may be gone by then.

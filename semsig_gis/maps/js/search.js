@@ -205,7 +205,7 @@ semsig.search = (map, area) => {
     L.DomEvent.preventDefault(event);
     if (list.hidden) look();
     if (offers.length) take(offers[Math.max(active, 0)]);
-    else if (input.value.trim()) tell("Nothing on this map is called so, or lies there.");
+    else if (input.value.trim()) tell("Nothing on this map has that name, number or place.");
   });
   L.DomEvent.disableClickPropagation(box);
   L.DomEvent.disableScrollPropagation(box);

@@ -222,7 +222,7 @@ def _yolo_names(file: Path, names: Path | None) -> dict[int, str]:
     beside = [folder / name for folder in (file.parent, file.parent.parent) for name in NAME_FILES]
     listed = names or next((path for path in beside if path.is_file()), None)
     if listed is None:
-        msg = f"the classes of {file} have no names; give its data.yaml or classes.txt, too."
+        msg = f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
         raise InputError(msg)
     text = _text(listed)
     if listed.suffix.lower() not in {".yaml", ".yml"}:

@@ -70,7 +70,9 @@ def _picture(image: dict[str, Any], source: str) -> Picture:
         corners, shares = _corners(item["geometry"], where)
         if not shares:
             if size is None:
-                msg = f"{where} is in pixels of a picture of unknown size; ask for its width, too."
+                msg = (
+                    f"{where} is in pixels of a picture of unknown size; request its width as well."
+                )
                 raise InputError(msg)
             left, top, right, bottom = corners
             corners = left / size[0], top / size[1], right / size[0], bottom / size[1]

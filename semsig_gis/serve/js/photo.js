@@ -79,7 +79,7 @@ semsig.photo = (session, photo) => {
     semsig.images.set(photo, image);
     stage.append(image);
   } else {
-    semsig.text(stage, "p", `A session does not hold its photos: drop ${photo.name} here to see `
+    semsig.text(stage, "p", `A session does not contain its photos: drop ${photo.name} here to see `
       + "it again. The marks count all the same.");
   }
   const place = (element, [left, top, right, bottom]) => Object.assign(element.style, {

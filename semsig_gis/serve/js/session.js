@@ -138,7 +138,7 @@ semsig.Session = class extends EventTarget {
       (scene) => Array.isArray(scene?.marks || scene?.compass));
     if (saved?.semsig !== "session" || saved.version !== 1
       || !Array.isArray(saved.views) || !saved.views.every(whole)) {
-      throw new Error("This file is no session of the workbench; open one that it saved.");
+      throw new Error("This file is not a session of the workbench; open one that it saved.");
     }
     if (saved.city?.fingerprint !== this.city.fingerprint) {
       throw new Error(`This session is about ${saved.city?.name}, and the server has `

@@ -197,12 +197,12 @@ class Client:
                 self._refuse(f"sends the same page again after {rows - len(page.rows):,} rows")
             digests.add(page.digest)
             if told is not None and rows > told:
-                self._refuse(f"sends {rows:,} rows where it tells of {told:,}")
+                self._refuse(f"sends {rows:,} rows where it announced {told:,}")
             if self.progress is not None:
                 self.progress(rows, told or 0)
             following = then(page, rows)
         if told is not None and rows < told:
-            self._refuse(f"sends {rows:,} rows where it tells of {told:,}")
+            self._refuse(f"sends {rows:,} rows where it announced {told:,}")
         return tuple(files)
 
     def _refuse(self, what: str) -> None:
