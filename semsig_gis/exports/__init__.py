@@ -304,7 +304,7 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     content = list(dict.fromkeys(names)) or (possible if many else [*default, accepted[0]][:1])
     for name in content:
         if name not in possible:
-            msg = f"{path} needs the {name}, but no {_NEEDS[name]} was given; give it as well."
+            msg = f"layer {name!r} was chosen for {path} with no {_NEEDS[name]}; give that as well."
             raise InputError(msg)
     # Identifiability is part of a database, wherever it is not asked for.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}

@@ -19,7 +19,7 @@ def test_tiles_are_updated_by_the_objects_in_their_folder(town: Path, run: Run) 
     assert {path: path.read_bytes() for path in tiles.rglob("*.*")} == before
     assert run("build", objects, "--out", town / "city.parquet")[0] == 0
     code, _, told = run("update", town / "city.parquet", "--objects", objects, "--workers", 2)
-    assert (code, "is not in tiles" in told) == (2, True)
+    assert (code, "is a single file, not tiles" in told) == (2, True)
     # What needs the objects finds them in the folder, until they are cleaned away.
     code, _, told = run("localize", tiles, "bench at 40, tree at 90")
     assert (code, "no street objects" in told) == (0, False)

@@ -82,7 +82,7 @@ def test_joined_views_come_apart_again() -> None:
         ({"ranges": [1.0, 2.0]}, "2 ranges were given for 1 objects"),
         ({"ranges": [-1.0]}, "a range is -1"),
         ({"range_errors": [9.0]}, "a range error is 9"),
-        ({"scores": np.zeros((1, 256))}, "sum to 1"),
+        ({"scores": np.zeros((1, 256))}, "add up to 1"),
         ({"photo": [1]}, "a photo that is not there"),
         ({"photos": ()}, "a view of no photo"),
     ],

@@ -308,7 +308,7 @@ def test_a_store_that_is_missing_or_of_another_database_is_told(tmp_path: Path) 
     save_database(build_database(fewer(1)), path)
     with refused(DatabaseError, "belongs to another database"):
         open_store(path)
-    with refused(InputError, "another ending"):
+    with refused(InputError, "another suffix"):
         save(tmp_path / "town.objects")
     assert names_in(tmp_path) == ["city.objects", "city.parquet"]
 

@@ -177,7 +177,7 @@ def test_what_was_read_can_be_written_and_read(photos: list[dict[str, Any]]) -> 
 REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"see": "lampe at 40"}, "the nearest is 'lamp'"),
     ({"see": "lamp at"}, "'lamp at'"),
-    ({"see": "lamp at 40, bench"}, "each its bearing"),
+    ({"see": "lamp at 40, bench"}, "neither a bearing nor an offset"),
     ({"see": "lamp at 40 soon"}, "range 'soon' cannot be read"),
     ({"see": "lamp at 40 within 0 m"}, "'within 0 m'"),
     ({"see": "lamp at 400"}, "bearing 400"),
@@ -190,11 +190,14 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"detections": {"class": "D"}}, "detections were given as {'class': 'D'}"),
     ({"detections": ["D"]}, "give a list"),
     ({"detections": [{"bearing": 5}]}, "class of a detection is None"),
-    ({"detections": [{"class": "D", "bearing": 5, "offset": 5}]}, "has no bearing, or two"),
+    (
+        {"detections": [{"class": "D", "bearing": 5, "offset": 5}]},
+        "neither a bearing nor an offset, or both",
+    ),
     ({"detections": [{"class": "D", "bearing": "east"}]}, "bearing was given as 'east'"),
-    ({"detections": [{"class": {"D": 0.7, "L": 0.4}, "bearing": 5}]}, "sum to 1 at most"),
-    ({"detections": [{"class": {"D": -0.1}, "bearing": 5}]}, "sum to 1 at most"),
-    ({"detections": [{"class": {"D": math.nan}, "bearing": 5}]}, "sum to 1 at most"),
+    ({"detections": [{"class": {"D": 0.7, "L": 0.4}, "bearing": 5}]}, "add up to at most 1"),
+    ({"detections": [{"class": {"D": -0.1}, "bearing": 5}]}, "add up to at most 1"),
+    ({"detections": [{"class": {"D": math.nan}, "bearing": 5}]}, "add up to at most 1"),
     ({"detections": [{"class": {"D": "high"}, "bearing": 5}]}, "score of 'D'"),
     ({"types": "D", "bearings": [1], "ranges": [1, 2]}, "2 ranges were given for 1 objects"),
     ({"types": "D", "bearings": [1], "ranges": [-1]}, "a range is -1"),
@@ -218,7 +221,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"types": "D", "bearings": [1], "photo": "here"}, "'here'"),
     ({"types": "D", "bearings": [1], "photo": [0, 0]}, "2 photo were given for 1 objects"),
     ({"photos": []}, "photos"),
-    ({"photos": [{"see": "lamp"}, {"see": "lamp at 5"}]}, "lack bearings"),
+    ({"photos": [{"see": "lamp"}, {"see": "lamp at 5"}]}, "have no bearing"),
 ]
 
 

@@ -345,7 +345,7 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
     folder = begin(target, RECIPE)
     publish(folder, [build(folder, database)])
     (target / "notes.txt").touch()  # beside the parts
-    with refused(InputError, "'notes.txt'", "move that elsewhere"):
+    with refused(InputError, "'notes.txt'", "move that file elsewhere"):
         begin(target, RECIPE)
     assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0)), "notes.txt"}
     (tmp_path / "city.partial").mkdir()

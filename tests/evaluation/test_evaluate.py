@@ -355,7 +355,7 @@ def test_what_is_refused(options: dict[str, Any], words: list[str]) -> None:
 
 
 def test_a_threshold_that_was_not_kept_is_refused() -> None:
-    with refused(SemsigError, "error of 12 m", "give some of 0, 5"):
+    with refused(SemsigError, "error of 12 m", "choose from 0, 5"):
         EVALUATION.cdf([10, 12])
 
 

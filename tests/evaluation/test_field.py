@@ -61,7 +61,7 @@ def test_the_radius_grows_until_enough_queries_speak() -> None:
 
 @pytest.mark.parametrize("radius", [0.0, 9.0, -1.0, math.nan, math.inf])
 def test_a_radius_that_cannot_be_is_refused(radius: float) -> None:
-    with refused(InputError, f"{radius:g} m", "10 or more"):
+    with refused(InputError, f"{radius:g} m", "10 m or more"):
         error_field(EVALUATION, CITY, radius=radius)
     with refused(InputError, "give the database that it was made with"):
         error_field(EVALUATION, CITY.select(slice(5)), radius=250.0)

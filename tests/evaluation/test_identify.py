@@ -332,7 +332,7 @@ def test_other_signatures_and_formats_are_told(city: Path, monkeypatch: pytest.M
     units = CELLS.distance_units.copy()
     units[7] ^= 1
     other = dataclasses.replace(CELLS, distance_units=units)
-    with refused(DatabaseError, "that of other signatures", "run semsig identify again"):
+    with refused(DatabaseError, "belongs to other signatures", "run semsig identify again"):
         open_identifiability(other, city)
     monkeypatch.setattr(identifiability_file, "FORMAT", identifiability_file.FORMAT + 1)
     with refused(DatabaseError, "another version of semsig"):
@@ -365,7 +365,7 @@ alike = functools.partial(find_lookalikes, COLUMNS)
         (ask, {"radius": -5.0}, ["radius is -5.0", "from 0"]),
         (ask, {"radius": math.nan}, ["radius is nan", "from 0"]),
         (check, {"queries": 0}, ["queries is 0", "from 1"]),
-        (check, {"seed": TOLD.seed}, ["that of the trials"]),
+        (check, {"seed": TOLD.seed}, ["which the trials had"]),
         (check, {"seed": -1}, ["seed is -1", "from 0"]),
         (check, {"index": LIGHT}, ["another database or noise model", "matching one"]),
         (check, {"index": ELSEWHERE}, ["another database or noise model", "matching one"]),

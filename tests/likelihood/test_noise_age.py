@@ -140,7 +140,7 @@ BENCH = {"class_name": "bench", "before": 5}
     [
         ([], "has no list of classes"),
         ({"years": 1, "classes": {}}, "has no list of classes"),
-        ({"classes": [BENCH]}, "does not say in how many years that changed; add years"),
+        ({"classes": [BENCH]}, "does not say over how many years that changed; add years"),
         ({"years": "two", "classes": [BENCH]}, "years of the drift is 'two'"),
         ({"years": 0, "classes": [BENCH]}, "is 0; give years above 0 and up to 100"),
         ({"years": 1e9, "classes": [BENCH]}, "years above 0 and up to 100"),
@@ -152,7 +152,7 @@ BENCH = {"class_name": "bench", "before": 5}
         ({"years": 1, "classes": [{**BENCH, "removed": -1}]}, "give whole numbers"),
         ({"years": 1, "classes": [{**BENCH, "removed": 6}]}, "than the 5 there were before"),
         ({"years": 1, "classes": [{**BENCH, "moved": 1}]}, "has moved_m = None; give metres"),
-        ({"years": 1, "classes": [{**BENCH, "before": 0}]}, "has no objects before"),
+        ({"years": 1, "classes": [{**BENCH, "before": 0}]}, "has no objects from before"),
     ],
 )
 def test_what_is_no_drift_is_refused(tmp_path: Path, values: object, fault: str) -> None:

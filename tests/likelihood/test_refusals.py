@@ -65,7 +65,7 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: rerank(INDEX, ONE, CellScores(loglik=FLAT), count=0), "0 cells", "from 1"),
     (lambda: align_cells(DATABASE, TYPES, NOISE, np.arange(2)), "no bearings", "give them"),
     (lambda: explain_cell(TYPES, 0, NOISE, database=DATABASE), "no bearings", "give them"),
-    (lambda: locate(INDEX, ONE, refined=True), "between the viewpoints", "give the store"),
+    (lambda: locate(INDEX, ONE, refined=True), "between the viewpoints", "object store"),
     (lambda: locate(INDEX, TYPES, refined=True, store=STORE), "no bearings", "give them"),
     (lambda: locate(INDEX, TYPES, explained=1), "no bearings", "give them"),
     (lambda: locate(INDEX, ONE, top=0), "0 candidates", "a whole number from 1"),
@@ -121,7 +121,7 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: learn_noise([ELSEWHERE], DATABASE), "none of the 1", "EPSG:2154"),
     (lambda: learn_noise([ELSEWHERE], OBJECTS), "none of the 1", "EPSG:2154"),
     (lambda: learn_noise([UNSEEN] * 2, DATABASE), "2 samples", "0 detections"),
-    (lambda: learn_noise([UNSEEN], OBJECTS), "its cell alone", "x and y"),
+    (lambda: learn_noise([UNSEEN], OBJECTS), "only its cell", "x and y"),
     (lambda: learn_noise([UNSEEN], DATABASE, position_sigma=math.nan), "nan m", "0 or more"),
 ]
 

@@ -92,5 +92,5 @@ def test_recall_rounds_the_number_kept_down() -> None:
 
 @pytest.mark.parametrize("percent", [0, -1, 100.5, math.nan])
 def test_a_percentage_out_of_range_is_refused(percent: float) -> None:
-    with pytest.raises(InputError, match="percentage above 0, at most 100"):
+    with pytest.raises(InputError, match="percentage above 0 and at most 100"):
         expected_recall([1], [1], cells=10, percent=percent)

@@ -196,8 +196,8 @@ def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: l
     ("kind", "text", "words"),
     [
         (UnknownNameError, "meduim", ["'meduim'", "nearest is 'medium'"]),
-        (UnknownNameError, "medium,,view:90", ["''", "no distortion"]),
-        (UnknownNameError, "medium:7", ["'7'", "means nothing", "of medium are occurrences"]),
+        (UnknownNameError, "medium,,view:90", ["''", "not a distortion"]),
+        (UnknownNameError, "medium:7", ["'7'", "is not a setting", "of medium are occurrences"]),
         (UnknownNameError, "view:90:degree=3", ["'degree'", "nearest is 'degrees'"]),
         (UnknownNameError, "detector:mime", ["'mime'", "nearest is 'mine'"]),
         (UnknownNameError, "missing:bnech", ["'bnech'", "nearest is 'bench'"]),

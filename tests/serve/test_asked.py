@@ -140,13 +140,16 @@ def test_a_panorama_is_known_by_its_form(page: Page) -> None:
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        (b"just a text", "no picture"),
-        (b"", "no picture"),
-        (b"<svg xmlns='http://www.w3.org/2000/svg'><script>alert(1)</script></svg>", "no picture"),
+        (b"just a text", "cannot be read as a picture"),
+        (b"", "cannot be read as a picture"),
+        (
+            b"<svg xmlns='http://www.w3.org/2000/svg'><script>alert(1)</script></svg>",
+            "cannot be read as a picture",
+        ),
         (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic" + bytes(100), "HEIC"),
         (bomb(), "pixels"),
-        (picture()[:-400], "no picture"),
-        (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n", "no picture"),
+        (picture()[:-400], "cannot be read as a picture"),
+        (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n", "cannot be read as a picture"),
     ],
     ids=["text", "nothing", "svg", "heic", "bomb", "cut", "postscript"],
 )

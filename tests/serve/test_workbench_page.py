@@ -421,9 +421,9 @@ def test_a_file_that_is_no_session_of_this_city_is_refused(
 ) -> None:
     session = shown.ask("return semsig.session.saved()")
     changes: list[tuple[dict[str, Any] | None, str]] = [
-        (None, "no session"),
-        ({"version": 2}, "no session"),
-        ({"views": [{"photos": [{}]}]}, "no session"),
+        (None, "not a session"),
+        ({"version": 2}, "not a session"),
+        ({"views": [{"photos": [{}]}]}, "not a session"),
         ({"city": {"name": "elsewhere", "fingerprint": "0"}}, "elsewhere"),
     ]
     for number, (change, word) in enumerate(changes):

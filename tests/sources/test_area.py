@@ -133,7 +133,7 @@ def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
     [
         (shapely.Point(3, 43), "holds Point"),
         (shapely.LineString([(3, 43), (4, 43)]), "holds LineString"),
-        (None, "contains nothing"),
+        (None, "holds nothing"),
         (shapely.Polygon([(0, 0), (1, 1), (0, 0)]), "encloses no area"),
     ],
 )

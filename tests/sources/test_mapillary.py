@@ -158,7 +158,7 @@ def test_a_token_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch) 
     with refused(InputError, "MAPILLARY_ACCESS_TOKEN", "is not set"):
         Secret.of_environment("MAPILLARY_ACCESS_TOKEN")
     monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", " MLY|1\n2 ")
-    with pytest.raises(InputError, match=r"^[^|]*MAPILLARY_ACCESS_TOKEN holds blanks[^|]*$"):
+    with pytest.raises(InputError, match=r"^[^|]*MAPILLARY_ACCESS_TOKEN contains blanks[^|]*$"):
         Secret.of_environment("MAPILLARY_ACCESS_TOKEN")
     monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", f"{TOKEN}\n")
     assert Secret.of_environment("MAPILLARY_ACCESS_TOKEN") == Secret(TOKEN)
@@ -176,5 +176,5 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
     for content in ('{"data": [{"id": 1}]}', "[]", '{"features": [1]}', "x"):
         path.write_text(content, "utf-8")
-        with refused(SourceError, str(path), "not what Mapillary sends"):
+        with refused(SourceError, str(path), "not an answer of Mapillary"):
             read_layers(path, CATALOG.layers)

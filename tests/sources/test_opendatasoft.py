@@ -363,7 +363,7 @@ def test_an_old_geojson_file_may_state_its_crs(
             WHOLE[:4] + bytes(len(WHOLE) // 3) + WHOLE[4 + len(WHOLE) // 3 :],
             "whole Parquet",
         ),
-        ("a.png", b"\x89PNG\r\n\x1a\n\0\0", "not a text"),
+        ("a.png", b"\x89PNG\r\n\x1a\n\0\0", "unknown encoding"),
         ("a.gpkg", b"SQLite", "a.gpkg"),
     ],
 )

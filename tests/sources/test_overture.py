@@ -199,7 +199,7 @@ def test_a_store_that_is_none_is_refused(
 def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.parquet"
     pq.write_table(pa.table({"id": ["a"], "amenity": ["bench"]}), path)
-    with refused(SourceError, str(path), "no file of Overture Maps", "id, amenity"):
+    with refused(SourceError, str(path), "not a file of Overture Maps", "id, amenity"):
         read_layers(path, SPECS)
     path.write_bytes(b"PAR1")
     with refused(SourceError, str(path), "cannot be read as GeoParquet"):

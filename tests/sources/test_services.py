@@ -306,7 +306,10 @@ def test_axes_that_a_wfs_exchanges_are_exchanged_back(server: Server, fetched: F
 def test_what_is_no_wfs_is_told(server: Server, fetched: Fetch) -> None:
     service = Wfs(server)
     for answer, words in [
-        (Answer(b"<WMS_Capabilities/>"), ["no Web Feature Service", "(it sent WMS_Capabilities)"]),
+        (
+            Answer(b"<WMS_Capabilities/>"),
+            ["not a Web Feature Service", "(it sent WMS_Capabilities)"],
+        ),
         (Answer(b"<WFS_Capabilities version='1.1.0'/>"), ["(it sent WFS_Capabilities 1.1.0)"]),
         (Answer(b"<!DOCTYPE html><html></html>"), ["a web page", "XML"]),
         (Answer(b"<r version='2'><ServiceException>No.</ServiceException></r>"), ["error No to"]),
@@ -330,7 +333,7 @@ def test_ogc_features_filters_where_it_says_so(server: Server, fetched: Fetch) -
 @pytest.mark.parametrize(
     ("change", "layer", "error", "words"),
     [
-        ({"filters": ""}, {"server_where": "KIND = 'lamp'"}, CatalogError, ["takes no filter"]),
+        ({"filters": ""}, {"server_where": "KIND = 'lamp'"}, CatalogError, ["accepts no filter"]),
         ({"conforms": ()}, {}, SourceError, ["OGC API - Features", "address", "/ogc"]),
         ({"next_host": "http://elsewhere.example/x"}, {}, SourceError, ["elsewhere", "endpoints"]),
     ],

@@ -618,7 +618,7 @@ def test_layers_of_a_container(container: Path) -> None:
     layers = {layer.name: layer.rows for layer in list_layers(container)}
     assert layers == {"trees": 1, "lights": 2}
     assert read(container, layer="lights").counts.read == 2
-    with refused(SourceError, "holds 2 layers (trees, lights); name the one"):
+    with refused(SourceError, "holds 2 layers (trees, lights); give the name of one"):
         read(container)
     with refused(UnknownNameError, "no layer 'light'; the nearest is 'lights'"):
         read(container, layer="light")
