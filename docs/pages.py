@@ -36,7 +36,7 @@ NAMED = {
     '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
 }
-COLOURS = 64  # enough for figures and maps
+COLOURS = 48  # enough for figures and maps
 # What pictures of matplotlib and the style of notebooks have without showing it.
 UNSEEN = {
     ".svg": re.compile(
@@ -66,10 +66,17 @@ The examples begin from `demo_objects` and `demo_database`: the street objects o
 def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages when the build begins, and the maps of the gallery when it ends."""
     app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir)))
+    app.connect("builder-inited", lambda app: _forget(Path(app.outdir)))
     app.connect("builder-inited", lambda app: write_drawings(Path(app.srcdir, "drawn")))
     app.connect("build-finished", _finish)
     app.connect("html-page-context", _lighten)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _forget(folder: Path) -> None:
+    """Remove the style of notebooks that a build before made light, which is copied again."""
+    for path in folder.glob("_static/mystnb*.css"):
+        path.unlink()
 
 
 def _finish(app: Sphinx, error: Exception | None) -> None:
