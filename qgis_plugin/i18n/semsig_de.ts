@@ -684,8 +684,8 @@
         <translation>Die Tabelle der Straßenobjekte, die geschrieben wird. Eine temporäre Datei geht verloren, wenn QGIS beendet wird.</translation>
     </message>
     <message>
-        <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1.2 GB; nothing else on this computer is changed.</source>
-        <translation>Die Werkzeuge brauchen eine Engine: das Programm semsig in einer eigenen Python-Umgebung im Ordner Ihres QGIS-Profils. Sie belegt etwa 1,2 GB; sonst wird auf diesem Computer nichts geändert.</translation>
+        <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1 GB; nothing else on this computer is changed.</source>
+        <translation>Die Werkzeuge brauchen eine Engine: das Programm semsig in einer eigenen Python-Umgebung im Ordner Ihres QGIS-Profils. Sie belegt etwa 1 GB; sonst wird auf diesem Computer nichts geändert.</translation>
     </message>
     <message>
         <source>This is what is seen from there; change it, or find the place.</source>

@@ -684,8 +684,8 @@
         <translation>La table d’objets de rue à écrire. Un fichier temporaire est perdu à la fermeture de QGIS.</translation>
     </message>
     <message>
-        <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1.2 GB; nothing else on this computer is changed.</source>
-        <translation>Les outils ont besoin d’un moteur : le programme semsig dans son propre environnement Python, dans le dossier de votre profil QGIS. Il occupe environ 1,2 Go ; rien d’autre n’est modifié sur cet ordinateur.</translation>
+        <source>The tools need an engine: the program semsig in a Python environment of its own, in the folder of your QGIS profile. It takes about 1 GB; nothing else on this computer is changed.</source>
+        <translation>Les outils ont besoin d’un moteur : le programme semsig dans son propre environnement Python, dans le dossier de votre profil QGIS. Il occupe environ 1 Go ; rien d’autre n’est modifié sur cet ordinateur.</translation>
     </message>
     <message>
         <source>This is what is seen from there; change it, or find the place.</source>

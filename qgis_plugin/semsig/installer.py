@@ -134,7 +134,7 @@ class EngineDialog(QDialog):
         if not engine.command:
             text = tr(
                 "The tools need an engine: the program semsig in a Python environment of its own, "
-                "in the folder of your QGIS profile. It takes about 1.2 GB; nothing else on this "
+                "in the folder of your QGIS profile. It takes about 1 GB; nothing else on this "
                 "computer is changed."
             )
         elif engine.current:
