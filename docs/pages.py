@@ -36,11 +36,16 @@ NAMED = {
     '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
 }
-COLOURS = 48  # enough for figures and maps
+COLOURS = 64  # enough for figures and maps
 # What pictures of matplotlib and the style of notebooks have without showing it.
 UNSEEN = {
     ".svg": re.compile(
-        r'<path d="M [\d.]+ [\d.]+ \n"[^>]*/>|\n *(?=<)|(?<=[\d][.]\d\d)\d+(?=[ "])'
+        r"""<path[ ]d="M[ ][\d.]+[ ][\d.]+[ ]\n"[^>]*/>  # a line of one point
+        | \n[ ]*(?=<)
+        | (?<=\d[.]\d\d)\d+(?=[ "])
+        | (?<=[;:])[ ](?=[^<>"]*")
+        | [ ]id="(?:line2d|patch|text)_\d+\"""",
+        re.VERBOSE,
     ),
     ".css": re.compile(r"^div\.highlight \.-Color.*?\}\n", re.MULTILINE | re.DOTALL),
 }
@@ -97,7 +102,8 @@ def _finish(app: Sphinx, error: Exception | None) -> None:
     for path in Path(app.outdir, "_images").glob("*.png"):
         with Image.open(path) as picture:
             if picture.mode != "P":
-                picture.convert("RGB").quantize(COLOURS).save(path, optimize=True)
+                few = picture.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+                few.save(path, optimize=True)
     if error is None and app.config.nb_execution_mode != "off":
         write_gallery(Path(app.outdir, "gallery"))
 
