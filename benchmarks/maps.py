@@ -39,7 +39,7 @@ _CITIES = {"full": PARIS_LIKE, "small": CitySpec(size=300.0)}
 _QUERIES = {"full": 20_000, "small": 50}
 _ZOOMS = {"full": (1, 1, 1, -1, -1, -1), "small": (1,)}
 _MOST_MB, _MOST_SECONDS, _MOST_MS = 8.0, 5.0, 100.0
-_REPEATS = 3
+_REPEATS = {"full": 3, "small": 1}
 _SEED = 20
 _GONE = 0.02  # share of the objects that a year takes away
 
@@ -128,7 +128,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
             for what, drawn in _maps(_CITIES[size], _QUERIES[size]):
                 page = Path(folder, "map.html")
                 save_map(drawn, page, self_contained=True)
-                yield from _measured(browser, page, what)
+                yield from _measured(browser, page, what, _REPEATS[size])
             yield _filtering(browser, what)
             yield _smoothness(browser, what, _ZOOMS[size])
         finally:
@@ -153,10 +153,10 @@ def _maps(city: CitySpec, queries: int) -> Iterator[tuple[str, folium.Map]]:
     yield f"{queries:,} queries among {cells}", evaluation_map(evaluation, database)
 
 
-def _measured(browser: Chrome, page: Path, what: str) -> Iterator[Comparison]:
-    """Open a map several times."""
+def _measured(browser: Chrome, page: Path, what: str, repeats: int) -> Iterator[Comparison]:
+    """Open a map some times."""
     seconds = []
-    for _ in range(_REPEATS):
+    for _ in range(repeats):
         browser.get("about:blank")
         browser.get(page.as_uri())
         seconds.append(browser.execute_async_script(DRAWN))
