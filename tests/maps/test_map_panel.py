@@ -75,7 +75,7 @@ def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int
     with still(page, *screen):
         page.open(ambiguity_map(CITY))
         page.ask("map.setView(arguments[0], 18, {animate: false})", PLACES.mean(axis=0).tolist())
-        for _ in range(20):
+        for _ in range(40):
             some = rng.permutation(len(CITY))[:60]
             where = page.ask(ON_TOP, PLACES[some].tolist())
             at = next(at for at, (_, _, on_top) in enumerate(where) if on_top)
