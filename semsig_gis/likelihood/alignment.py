@@ -22,7 +22,7 @@ _WIDE = 45.0  # deviation in degrees from which on the tails meet behind the obs
 _LARGE = 1e200  # from which on a product becomes a logarithm
 _SURE = 6.0  # from which on the error function is one
 # How often messages are sent, and the relative change at which they are taken for settled.
-_ROUNDS, _SETTLED = 30, 3e-2
+_ROUNDS, _SETTLED = 30, 1e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
 
 

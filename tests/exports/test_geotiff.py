@@ -149,7 +149,7 @@ def test_what_is_not_of_the_field_is_refused(tmp_path: Path) -> None:
     database, _ = small_city()
     with refused(InputError, "no evaluation"):
         export_database(database, tmp_path / "a.tif", layers="field")
-    with refused(InputError, "no smoothing"):
+    with refused(InputError, "not the smoothing"):
         export_database(database, tmp_path / "a.tif", smooth=250.0)
 
 
