@@ -217,8 +217,7 @@ def degree_bounds(crs: CRS, bounds: Bounds) -> Bounds:
 
     West is greater than east where the box crosses 180 degrees.
     """
-    sides = to_degrees(crs).transform_bounds(*bounds, densify_pts=EDGE_POINTS)
-    west, south, east, north = sides
+    west, south, east, north = to_degrees(crs).transform_bounds(*bounds, densify_pts=EDGE_POINTS)
     return west, south, east, north
 
 

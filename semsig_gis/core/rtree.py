@@ -28,16 +28,12 @@ class ObjectIndex:
     """An R-tree over points in metres, shape (n, 2).
 
     InputError if there is no point, or one is not finite. The tree is packed in one go and asked
-    for many boxes at once. As a tree belongs to its thread, each that asks has its own.
+    for many boxes at once. As a tree belongs to its thread, each makes its own when it asks.
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
         self._xy = checked_points(xy)
         self._own = threading.local()
-        self._own.tree = self._packed()
-
-    def _packed(self) -> rtree_index.Index:
-        return rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
 
     def __reduce__(self) -> str | tuple[object, ...]:  # noqa: D105
         return (type(self), (self._xy,))
@@ -54,7 +50,7 @@ class ObjectIndex:
         side = reach / BLOCKS
         corners, block = np.unique(np.floor(places / side) * side, axis=0, return_inverse=True)
         if not hasattr(self._own, "tree"):
-            self._own.tree = self._packed()
+            self._own.tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
         found, counts = self._own.tree.intersection_v(corners - reach, corners + (reach + side))
         sizes = counts.astype(np.int64)
         point = found[consecutive((np.cumsum(sizes) - sizes)[block], sizes[block])]

@@ -70,24 +70,27 @@ def work_alone() -> None:
     _here.sharing = True
 
 
-def each_in_order(work: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
+def each_in_order(
+    work: Callable[[_Item], _Result], items: Iterable[_Item], *, threads: int | None = None
+) -> Iterator[_Result]:
     """Yield what `work` returns for each of the items, which it is called with side by side.
 
-    Each core has an item of its own, and only a few are taken before what they give is. The first
-    one is worked on by all, so that what is kept for later ones is made once. An error of the items
-    is raised when all before have been yielded.
+    Each thread, one a core by default, has an item of its own, and only a few are taken before what
+    they give is. The first one is worked on by all, so that what is kept for later ones is made
+    once. An error of the items is raised when all before have been yielded.
     """
     rest = iter(items)
     for first in rest:
         yield work(first)
         break
     waiting: deque[Future[_Result]] = deque()
-    pool = ThreadPoolExecutor(cores(), initializer=work_alone)
+    threads = cores() if threads is None else threads
+    pool = ThreadPoolExecutor(threads, initializer=work_alone)
     try:
         try:
             for item in rest:
                 waiting.append(pool.submit(work, item))
-                if len(waiting) > 2 * cores():
+                if len(waiting) > 2 * threads:
                     yield waiting.popleft().result()
         except Exception:
             while waiting:

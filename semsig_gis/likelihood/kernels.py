@@ -119,10 +119,10 @@ def scan(  # noqa: PLR0917
     """Fill `totals` and `products` of the cells ``part[0]`` to ``part[1] - 1``.
 
     The score of a cell is its total and the logarithm of its product: the sum over the detections
-    of a photo of the logarithm of a sum over the objects. An object has
-    a class row in `kinds` and a level of its distance and a bin of its bearing in `places`. By the
-    group of its class (`group_of`) and its place, `rows` are those of `profile_rows`, and `masses`
-    those of `mass_rows`, without a level where all round was seen. `named`, shape (lengths, k,
+    of a photo of the logarithm of a sum over the objects. An object has a class row in `kinds` and
+    a level of its distance and a bin of its bearing in `places`. By the group of its class
+    (`group_of`) and its place, `rows` are those of `profile_rows`, and `masses` those of
+    `mass_rows`, without a level where all round was seen. `named`, shape (lengths, k,
     blocks * LANES), is the chance of a name over the density of such false detections, `disc` the
     factor of their range. By length and class, `detected` is the chance of detection of what is
     near; by class and level, `seen` is what is left of it, and `left` what has left the range.

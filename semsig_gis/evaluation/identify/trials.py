@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.threads import work_alone
+from semsig_gis.core.threads import each_in_order
 from semsig_gis.core.view import FULL_VIEW, View
 from semsig_gis.evaluation.identify.columns import symbol_columns
 from semsig_gis.evaluation.identify.lookalikes import city_extent
@@ -127,7 +126,8 @@ def try_cells(
     if columns is not None and left_out is None:
         leaning[np.flatnonzero(columns.counts[numbers, :, cells].any(axis=1))[:LEANS]] = True
 
-    def ask(trial: int, query: Signature) -> tuple[float, ...]:
+    def ask(item: tuple[int, Signature]) -> tuple[float, ...]:
+        trial, query = item
         cell, look = int(cells[trial]), int(numbers[trial])
         if not len(query):
             return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
@@ -142,11 +142,10 @@ def try_cells(
         return _outcome(index, places, cell, query, radius, scores, own)
 
     rows: list[tuple[float, ...]] = []
-    with ThreadPoolExecutor(threads, initializer=work_alone) as pool:
-        for row in pool.map(ask, range(len(cells)), queries):
-            rows.append(row)
-            if progress is not None:
-                progress(len(rows), len(cells))
+    for row in each_in_order(ask, zip(range(len(cells)), queries, strict=False), threads=threads):
+        rows.append(row)
+        if progress is not None:
+            progress(len(rows), len(cells))
     itself, near, found, bits, lean = np.array(rows, dtype=np.float64).reshape(-1, 5).T
     return Trials(
         cells=np.asarray(cells),
