@@ -30,7 +30,7 @@ def export(
         typer.Option(
             help="File to write. Its suffix is the format: .gpkg (all layers, for QGIS), "
             ".parquet, .fgb, .geojson or .csv (one layer), .pmtiles (cells for web maps), "
-            ".tif (one number a cell) or .json (STAC item)."
+            ".tif (one number per cell) or .json (STAC item)."
         ),
     ],
     objects: Annotated[Path | None, typer.Option(help="Street objects to add as a layer.")] = None,

@@ -100,7 +100,7 @@ def learn(
         say(
             f"Corrected for what a map of {map_age:g} years explains: detection "
             f"{noise.detection:.3f} "
-            f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects a full turn (was "
+            f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects per full turn (was "
             f"{learnt.clutter:.3f})."
         )
     say(f"noise model: {out}")

@@ -55,7 +55,7 @@ def _installed(
         if entry.name in taken or entry.name in entries:
             other = _package(entries[entry.name]) if entry.name in entries else "semsig_gis itself"
             msg = (
-                f"{entry.name!r} of {group} is brought by {other} and by {_package(entry)}; "
+                f"{entry.name!r} of {group} is provided by {other} and by {_package(entry)}; "
                 "uninstall one of the two packages or rename its entry."
             )
             raise fault(msg)
@@ -68,8 +68,8 @@ def _installed(
         except (Exception, SystemExit) as error:  # noqa: BLE001
             cause = " ".join(str(error).split()).rstrip(".") or type(error).__name__
             warnings.warn(
-                f"{name!r} of {group}, brought by {_package(entry)}, is left out because it cannot "
-                f"be loaded ({cause}); correct or uninstall that package.",
+                f"{name!r} of {group}, provided by {_package(entry)}, is left out because it "
+                f"cannot be loaded ({cause}); correct or uninstall that package.",
                 stacklevel=3,  # the caller of the public function
             )
     return found

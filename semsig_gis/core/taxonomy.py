@@ -39,11 +39,11 @@ class ObjectClass:
     title : str
         Name to show to people.
     range_m : float, optional
-        From how far an object of the class is seen, in metres; None for the range that holds for
-        all.
+        The distance from which an object of the class is seen, in metres; None for the range of
+        all classes.
     height_m, height_sigma : float, optional
         How tall an object of the class is, from the ground to its top, and the standard deviation
-        of that, in metres; None where that tells nothing of how far it is.
+        of that, in metres; None if the height says nothing about the distance.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def check_height(height: float | None, sigma: float | None, what: str) -> None:
     if height is None or sigma is None or not 0 < sigma <= height <= MAX_HEIGHT_M:
         msg = (
             f"{what} has a height of {height} m and a height_sigma of {sigma} m; give height_m "
-            f"above 0 and up to {MAX_HEIGHT_M:.0f}, and height_sigma above 0 and at most as much."
+            f"above 0 and up to {MAX_HEIGHT_M:.0f}, and height_sigma above 0 and at most height_m."
         )
         raise CatalogError(msg)
 

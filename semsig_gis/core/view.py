@@ -89,7 +89,7 @@ class Photo:
         that overlap become one; none stands for the full turn.
     north_sigma : float, optional
         Standard deviation in degrees of its north, 0 or 0.001 to 360, infinite if not known; by
-        which all its bearings and sectors are off together. None if whoever asks says so.
+        which all its bearings and sectors are off together. None if the query sets it.
 
     Raises
     ------
@@ -142,7 +142,7 @@ class Photo:
         return replace(self, sectors=tuple((low, low + width) for low, width in start))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON: ``sectors`` and ``heading_error``, where they are told."""
+        """Return plain values for JSON: ``sectors`` and ``heading_error``, if they are given."""
         values: dict[str, Any] = {}
         if self.sectors:
             values["sectors"] = [[low, high % FULL_TURN] for low, high in self.sectors]

@@ -1,4 +1,4 @@
-"""What is seen beside the middles of cells, by the cells alone."""
+"""What is seen from places beside the centres of cells, computed only from the cells."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ CELLS_A_PART = 64  # that are worth a thread
 AROUND = tuple((aside, up) for aside in (-1, 0, 1) for up in (-1, 0, 1))
 OWN = AROUND.index((0, 0))
 FIRST_ROOM = 4096  # entries
-TINY = 1e-300  # what is at the very place lies to the north
+TINY = 1e-300  # an object at exactly the place counts as north of it
 
 
 def views_aside(
     database: SignatureDatabase, cells: NDArray[np.int64], places: NDArray[np.float64]
 ) -> Views:
-    """Return what is seen from some cells at places other than their middles, by the cells alone.
+    """Return what is seen from places beside the centres of some cells, using only the cells.
 
-    The places, shape (p, 2), are metres to the east and north of the middle and less than a cell
-    away; that of cell i and place j is view ``i * len(places) + j``. What comes into range there is
-    known from the cells on that side; where one of these is missing, what has left the range is
-    kept, at its distance.
+    The places, shape (p, 2), are metres to the east and north of the centre and less than a cell
+    away; that of cell i and place j is view ``i * len(places) + j``. Objects that come into range
+    there are taken from the neighbouring cells on that side. If one of these cells is missing,
+    objects that have left the range are kept, at their distance.
     """
     columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
     ids, around = database.cell_ids, np.full((len(cells), len(AROUND)), -1)
@@ -59,7 +59,7 @@ def views_aside(
             database.bearing_units,
             database.distance_units,
             database.taxonomy.ranges(database.spec.radius),
-            # What is nearest is not at the very place.
+            # The nearest objects are not at exactly the place.
             np.maximum(np.arange(DISTANCE_UNITS + 1), 0.5) * metre,
             np.sin(angles),
             np.cos(angles),
@@ -143,7 +143,7 @@ def _look(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
     seen from each place, and the class code, bearing in degrees and distance of all that is.
     """
     here = np.empty(len(AROUND) + 1, np.int64)  # where the entries of each cell around start
-    most = 0  # not by functions of numpy, which take their time to load
+    most = 0  # without functions of numpy, which load slowly
     for cell in range(part[0], part[1]):
         total = 0
         for row in around[cell]:
@@ -169,7 +169,7 @@ def _look(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 x[size], y[size] = metre * east[angle] + right, metre * north[angle] + above
                 kinds[size] = codes[entry]
                 reach[size] = ranges[codes[entry]] ** 2
-                # What the cell itself sees, too, is there already.
+                # What the cell itself sees as well is there already.
                 if source == OWN or x[size] ** 2 + y[size] ** 2 > reach[size]:
                     size += 1
         here[len(AROUND)] = size

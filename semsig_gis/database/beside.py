@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 INDEX = "likelihood index of an older version"
 STORE = "street objects"
 LEFT_STORE = "street objects of a build that was killed"
-LEFT = "what a run that was killed left"
-AT_WORK = "what a run is writing"
+LEFT = "files left by a run that was killed"
+AT_WORK = "files that a run is writing"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

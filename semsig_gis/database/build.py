@@ -67,8 +67,9 @@ def build_database(
     footprints : GeoDataFrame, optional
         Buildings (polygons) in any CRS; what they hide is not seen.
     streets : GeoDataFrame, optional
-        Centre lines in any CRS; a column ``half_width`` holds metres where it is there. Of a table
-        of OpenStreetMap's elements, either takes what `read_surroundings` finds in it.
+        Centre lines in any CRS, with their half widths in metres in a column ``half_width`` if
+        there is one. From a table of OpenStreetMap's elements, buildings and streets are taken as
+        `read_surroundings` finds them.
     progress : callable, optional
         Called with the number of cells done and in all.
 
@@ -239,7 +240,7 @@ def require_room(pairs: float, *, cells: int, objects: int, processes: int = 1) 
     what = f"{objects:,} objects seen from {cells:,} cells (about {pairs:,.0f} sightings)"
     advice = "make the step larger, the visibility range smaller, or build in smaller tiles"
     if pairs > MOST_PAIRS:
-        msg = f"{what} are more than the {MOST_PAIRS:,} that one file holds; {advice}."
+        msg = f"{what} are more than the {MOST_PAIRS:,} that one file can contain; {advice}."
         raise InputError(msg)
     needed = BLOCK_BYTES + CELL_BYTES * cells + PAIR_BYTES * pairs
     if processes > 1:

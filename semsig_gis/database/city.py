@@ -138,7 +138,10 @@ class City(Displayed):
         before = self._read_state or file_state(self.path)
         value = part(self.path)
         if file_state(self.path) != before:
-            msg = f"another program has written {self.path} meanwhile; run this again."
+            msg = (
+                f"another program has changed {self.path} in the meantime; run the same command "
+                "again."
+            )
             raise DatabaseError(msg)
         self._read_state = before
         return value
@@ -245,7 +248,7 @@ def _extend(
     cells = table["cell_id"].to_numpy()
     rows = np.minimum(np.searchsorted(cell_ids, cells), len(cell_ids) - 1)
     if not np.array_equal(cell_ids[rows], cells):
-        msg = f"{path} has other cells than those that were looked at; open the database again."
+        msg = f"the cells of {path} have changed since it was opened; open the database again."
         raise DatabaseError(msg)
     before = specs.get(ADDED, {})
     replaced = [name for one in before.keys() & added for name in before[one]["columns"]]

@@ -282,7 +282,7 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
     ids = np.concatenate([part.cell_ids for part in parts])
     order = np.argsort(ids, kind="stable")
     if (np.diff(ids[order]) == 0).any():
-        msg = "two of the databases hold the same cell; join databases of different cells."
+        msg = "two of the databases contain the same cell; join databases of different cells."
         raise DatabaseError(msg)
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
@@ -493,7 +493,7 @@ def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
     array = np.asarray(values)
     if array.dtype != np.uint8 or array.ndim != 1:
         msg = (
-            f"a sequence holds {array.dtype} values in {array.ndim} dimensions; give its "
+            f"a sequence contains {array.dtype} values in {array.ndim} dimensions; give its "
             "class codes or angle levels (0 to 255) as a one-dimensional uint8 array."
         )
         raise InputError(msg)

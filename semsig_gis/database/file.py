@@ -199,7 +199,7 @@ def database_of(
         and not (follows[1:] & (bearing_units[1:] < bearing_units[:-1])).any()
     )
     if not consistent:
-        msg = f"{path} is damaged (its columns do not fit each other); build the database again."
+        msg = f"{path} is damaged (its columns do not match each other); build the database again."
         raise DatabaseError(msg)
     return database
 
@@ -221,7 +221,9 @@ def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], 
 def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
     """Return a column of some type as one array without missing values."""
     if column.null_count or column.type != kind or not len(column):
-        msg = f"a column holds {len(column)} values of {column.type}, {column.null_count} missing"
+        msg = (
+            f"a column contains {len(column)} values of {column.type}, {column.null_count} missing"
+        )
         raise ValueError(msg)
     return column.combine_chunks()
 
@@ -365,7 +367,10 @@ def read_manifest(folder: str | Path) -> Manifest:
         msg = f"{path} is damaged or cannot be read; build the database again."
         raise DatabaseError(msg) from error
     if kind != PARTS_KIND:
-        msg = f"{path} is of another kind; give a folder that `semsig build --tile` wrote."
+        msg = (
+            f"{path} does not belong to a signature database; give a folder that `semsig build "
+            "--tile` wrote."
+        )
         raise DatabaseError(msg)
     return Manifest(recipe, parts)
 

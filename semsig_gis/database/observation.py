@@ -61,7 +61,7 @@ _SECTORS = re.compile(rf"{_SECTOR}(?:[\s,;]+{_SECTOR})*")
 
 
 def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> View:
-    """Make a view of what a row of a file, or a person, tells.
+    """Make a view from a row of a file, or from what a person says.
 
     Parameters
     ----------
@@ -367,7 +367,7 @@ def _range(told: object, furthest: float) -> tuple[float, float]:
     if match is None or not 0 < metres <= MAX_RANGE_M:
         msg = (
             f"range {told!r} cannot be read; give metres, 'within 12 m', 'near', 'middle' or "
-            "'far', or '?' where it is not known."
+            "'far', or '?' if it is not known."
         )
         raise InputError(msg)
     return _spread(0.0, metres) if match["within"] else (metres, math.nan)

@@ -59,12 +59,13 @@ def database_summary(
     Paper, Tables 1 and 2. An object occurs once in every cell that sees it. The covered area is the
     number n of cells times that of a cell.
 
-    Objects a km2 of a class: with `object_counts`, their number by the covered area. Without,
-    occurrences / (n pi R^2), where R is the range of the class, which occlusion makes too small.
+    Objects per km2 of a class: with `object_counts`, their number divided by the covered area.
+    Without, occurrences / (n pi R^2), where R is the range of the class, which occlusion makes too
+    small.
 
     Entropy of a class, in bits: -sum over k of p_k log2 p_k, where p_k is the share of the cells
-    that see exactly k objects of it; log2 n (``cell_bits``) would tell the cell. Entropy of groups:
-    the same of the shares of the cells in each group.
+    that see exactly k objects of it; log2 n (``cell_bits``) would identify the cell. Entropy of
+    groups: the same of the shares of the cells in each group.
 
     Examples
     --------

@@ -531,8 +531,8 @@ def _require_replaceable(target: Path) -> None:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:
         msg = (
-            f"{target} holds {min(others)!r}, which is not part of a signature database; give the "
-            "name of a new folder, or move that file elsewhere."
+            f"{target} contains {min(others)!r}, which is not part of a signature database; give "
+            "the name of a new folder, or move that file elsewhere."
         )
         raise InputError(msg)
 

@@ -108,7 +108,7 @@ def _lines(
     lines = given[drawn]
     if len(lines) == 0 or not (shapely.get_dimensions(lines) == CURVES).all():
         others = lines[shapely.get_dimensions(lines) != CURVES]
-        what = f"the streets hold {_brief(others[0])}" if len(others) else "there is no street"
+        what = f"the streets contain {_brief(others[0])}" if len(others) else "there is no street"
         msg = f"{what}; give the centre lines of streets."
         raise InputError(msg)
     return lines, reaches[drawn]

@@ -146,7 +146,7 @@ def _require_pairs(first: Evaluation, second: Evaluation) -> None:
         same = np.array_equal(places[0], places[1])
     if not same:
         msg = (
-            f"the two evaluations asked other queries ({len(tables[0])} and {len(tables[1])}); "
+            f"the two evaluations have different queries ({len(tables[0])} and {len(tables[1])}); "
             "compare evaluations with the same places, seeds and number of queries."
         )
         raise InputError(msg)

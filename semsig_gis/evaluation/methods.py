@@ -126,9 +126,9 @@ def localize(
     Parameters
     ----------
     database : SignatureDatabase, PartitionedDatabase or City
-        The cells. By a distance, of a database in parts one part at a time is in memory. By the
-        likelihood, the street objects of a city with a store tell the place between the middles of
-        its cells, too.
+        The cells. By a distance, only one part of a database in parts is in memory at a time. By
+        likelihood, a city with a store of street objects is also searched between the centres of
+        its cells.
     query : Signature
         What a person or a detector saw, perhaps nothing; types or bearings may be unknown. Objects
         of a class that no cell sees are false detections, and the answer says so.
@@ -146,7 +146,7 @@ def localize(
     -------
     Location or Localization
         The answer of the likelihood, with chances (see `locate` for what else it may know), or
-        that of a distance, with ties told.
+        that of a distance, with its ties.
 
     Raises
     ------

@@ -93,7 +93,7 @@ class Evaluation(Displayed):
           (text, comma-separated) and how many there are (none: the query is *unlocalized*);
           ``heading``: degrees to add to the bearings to have them from true north;
         - ``query_ranges``, ``query_sectors``: rough distances in metres, and the sectors that were
-          told to have been looked at, such as ``340.0-50.0`` (text, comma-separated, else empty);
+          stated to have been looked at, such as ``340.0-50.0`` (text, comma-separated, else empty);
         - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate, drawn from the
           tied, and its distance or negative log-likelihood; missing when unlocalized;
         - ``tied``: cells that share the best score, 0 when unlocalized; ``next_cell_ids``: the
@@ -198,7 +198,7 @@ class Evaluation(Displayed):
 
     @property
     def unlocalized(self) -> int:
-        """Number of queries of which the distortion left nothing."""
+        """Number of queries in which the distortion left no object."""
         return int((self.queries["query_length"] == 0).sum())
 
     def rows_in(self, database: SignatureDatabase) -> NDArray[np.int64]:
@@ -283,7 +283,7 @@ class Evaluation(Displayed):
 
         ``coverage`` is the share of queries that `likelihood.posterior.DEFAULT_RULE` answers,
         ``precision`` the share of answers that are right, ``in_region`` the share of regions of
-        90 % that hold the true cell; NaN where there is no query to tell.
+        90 % that contain the true cell; NaN if there is no such query.
         """
         if self.method.noise is None:
             return {}

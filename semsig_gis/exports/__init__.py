@@ -289,12 +289,12 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     for name in names:
         if name not in accepted:
             hint = nearest_name(name, accepted)
-            msg = f"{path} cannot hold {name!r}; give one of {', '.join(accepted)}{hint}."
+            msg = f"{path} cannot contain {name!r}; give one of {', '.join(accepted)}{hint}."
             raise UnknownNameError(msg)
     many = suffix in _MANY_LAYERS
     if len(names) > 1 and not many:
         msg = (
-            f"{path} can hold only one layer, but {' and '.join(names)} were given; give one of "
+            f"{path} can contain only one layer, but {' and '.join(names)} were given; give one of "
             "them, or write a GeoPackage."
         )
         raise InputError(msg)

@@ -371,7 +371,7 @@ def rerank(
     of some thousand cells by the plain sum, to choose the cells, and then nine in each.
     """
     if count < 1:
-        msg = f"{count} cells were to be re-ranked; give a whole number from 1."
+        msg = f"the number of cells to re-rank is {count}; give a whole number from 1."
         raise InputError(msg)
     view = View.of(query)
     if view.bearings is None:

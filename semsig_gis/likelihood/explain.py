@@ -98,7 +98,7 @@ class Explanation(Displayed):
         return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
 
     def ends(self, reach: float) -> NDArray[np.float64]:
-        """Return where the line to each row ends, shape (n, 2): as far as was told, or `reach`.
+        """Return where the line to each row ends, shape (n, 2): at its range, or at `reach`.
 
         It goes where a detection was seen, and else where the street object stands.
         """
@@ -115,7 +115,7 @@ class Explanation(Displayed):
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many rows there are of each verdict, but for what stands outside."""
+        """How many rows there are of each verdict, without what stands outside the sectors."""
         counts = Counter(row["verdict"] for row in self.rows)
         return {verdict: counts[verdict] for verdict in VERDICTS}
 

@@ -2,7 +2,7 @@
 
 The steps of the likelihood method in one call: score every cell by the index, re-rank the best
 by one-to-one associations, turn the scores into chances, decide whether to answer, and, where the
-street objects are known, look for the place between the viewpoints and say what speaks for it.
+street objects are known, look for the place between the viewpoints and explain it.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ if TYPE_CHECKING:
     from semsig_gis.likelihood.rule import AnswerRule, Decision
 
 DISAGREEMENT = 0.01
-"""Ratio of a prior (see `posterior.prior_ratio`) from which down an answer tells of it."""
-LARGE_POWER = 4  # of ten, from which on a number is told as a power
+"""Ratio of a prior (see `posterior.prior_ratio`) at or below which an answer warns of it."""
+LARGE_POWER = 4  # of ten, from which on a number is written as a power
 TINY = np.finfo(np.float64).tiny
 
 
@@ -76,7 +76,7 @@ class Location(Answer):
         Of the likeliest cells, which are the rows of `candidates`, likeliest first: ``rank`` (from
         1), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the
         database), ``types`` (symbols), ``length`` (objects), ``loglik`` (natural logarithm of the
-        likelihood), ``chance`` and, where north was not known for sure, ``heading`` (degrees to
+        likelihood), ``chance`` and, if north was not known exactly, ``heading`` (degrees to
         add to the bearings of the query).
     answer : Decision
         The cell around which the chance is largest, that chance, and whether it is enough.
@@ -203,9 +203,9 @@ class Location(Answer):
 class LikelihoodLocator:
     """An index, and how queries to it are answered; `locate` describes the fields.
 
-    A place is refined, too, where `refined` is None and there are a store and bearings. A `quick`
-    answer looks at cells from their middles alone, at fewer of them closely, and tells no heading
-    of the place. A `memo` is for views of which more is told from query to query.
+    A place is also refined if `refined` is None and there are a store and bearings. A `quick`
+    answer looks at cells only from their centres, looks closely at fewer of them, and gives no
+    heading of the place. A `memo` is for a view that grows from query to query.
     """
 
     index: LikelihoodIndex
@@ -559,8 +559,8 @@ def _prior_notes(ratio: float | None) -> tuple[str, ...]:
     power = -math.log10(ratio)
     odds = f"{1.0 / ratio:,.0f}" if power < LARGE_POWER else f"10^{power:.0f}"
     note = (
-        f"the prior and the view disagree: 1 in {odds} (the view is so many times likelier from "
-        "anywhere in the city than from where the prior says)."
+        f"the prior and the view disagree: the view is {odds} times likelier from anywhere in the "
+        "city than from where the prior says."
     )
     return (note,)
 

@@ -32,7 +32,7 @@ class _Photo:
 
 
 class TurnMemo:
-    """What is kept of the last photos whose north is not known, for those of which more is told."""
+    """What is kept of the last photos whose north is not known, for when more objects are added."""
 
     def __init__(self) -> None:
         self._photos: list[_Photo] = []
@@ -74,6 +74,6 @@ class TurnMemo:
 
 
 def _object(photo: View, row: int) -> bytes:
-    """Return all that is told of an object of a photo."""
+    """Return all that is known of an object of a photo."""
     values = (photo.codes, photo.bearings, photo.ranges, photo.range_errors, photo.scores)
     return b"|".join(b"" if one is None else one[row].tobytes() for one in values)

@@ -66,7 +66,7 @@ class LikelihoodMethod:
             msg = f"method {text!r} has an unknown noise model{hint}; give one of {names}."
             raise UnknownNameError(msg)
         misread = (
-            f"method {text!r} cannot be read; give 'likelihood:NOISE' and, if wanted, ':refined', "
+            f"method {text!r} cannot be read; give 'likelihood:NOISE' and optionally ':refined', "
             "':on_grid', ':heading=10' (degrees) or ':heading=unknown'."
         )
         refined, on_grid, north_sigma = False, False, 0.0

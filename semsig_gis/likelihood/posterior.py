@@ -183,7 +183,7 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     CrsError
         If its CRS is missing or does not fit that of the database.
     InputError
-        If it does not hold the chances of the cells of the database.
+        If it does not contain the chances of the cells of the database.
 
     Examples
     --------
@@ -209,8 +209,8 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     total = chances.sum()
     if not (chances >= 0).all() or not math.isclose(total, 1.0, abs_tol=ROUNDING):
         msg = (
-            f"{path} does not hold the chances of the cells of this database, which add up to 1; "
-            "give a .tif file that semsig localize --out wrote for it."
+            f"{path} does not contain the chances of the cells of this database, which add up to "
+            "1; give a .tif file that semsig localize --out wrote for it."
         )
         raise InputError(msg)
     return Posterior(database=database, chances=chances / total)
@@ -248,13 +248,13 @@ def posterior(
         if values.shape != total.shape:
             msg = (
                 f"{values.size} likelihoods or priors were given for {total.size} cells; "
-                "give one a cell."
+                "give one for each cell."
             )
             raise InputError(msg)
         total += values
     top = total.max()
     if np.isnan(top) or top == np.inf:
-        msg = "a likelihood or a prior is not a number below infinity; give logarithms."
+        msg = "a likelihood or a prior is not a number or is infinite; give logarithms."
         raise InputError(msg)
     if top == -np.inf:
         msg = "the prior excludes every cell that the query may be in; widen it."

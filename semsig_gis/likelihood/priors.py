@@ -98,7 +98,7 @@ class KnownPosition:
         if len(near) != 1:
             read = " and ".join(place.read_as for place in near)
             msg = (
-                f"the position {text!r} is in the city as {read}; write which is meant, as "
+                f"the position {text!r} is in the city as {read}; write which is meant, such as "
                 "60.171N,24.947E,200 or 386000m,6672000m,200."
                 if near
                 else f"the position {text!r} is in the city neither as {METRES} nor as "
@@ -194,7 +194,9 @@ def area_prior(
     [7]
     """
     if not 0 <= outside < 1:
-        msg = f"the chance of a place outside the area is {outside}; give 0 to below 1."
+        msg = (
+            f"the chance of a place outside the area is {outside}; give a number from 0 to below 1."
+        )
         raise InputError(msg)
     if not isinstance(area, (shapely.Polygon, shapely.MultiPolygon)) or area.is_empty:
         msg = f"the area is a {type(area).__name__} or empty; give a polygon that is not."
@@ -336,7 +338,10 @@ def raster_prior(
         raise InputError(msg)
     values = weights[~missing]
     if np.isinf(values).any() or (values < 0).any():
-        msg = f"{path} holds {values.min():g} to {values.max():g}; give finite values, 0 or more."
+        msg = (
+            f"{path} contains values from {values.min():g} to {values.max():g}; give finite "
+            "values, 0 or more."
+        )
         raise InputError(msg)
     weights[missing] = values[values > 0].min(initial=values.max())
     return weight_prior(database, weights)
@@ -370,10 +375,10 @@ def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.
     """
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != (len(database),):
-        msg = f"{values.size} weights for {len(database)} cells were given; give one a cell."
+        msg = f"{values.size} weights for {len(database)} cells were given; give one for each cell."
         raise InputError(msg)
     if not np.isfinite(values).all() or (values < 0).any():
-        msg = "the weights of the cells hold a negative number or none at all; give 0 or more."
+        msg = "a weight of the cells is negative or not finite; give finite numbers, 0 or more."
         raise InputError(msg)
     total = values.sum()
     if not total > 0:

@@ -1,4 +1,4 @@
-"""What to look for next: the question whose answer is expected to tell most."""
+"""What to look for next: the question whose answer is expected to help most."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def next_questions(
     unplaced: Sequence[int] = (),
     absent: Sequence[int] = (),
 ) -> tuple[ClassQuestion, ...]:
-    """Return what to look for next, what is expected to tell most first.
+    """Return what to look for next, beginning with what is expected to help most.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def unplaced_prior(
     *,
     absent: Sequence[int] = (),
 ) -> NDArray[np.float64]:
-    """Return what objects tell of the place that were seen nobody knows where, or nowhere.
+    """Return a prior from objects that were seen in an unknown direction, or not at all.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
 }
 CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
-BEST_PLACE = "The best place is where most of the chance is around it; ranks are of single cells."
+BEST_PLACE = "The best place has the most chance around it; ranks are of single cells."
 REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
 SURROUNDINGS_M = 45.0  # to see around the answer
 CLOSEST_ZOOM = 20
@@ -423,7 +423,7 @@ def _chances_legend(posterior: Posterior) -> str:
         for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
     )
     return part_of("Chance ", f"<p>Chance in percent<br>{chances}</p>") + part_of(
-        "Regions ", f"<p>Regions, the fewest cells that hold<br>{regions}</p>"
+        "Regions ", f"<p>Regions, the fewest cells that contain<br>{regions}</p>"
     )
 
 

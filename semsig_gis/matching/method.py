@@ -95,8 +95,8 @@ class Method:
         """
         misread = (
             f"method {text!r} cannot be read; give two measures as 'edit+jaccard' (types, angles) "
-            "or one as 'types:edit' or 'angles:histogram', then, if wanted, ':5%' for two stages, "
-            "':alpha=0.7', ':raw' or ':weights=2/1/1'."
+            "or one as 'types:edit' or 'angles:histogram', optionally followed by ':5%' for two "
+            "stages, ':alpha=0.7', ':raw' or ':weights=2/1/1'."
         )
         head, *options = text.strip().split(":")
         types: str | None

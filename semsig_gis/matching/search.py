@@ -221,7 +221,7 @@ def _unused_notes(query: Signature, method: Method) -> tuple[str, ...]:
     unused = [name for name, there in known.items() if there]
     if not unused:
         return ()
-    return (f"{method} makes no use of {' and '.join(unused)}; the method likelihood does.",)
+    return (f"{method} does not use {' and '.join(unused)}; the method likelihood does.",)
 
 
 class Shortlist:

@@ -220,8 +220,8 @@ def replace_layers(
     kept = tuple(sorted(remaining[SOURCE].unique()))
     notes = [*_doubts(objects, len(remaining), renewed)]
     notes += [
-        f"the new objects do not say which layers {licence.terms!r} is about, so what a layer had "
-        "that is empty now stays; load them again"
+        f"the new objects do not say which layers the licence {licence.terms!r} is for, so a layer "
+        "that is empty now keeps its old objects; load the new objects again"
         for licence in new.licenses
         if not licence.layers  # as in files of earlier versions
     ]
@@ -250,7 +250,7 @@ def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
         return old.extended(item for item in new.classes if item.code not in codes)
     except CatalogError as error:
         msg = (
-            f"the new classes do not fit those of before ({str(error)[:-1]}); load both with the "
+            f"the new classes do not match the old ones ({str(error)[:-1]}); load both with the "
             "same catalogue, or build the database again."
         )
         raise InputError(msg) from error
@@ -270,13 +270,13 @@ def _doubts(objects: StreetObjects, kept: int, renewed: set[str]) -> Iterable[st
             merged.update({part.partition(":")[0] for part in text.split("; ")} & renewed)
         for name, number in sorted(merged.items()):
             yield (
-                f"{number:,} objects of layers that stay were merged with objects of {name!r}, "
-                "which may stand beside them now; load layers that are merged together"
+                f"{number:,} objects of layers that were not loaded again were merged with objects "
+                f"of {name!r}, which may be there twice now; load merged layers together"
             )
     keys = _keys(objects)[LOOKS]
     twice = keys[kept:].merge(keys[:kept].drop_duplicates(), on=LOOKS)
     if len(twice):
         yield (
-            f"{len(twice):,} new objects stand exactly where an object of a layer that stays does; "
-            "load layers that overlap together"
+            f"{len(twice):,} new objects are at exactly the place of an object in a layer that was "
+            "not loaded again; load overlapping layers together"
         )

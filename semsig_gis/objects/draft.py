@@ -92,8 +92,8 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     -------
     str
         TOML text, by which the file loads. What only a person can know is marked ``EDIT`` in a
-        comment; where nothing tells the class, it is one of its own. Filters, classes by the value
-        of a field and the like are offered in comments.
+        comment; if nothing in the file suggests the class, it is one of its own. Filters, classes
+        by the value of a field and the like are offered in comments.
 
     Raises
     ------

@@ -183,8 +183,8 @@ def settle_extent(
     """
     if not max_distortion > 0:
         msg = (
-            f"the largest distortion is {max_distortion:g}; give a number above 0, which are "
-            "degrees of bearings and percent of lengths."
+            f"the largest distortion is {max_distortion:g}; give a number above 0, in degrees "
+            "for bearings and in percent for lengths."
         )
         raise InputError(msg)
     metric = None if crs is None else require_metric_crs(crs)
@@ -312,7 +312,7 @@ def _require_company(one: _Located, towns: _Towns) -> None:
     """Refuse a layer of which no place lies where most of the data does."""
     if len(one.places) < FEW_PLACES or (towns.of(one.places) == 0).any():
         return
-    remedy = "correct the crs of the wrong ones, or load them apart"
+    remedy = "correct the crs of the wrong ones, or load them separately"
     if one.swapped is not None and towns.of(np.array([one.swapped]))[0] == 0:
         remedy = f"with x and y exchanged it would lie there, so correct the wrong ones: {EXCHANGE}"
     here, there = _Towns(one.places).bounds(0), towns.bounds(0)

@@ -51,8 +51,8 @@ def objects_from_frame(
         Column of the classes, by name; rows without one are left out. The classes are those of
         `catalog`, or of all built-in catalogues.
     tags : bool, default False
-        Whether the columns are tags of OpenStreetMap; a table that tells which elements it holds
-        (such as ``element`` and ``id``, ``feature_id``, or ``osm_id``) is known by that.
+        Whether the columns are tags of OpenStreetMap; a table that says which elements it contains
+        (such as ``element`` and ``id``, ``feature_id``, or ``osm_id``) is recognised by that.
     catalog : Catalog, str or Path, optional
         Catalogue whose layers are looked for: ``openstreetmap`` by tags, any other by the fields
         of its layers.
@@ -69,7 +69,7 @@ def objects_from_frame(
     Raises
     ------
     InputError
-        If the table does not say what it holds, or a value of the column is no class.
+        If the table does not say what it contains, or a value of the column is not a class.
     CrsError
         If it has no CRS.
     EmptyResultError
@@ -165,7 +165,7 @@ def _by_column(
     unknown = next((str(v) for v in frame[column].dropna().unique() if v not in names), None)
     if unknown is not None:
         msg = (
-            f"column {column!r} holds {unknown!r}, which is not a "
+            f"column {column!r} contains {unknown!r}, which is not a "
             f"class{nearest_name(unknown, names)}; the classes are {', '.join(names)}, and rows "
             "without one are left out."
         )

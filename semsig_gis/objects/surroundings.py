@@ -192,7 +192,7 @@ def _read(
     dimensions = shapely.get_dimensions(table.geometry.to_numpy())
     others = table.geometry[dimensions != DIMENSIONS[kind]]
     if (len(table) == 0 and box is None) or len(others):
-        content = f"holds a {others.iloc[0].geom_type}" if len(others) else f"holds no {kind}"
+        content = f"contains a {others.iloc[0].geom_type}" if len(others) else f"contains no {kind}"
         msg = f"{where} {content}; give {_of_kind(path, kind)}."
         raise InputError(msg)
     return table.to_crs(crs)

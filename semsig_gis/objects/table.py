@@ -406,5 +406,5 @@ def _require_columns(arrow: pa.Table) -> None:
         if (field.name in NUMBERS and not pa.types.is_integer(kind)) or (
             field.name in TEXTS and kind not in {pa.string(), pa.large_string(), pa.null()}
         ):
-            msg = f"its column {field.name} holds {kind}"
+            msg = f"its column {field.name} contains {kind}"
             raise TypeError(msg)

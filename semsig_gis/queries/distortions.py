@@ -242,8 +242,8 @@ class Detector:
     def __post_init__(self) -> None:  # noqa: D105
         if not self.half >= NEAREST_M:
             msg = (
-                f"a detector that sees half at {self.half!r} m was given; give metres from "
-                f"{NEAREST_M}, or infinity where distance does not matter."
+                f"the setting half is {self.half!r} m; give the metres at which a detector sees "
+                f"half of the objects, from {NEAREST_M}, or infinity if distance does not matter."
             )
             raise InputError(msg)
 
@@ -574,13 +574,13 @@ def _class_chances(
     if distortion.false_class == "uniform":
         return np.full(classes.size, 1.0 / classes.size)
     if weights is None:
-        msg = "false classes by frequency need weights; give one a class."
+        msg = "false classes by frequency need weights; give one for each class."
         raise InputError(msg)
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != classes.shape or not np.isfinite(values).all() or (values < 0).any():
         msg = (
             f"{values.size} weights for {classes.size} classes were given; "
-            "give one a class, 0 or more."
+            "give one for each class, 0 or more."
         )
         raise InputError(msg)
     if not values.any():

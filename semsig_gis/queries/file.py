@@ -167,14 +167,14 @@ def _leg(row: Row, north: North, sigma: float) -> Leg | None:
         return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
     if values.keys() == set(TOWARDS):
         return Leg.towards(values["bearing"] + north.turn, values["distance"], sigma=sigma)
-    msg = "the way to it needs dx and dy, or distance and bearing"
+    msg = "its step from the line before needs dx and dy, or distance and bearing"
     raise InputError(msg)
 
 
 def _route(rows: list[tuple[int, _Stop]], source: str, track: Track | None) -> Route:
     views = [(_name(stop.name, line), stop.view) for line, stop in rows]
     stops = [stop for _, stop in rows]
-    advice = "leave that to the track"
+    advice = "leave it out, because the track gives the steps"
     if track is None:
         advice = "give dx and dy, or distance and bearing, on every line of a route but the first"
     for number, (line, stop) in enumerate(rows):

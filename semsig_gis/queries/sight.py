@@ -51,11 +51,11 @@ class Sight(Displayed):
     false : ndarray of bool, shape (n,), or None
         Whether each object is a false one; None where none is.
     ranges, scores : ndarray of float64 or None
-        Rough distances and scores of classes that a detector tells, as in `View`.
+        Rough distances and scores of classes that a detector gives, as in `View`.
     range_error : float, default NaN
         The relative error that it states of the rough distances, as in `View`.
     photo : Photo, default the full turn
-        The directions that are told to have been looked at.
+        The directions that are stated to have been looked at.
 
     Examples
     --------
@@ -91,7 +91,7 @@ class Sight(Displayed):
 
     @property
     def signature(self) -> Signature:
-        """What a detector tells of it: a `View` if that is more than types and bearings."""
+        """What a detector reports of it: a `View` if that is more than types and bearings."""
         if self.ranges is None and self.scores is None and self.photo == FULL_VIEW:
             return Signature(self.codes, self.bearings)
         return View(
@@ -121,7 +121,7 @@ class Sight(Displayed):
         return replace(self, **kept)
 
     def in_view(self) -> Sight:
-        """Return the objects in the directions that are told to have been looked at."""
+        """Return the objects in the directions that are stated to have been looked at."""
         return self.only(self.photo.sees(self.bearings)) if self.photo.sectors else self
 
     def renamed(self, codes: NDArray[np.uint8]) -> Sight:

@@ -44,7 +44,7 @@ def _occurrence_table(facts: Mapping[str, Any]) -> Table:
             )
             for item, number in zip(items, numbers, strict=True)
         ),
-        "An object counts once in every signature that holds it.",
+        "An object counts once in every signature that contains it.",
     )
 
 
@@ -83,7 +83,7 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),
             ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
             ("File", "" if size is None else f"{size:.1f} MB", "38.7 MB"),
-            ("File a km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
+            ("File per km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
             ("Largest group by type", f"{types}, {largest['cells']:,} cells", "DDD, 29,958 cells"),
         ),
         (
@@ -132,10 +132,10 @@ def _class_table(facts: Mapping[str, Any]) -> Table:
     counted = facts["density_from"] == "objects"
     missed = "" if facts["occlusion_m"] is None else ", without what buildings hide"
     density = (
-        "Objects a km² of the covered area."
+        "Objects per km² of the covered area."
         if counted
-        else "Objects a km² are estimated: what the mean cell sees by the area within range of it"
-        f"{missed}."
+        else "Objects per km² are estimated: what the mean cell sees, divided by the area within "
+        f"range of it{missed}."
     )
     objects = {"Objects": [f"{item['objects']:,}" for item in items]} if counted else {}
     return Table.of_columns(
@@ -144,7 +144,7 @@ def _class_table(facts: Mapping[str, Any]) -> Table:
             "Class (symbol)": map(class_label, items),
             "Range, m": [f"{item['range_m']:g}" for item in items],
             **objects,
-            "Objects a km²": [f"{item['objects_per_km2']:,.1f}" for item in items],
+            "Objects per km²": [f"{item['objects_per_km2']:,.1f}" for item in items],
             "Entropy, bits": [f"{item['entropy_bits']:.3f}" for item in items],
         },
         f"{density} Entropy: how much the number of objects of the class says about the cell.",

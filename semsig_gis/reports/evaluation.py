@@ -135,7 +135,7 @@ def evaluation_settings(evaluation: Evaluation) -> dict[str, str]:
         "Visibility range": f"{database['radius_m']:g} m",
         "Grid step": f"{database['step_m']:g} m",
         "Angle levels": str(database["levels"]),
-        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB a km²"}),
+        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB per km²"}),
     }
 
 
@@ -266,7 +266,7 @@ def experiment_tables(
     megabytes = database["mb_per_km2"]
     settings = {
         "Database": f"{spec.database}, {database['cells']:,} cells",
-        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB a km²"}),
+        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB per km²"}),
         "Queries": f"{spec.queries:,} of each seed ({', '.join(map(str, spec.seeds))})",
         "Seen from": spec.seen_from + ("" if spec.city is None else f" of {spec.city}"),
         **{f"Method {name}": str(method) for name, method in spec.methods.items()},

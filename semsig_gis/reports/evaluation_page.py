@@ -78,7 +78,7 @@ def evaluation_page(
         headline=evaluation_headline(evaluation),
         text=(
             (
-                f"{settings['Queries']} views of known places were spoiled "
+                f"{settings['Queries']} views of known places were distorted "
                 f"({settings['Distortions']}), and {settings['Method']} ranked "
                 f"{settings['Cells']} cells for each."
             ),

@@ -310,7 +310,7 @@ def _class_table(report: QualityReport) -> Table:
         ),
         note=(
             f"The convex hull of all objects is {report.hull_km2:,.2f} km², ground without objects "
-            f"included; the squares of {SQUARE_M:.0f} m that hold an object are "
+            f"included; the squares of {SQUARE_M:.0f} m that contain an object are "
             f"{report.occupied_km2:,.2f} km². Nearest: the median distance to the nearest other "
             f"object of the class.{absent}"
         ),

@@ -296,7 +296,7 @@ def _refuse(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
         f"({', '.join(files)})"
         for files, names in patterns.items()
     )
-    verb = "holds no file of" if path.is_dir() else "is not the file of"
+    verb = "contains no file of" if path.is_dir() else "is not the file of"
     tags = any(spec.reader == TAGS_READER for spec in specs)
     more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
     msg = f"{path} {verb} any layer; the layers and their files are {known}{more}."

@@ -261,7 +261,7 @@ def _joined(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
     polygon = None if others else join_areas(geometry.to_crs(WGS84).to_numpy())
     if polygon is None:
         kinds = ", ".join(others) or "nothing"
-        what = "encloses no area" if len(geometry) and not others else f"holds {kinds}"
+        what = "encloses no area" if len(geometry) and not others else f"contains {kinds}"
         msg = f"{where} {what}; give a {kind} of polygons."
         raise InputError(msg)
     return Area(polygon, name)

@@ -70,7 +70,7 @@ class LayerSpec:
         Layer inside a file that holds several.
     where, exclusions : tuple of (str, tuple)
         Fields or tags and the values of each: of `where`, all must hold for a row to count, and of
-        `exclusions`, none. Values are exact, but for texts between slashes (a regular expression
+        `exclusions`, none. Values are exact, except texts between slashes (a regular expression
         that the whole value must match), comparisons such as ``">=0"``, ``"none"`` (absent or
         empty) and ``"*"`` (every value but ``"no"``).
     class_by : ClassBy, optional

@@ -174,7 +174,7 @@ def whole_numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
     """
     array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     if array.null_count or not pa.types.is_integer(array.type):
-        msg = f"a column holds {array.type}, {array.null_count} missing"
+        msg = f"a column contains {array.type}, {array.null_count} missing"
         raise ValueError(msg)
     kind = np.dtype(str(array.type))
     content = array.buffers()[1] if len(array) else b""

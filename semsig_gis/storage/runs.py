@@ -91,8 +91,8 @@ class RunKind:
         except (OSError, TypeError, ValueError) as error:
             first = min(entries - set(self.names) or entries, default="nothing")
             msg = (
-                f"{folder} holds {first!r}, but no {self.content} that can be read; choose another "
-                "folder."
+                f"{folder} contains {first!r}, but no {self.content} that can be read; choose "
+                "another folder."
             )
             raise InputError(msg) from error
 
@@ -158,7 +158,7 @@ def read_json(path: Path) -> Recipe:
     """Return the values of a JSON file; TypeError if it holds anything but an object."""
     values = parse_json(read_whole(path), finite=True)
     if not isinstance(values, dict):
-        msg = f"{path} holds no values by name"
+        msg = f"{path} contains no named values"
         raise TypeError(msg)
     return values
 

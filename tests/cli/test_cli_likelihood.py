@@ -228,7 +228,7 @@ def test_a_track_tells_the_way_of_a_route(city: Path, run: Run, timed: bool) -> 
     assert "lat, lon" in printed
 
     for change, words in (
-        ({"dx": 1, "dy": 2}, ["line 3", "leave that to the track"]),
+        ({"dx": 1, "dy": 2}, ["line 3", "the track gives the steps"]),
         ({"time": "2026-05-31T09:00:00Z"}, ["view 3" if timed else "view 1", "time"]),
         ({"time": "noon"}, ["'noon'", "2024-05-31T14:05:09Z"]),
     ):

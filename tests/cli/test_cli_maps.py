@@ -106,7 +106,7 @@ def test_everything_on_one_map(done: Done, monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_raster_of_something_else_is_no_answer(done: Done, run: Run) -> None:
     done("export city.parquet --out cells.tif")
     outcome = run("map city.parquet --location cells.tif --out map.html")
-    sentence(outcome, "cells.tif does not hold the chances of the cells", "give a .tif file")
+    sentence(outcome, "cells.tif does not contain the chances of the cells", "give a .tif file")
 
 
 @pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml", "parquet", "csv", "fgb"])

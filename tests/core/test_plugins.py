@@ -126,7 +126,7 @@ def test_a_broken_catalogue_is_told_and_skipped(
     good.touch()
     install("good", CATALOGS, f"value = {str(good)!r}", good="value")
     install("bad", CATALOGS, code, bad="value")
-    with pytest.warns(UserWarning, match="'bad' of semsig_gis.catalogs, brought by bad") as caught:
+    with pytest.warns(UserWarning, match="'bad' of semsig_gis.catalogs, provided by bad") as caught:
         catalogs = installed_catalogs()
     assert catalogs["good"] == good
     assert "bad" not in catalogs

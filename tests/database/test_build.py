@@ -247,5 +247,5 @@ def test_what_the_memory_does_not_hold_is_not_begun(
         build_database(town.street_objects, spec=SignatureSpec(3000.0))
     with refused(InputError, "cells of 6.5 m within 6000 m", "free"):
         build_database(town.street_objects, grid=GridSpec(6.5), spec=SignatureSpec(6000.0))
-    with refused(InputError, "more than the 2,147,483,647 that one file holds"):
+    with refused(InputError, "more than the 2,147,483,647 that one file can contain"):
         build.require_room(3e9, cells=10, objects=10**6)

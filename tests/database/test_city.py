@@ -199,7 +199,7 @@ def test_an_end_on_the_way_leaves_what_was_there(
 
 def test_other_cells_are_refused(city: City, database: SignatureDatabase) -> None:
     some = database.select(np.arange(5, len(database)))
-    with refused(DatabaseError, "other cells", "open the database again"):
+    with refused(DatabaseError, "have changed since it was opened", "open the database again"):
         city.put_columns("numbers", columns(len(some)), cell_ids=some.cell_ids, facts={})
     assert not city.has_columns
 
@@ -451,7 +451,7 @@ def test_a_city_is_read_as_it_was_at_one_moment(
     assert len(city.database) == len(build_database(fewer(7)))
     save(stored, fewer(12))
     for act in (lambda: city.store, lambda: put(city, columns(len(city.database)))):
-        with refused(DatabaseError, "another program has written", "run this again"):
+        with refused(DatabaseError, "another program has changed", "run the same command again"):
             act()
     assert not City(stored).has_columns
 

@@ -306,7 +306,7 @@ def test_parts_that_do_not_fit_each_other_are_refused(town: World, parts: Path) 
     [
         *((text, "damaged") for text in ("", "{", "[]", "{}", '{"kind": 3}', '{"parts": 3}')),
         ('{"kind": "signature database in parts", "recipe": {}, "parts": [{}]}', "damaged"),
-        ('{"kind": "album", "recipe": {}, "parts": []}', "another kind"),
+        ('{"kind": "album", "recipe": {}, "parts": []}', "does not belong to"),
         *(
             (f'{{"kind": 1, "recipe": {{}}, "parts": [{{"cells": {number}}}]}}', "damaged")
             for number in ("1e999", "Infinity", "NaN", "1" + "0" * 40)

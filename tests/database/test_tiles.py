@@ -176,7 +176,7 @@ def test_tables_of_buildings_and_streets_are_as_good_as_files(
     by_file = build_tiles(objects_file, tmp_path / "files", **spec, **files)
     assert [part.sha256 for part in by_table.parts] == [part.sha256 for part in by_file.parts]
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["tables"]
-    with refused(InputError, "the table holds a Polygon", "a table of lines"):
+    with refused(InputError, "the table contains a Polygon", "a table of lines"):
         build_tiles(objects_file, tmp_path / "none", streets=tables["buildings"])
 
 

@@ -365,7 +365,7 @@ alike = functools.partial(find_lookalikes, COLUMNS)
         (ask, {"radius": -5.0}, ["radius is -5.0", "from 0"]),
         (ask, {"radius": math.nan}, ["radius is nan", "from 0"]),
         (check, {"queries": 0}, ["queries is 0", "from 1"]),
-        (check, {"seed": TOLD.seed}, ["which the trials had"]),
+        (check, {"seed": TOLD.seed}, ["which is that of the trials"]),
         (check, {"seed": -1}, ["seed is -1", "from 0"]),
         (check, {"index": LIGHT}, ["another database or noise model", "matching one"]),
         (check, {"index": ELSEWHERE}, ["another database or noise model", "matching one"]),

@@ -122,7 +122,7 @@ REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
     (city(h3=16), "city.fgb", ("resolution 16", "0 to 15")),
     (city(layers="hexagons"), "city.fgb", ("no resolution",)),
     (city(layers="cells", h3=9), "city.fgb", ("only the cells", "not the resolution")),
-    (city(layers="objects"), "city.pmtiles", ("cannot hold 'objects'", "give one of cells")),
+    (city(layers="objects"), "city.pmtiles", ("cannot contain 'objects'", "give one of cells")),
     (city(geometry="point"), "city.pmtiles", ("only the cells", "not the geometry")),
     (city(layers=["object"]), "city.csv", ("'object'", "the nearest is 'objects'")),
     (city(layers=["ambiguity"]), "city.csv", ("'ambiguity'", *LAYERS)),

@@ -102,7 +102,7 @@ def test_a_prior_that_the_view_speaks_against_is_told() -> None:
     assert found.to_dict()["prior"] == {"near": "the lamp", "ratio": found.prior_ratio}
     assert misled.prior_ratio is not None
     assert misled.prior_ratio < 0.01
-    assert "the prior and the view disagree: 1 in" in misled.notes[0]
+    assert "the prior and the view disagree: the view is" in misled.notes[0]
     assert locate(WIDE, query).to_dict()["prior"] is None
     # A route is one view of the place that it begins at.
     views = locate_route(WIDE, [query], [], log_prior=wrong)

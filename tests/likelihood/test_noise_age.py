@@ -140,7 +140,7 @@ BENCH = {"class_name": "bench", "before": 5}
     [
         ([], "has no list of classes"),
         ({"years": 1, "classes": {}}, "has no list of classes"),
-        ({"classes": [BENCH]}, "does not say over how many years that changed; add years"),
+        ({"classes": [BENCH]}, "does not say over how many years the city changed; add years"),
         ({"years": "two", "classes": [BENCH]}, "years of the drift is 'two'"),
         ({"years": 0, "classes": [BENCH]}, "is 0; give years above 0 and up to 100"),
         ({"years": 1e9, "classes": [BENCH]}, "years above 0 and up to 100"),

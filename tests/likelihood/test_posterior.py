@@ -230,7 +230,7 @@ def test_a_raster_weighs_the_cells(
     [
         ([[1.0]], 1e5, "has no data at any cell"),
         (np.zeros((2, 2)), 0.0, "excludes every cell"),
-        ([[1.0, -2.0]], 0.0, "holds -2 to 1; give finite values, 0 or more"),
+        ([[1.0, -2.0]], 0.0, "contains values from -2 to 1; give finite values, 0 or more"),
         ([[1.0, np.inf]], 0.0, "give finite values, 0 or more"),
         ([[0.0]], 0.0, "excludes every cell"),
     ],

@@ -175,8 +175,8 @@ def test_what_may_be_twice_is_told() -> None:
     objects, kept, notes = replace_layers(old, new)
     assert kept == ("lamps", "trees")
     assert objects.table["merged"].tolist() == ["posts:4; signals:2", "", "", "", ""]
-    assert "1 objects of layers that stay were merged with objects of 'posts'" in notes[0]
-    assert "1 new objects stand exactly where" in notes[1]
+    assert "not loaded again were merged with objects of 'posts'" in notes[0]
+    assert "1 new objects are at exactly the place" in notes[1]
     assert len(notes) == 2
 
 
@@ -187,7 +187,7 @@ def test_a_licence_of_unknown_layers_renews_none() -> None:
     new = table((4, 4, TREE, "trees", "5"), licenses=(unclear,))
     objects, kept, notes = replace_layers(dataclasses.replace(OLD, licenses=before), new)
     assert (kept, objects.licenses) == (("lamps",), (*before, unclear))
-    assert "which layers 'City (CC0): lamps, trees' is about" in notes[0]
+    assert "which layers the licence 'City (CC0): lamps, trees' is for" in notes[0]
 
 
 def test_warnings_go_with_the_layers_that_they_are_about() -> None:

@@ -152,7 +152,7 @@ REFUSED = {  # layers, the metric CRS, words
     "a layer of another city": (
         [layer(town(PARIS, size=50)), layer(town(LYON), name="b")],
         None,
-        ["'b'", "4.8", "far from most of the data at 2.3", "load them apart"],
+        ["'b'", "4.8", "far from most of the data at 2.3", "load them separately"],
     ),
     "two cities": (
         [layer(town(PARIS), town(SYDNEY))],

@@ -119,7 +119,7 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
             read_area(tmp_path / name, crs=CRS)
     with refused(SourceError, "unbounded.parquet"):
         read_surroundings(tmp_path / "unbounded.parquet", role="buildings", crs=CRS, box=NOWHERE)
-    with refused(InputError, "holds no polygon"):
+    with refused(InputError, "contains no polygon"):
         read_surroundings(tmp_path / "empty.parquet", role="buildings", crs=CRS)
 
 
@@ -129,7 +129,7 @@ def test_a_table_is_as_good_as_a_file() -> None:
     near = read_surroundings(HOUSES, role="buildings", crs=CRS, box=box)
     assert near["n"].tolist() == HOUSES["n"][HOUSES.intersects(shapely.box(*box))].tolist()
     assert read_area(HOUSES, crs=CRS).area == pytest.approx(36 * len(HOUSES))
-    with refused(InputError, "the table holds a Polygon", "give a table of lines"):
+    with refused(InputError, "the table contains a Polygon", "give a table of lines"):
         read_surroundings(HOUSES, role="streets", crs=CRS)
     with refused(SourceError, "the table states no coordinate reference system"):
         read_surroundings(HOUSES.set_crs(None, allow_override=True), role="buildings", crs=CRS)

@@ -240,7 +240,7 @@ CASES: list[tuple[type[SemsigError], Callable[[], object], list[str]]] = [
     (CrsError, lambda: draw(32631, number=1), ["EPSG:32631", "EPSG:2154"]),
     (InputError, lambda: spoil([]), ["distinct codes", "at least one"]),
     (InputError, lambda: spoil([3, 3]), ["distinct codes"]),
-    (InputError, lambda: spoil([1, 3]), ["need weights", "one a class"]),
+    (InputError, lambda: spoil([1, 3]), ["need weights", "one for each class"]),
     (InputError, lambda: spoil([1, 3], [1]), ["1 weights for 2 classes"]),
     (InputError, lambda: spoil([1, 3], [1, -1]), ["0 or more"]),
     (InputError, lambda: spoil([1, 3], [0, 0]), ["all zero", "above zero"]),

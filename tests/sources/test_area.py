@@ -112,7 +112,7 @@ def test_the_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
 def test_a_table_of_polygons_is_an_area() -> None:
     table = gpd.GeoDataFrame(geometry=[shapely.box(*BOX)], crs="EPSG:4326")
     assert parse_area(table.to_crs(2154)).bounds == pytest.approx(BOX, abs=1e-6)
-    with refused(InputError, "the table holds Point", "give a table of polygons"):
+    with refused(InputError, "the table contains Point", "give a table of polygons"):
         parse_area(table.set_geometry(shapely.centroid(table.geometry.array)))
     with refused(CrsError, "the table has no coordinate reference system"):
         parse_area(table.set_crs(None, allow_override=True))
@@ -131,9 +131,9 @@ def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("geometry", "words"),
     [
-        (shapely.Point(3, 43), "holds Point"),
-        (shapely.LineString([(3, 43), (4, 43)]), "holds LineString"),
-        (None, "holds nothing"),
+        (shapely.Point(3, 43), "contains Point"),
+        (shapely.LineString([(3, 43), (4, 43)]), "contains LineString"),
+        (None, "contains nothing"),
         (shapely.Polygon([(0, 0), (1, 1), (0, 0)]), "encloses no area"),
     ],
 )

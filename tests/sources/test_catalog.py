@@ -329,5 +329,5 @@ def test_files_that_cannot_be_paired(tmp_path: Path) -> None:
     known = "the layers and their files are trees (*trees*.zip, *trees*), lights"
     with refused(SourceError, "cars.zip is not the file of any layer", known):
         find_files(SPECS, [other])
-    with refused(SourceError, "holds no file of any layer"):
+    with refused(SourceError, "contains no file of any layer"):
         find_files(SPECS, [other.parent])

@@ -149,7 +149,7 @@ def test_files_without_tags_are_no_files_of_openstreetmap(tmp_path: Path) -> Non
         find_files(SPECS, [path])
     folder.mkdir()
     (folder / "broken.gpkg").write_text("nothing")
-    with refused(SourceError, "city holds no file"):
+    with refused(SourceError, "city contains no file"):
         find_files(SPECS, [folder])
     damaged = tmp_path / "damaged.parquet"
     damaged.write_text("PAR1")

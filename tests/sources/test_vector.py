@@ -618,7 +618,7 @@ def test_layers_of_a_container(container: Path) -> None:
     layers = {layer.name: layer.rows for layer in list_layers(container)}
     assert layers == {"trees": 1, "lights": 2}
     assert read(container, layer="lights").counts.read == 2
-    with refused(SourceError, "holds 2 layers (trees, lights); give the name of one"):
+    with refused(SourceError, "contains 2 layers (trees, lights); give the name of one"):
         read(container)
     with refused(UnknownNameError, "no layer 'light'; the nearest is 'lights'"):
         read(container, layer="light")
@@ -630,7 +630,7 @@ def test_tables_without_geometry_are_not_meant(container: Path, tmp_path: Path) 
     for path in (alone, container):
         pyogrio.write_dataframe(pd.DataFrame({"styleName": ["red"]}), path, layer="layer_styles")
     assert read(alone).counts.read == 1
-    with refused(SourceError, "holds 2 layers (trees, lights)"):
+    with refused(SourceError, "contains 2 layers (trees, lights)"):
         read(container)
     with refused(SourceError, "has no geometry"):
         read(alone, layer="layer_styles")
@@ -647,7 +647,7 @@ def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
     assert [layer.name for layer in list_layers(path)] == ["things"]
     assert read(path).counts.read == 1
     geojson(inner, point(3, 43))
-    with refused(SourceError, "holds 2 layers"):
+    with refused(SourceError, "contains 2 layers"):
         read(pack(tmp_path / "two.zip", *inner.iterdir()))
 
 

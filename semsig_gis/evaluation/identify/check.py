@@ -156,7 +156,7 @@ def check_identifiability(
     require_number("number of threads", threads, least=1, most=MOST_WORKERS)
     require_number("seed", seed, least=0, most=MOST_SEED + 1)
     if seed == identifiability.seed:
-        msg = f"the check has seed {seed}, which the trials had; give another seed."
+        msg = f"the seed of the check is {seed}, which is that of the trials; give another seed."
         raise InputError(msg)
     database = identifiability.database
     same = np.array_equal(index.database.cell_ids, database.cell_ids)

@@ -79,7 +79,7 @@ def identify(
     radius : float, default 50
         Metres that count as near, 0 to 1,000,000.
     view : float, default 360
-        Degrees that a query sees at once, 10 to 360: a photo in any direction, or all round.
+        Degrees that a query sees at once, 10 to 360: a photo in any direction, or the full turn.
     trials : int, default 3000
         How many simulated queries to ask, 1 to 1,000,000.
     class_trials : int, default 400

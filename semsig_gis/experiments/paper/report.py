@@ -73,11 +73,11 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
             (
                 "Semantic signatures tell where in a city a view was taken from the street "
                 "objects in it. Here the experiments of the source paper are run again. Its city "
-                "is Paris in the open data of its time, and so its figures are a measure for "
-                "ours only where the cities are alike."
+                "is Paris in the open data of its time, so its figures can be compared with ours "
+                "only where the cities are alike."
             ),
             (
-                "Shares come with intervals of 95 % (Wilson), which tell how much chance there "
+                "Shares come with intervals of 95 % (Wilson), which show how much chance there "
                 "is in the choice of the queries. Ties are scored by their expectation."
             ),
             *results.missing,
@@ -309,9 +309,9 @@ def _level_section(results: Reproduction) -> Section:
             "error and rank. The highest may be of light distortion or of none; both have it."
         ),
         (
-            "Where cells tie with the last of the 5 %, all of them are kept here. If just 5 % "
+            "If cells tie with the last of the 5 %, all of them are kept here. If just 5 % "
             "are, the best 10 % are those of the first stage, the edit distance of the types: "
-            "that recall is told, too."
+            "that recall is shown as well."
         ),
         numbers=[*numbers, _just_5(results, "medium", "medium", JUST_5)],
         plots=_plots("levels", "the recommended method", cases, points),
@@ -377,8 +377,8 @@ def _range_sections(results: Reproduction) -> Iterator[Section]:
         "ranges",
         "Visibility range",
         (
-            "The recommended method, medium distortion, the first candidate alone, on "
-            "databases that were built anew."
+            "The recommended method, medium distortion, only the first candidate, on newly "
+            "built databases."
         ),
         (
             "The last column asks whether the range matters by itself, or by how many "
@@ -480,9 +480,9 @@ def _likelihood_section(results: Reproduction) -> Section:
     return _section(
         "likelihood",
         "The likelihood method",
-        "Not in the paper. A model of how detectors fail takes the place of the distances; "
-        "it does not know the level of the distortion. Beside it, the method that the paper "
-        f"recommends. {len(case.queries):,} queries, the first candidate alone.",
+        "Not in the paper. A model of how detectors fail replaces the distances; it does not "
+        "know the level of the distortion. The method that the paper recommends is shown beside "
+        f"it. {len(case.queries):,} queries, only the first candidate.",
         numbers=numbers,
         plots=(
             plot_of(

@@ -1,1 +1,1 @@
-"""How views are spoiled: models, tables, fits."""
+"""How detectors fail: models, tables, fits."""

@@ -150,7 +150,7 @@ def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
         raise InputError(msg)
     if "years" not in values:
         msg = (
-            f"{where} does not say over how many years that changed; add years, or write the "
+            f"{where} does not say over how many years the city changed; add years, or write the "
             "report with `semsig update --years N --json`."
         )
         raise InputError(msg)

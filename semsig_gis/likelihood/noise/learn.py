@@ -80,7 +80,10 @@ class Sample:
             msg = "a sample has a detection of unknown class; give its class, or leave it out."
             raise InputError(msg)
         if any(math.isinf(photo.north_sigma or 0.0) for photo in view.photos):
-            msg = "a sample has a photo of unknown heading; give it, or leave the sample out."
+            msg = (
+                "a sample has a photo of unknown heading; give the heading, or leave the sample "
+                "out."
+            )
             raise InputError(msg)
 
 

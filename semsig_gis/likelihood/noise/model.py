@@ -110,7 +110,7 @@ class NoiseSpec(Displayed):
 
     def __post_init__(self) -> None:  # noqa: D105
         if not isinstance(self.name, str):
-            msg = f"name of the noise is {self.name!r}; give a text."
+            msg = f"name of the noise model is {self.name!r}; give a text."
             raise InputError(msg)
         for label, number in _NUMBERS.items():
             number.check(label, getattr(self, label))
@@ -162,7 +162,7 @@ class NoiseSpec(Displayed):
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class NoiseMixture(Displayed):
-    """Noise of which only is known that it follows one of several models.
+    """Noise that is known only to follow one of several models.
 
     The likelihood of a cell is the weighted sum over the models: the level is as unknown as the
     place.
@@ -253,7 +253,7 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
         raise InputError(msg) from error
     specs = tuple(model for model in models if isinstance(model, NoiseSpec))
     if len(specs) < len(models):
-        msg = "a mixture of noise models holds another mixture; give plain models."
+        msg = "a mixture of noise models contains another mixture; give plain models."
         raise InputError(msg)
     return NoiseMixture(**{**values, "specs": specs, "weights": weights})
 
@@ -297,7 +297,7 @@ def place_noise(noise: Noise, step: float) -> Noise:
         variance = spec.position_sigma**2 - step**2 / 12.0
         if variance < -ROUNDING:
             msg = (
-                f"noise model {spec.name!r} is for queries from the middles of cells; build the "
+                f"noise model {spec.name!r} is for queries from the centres of cells; build the "
                 f"index for cell_noise(noise, {step:g}), which is for queries from anywhere in "
                 "them."
             )

@@ -191,7 +191,7 @@ def _gml(path: Path) -> Table:
     said = error_text(content)
     found = list(features(root))
     if said or not (found or local_name(root) == "FeatureCollection"):
-        what = f"holds the error {said}" if said else "has no features"
+        what = f"contains the error {said}" if said else "has no features"
         msg = f"{path} {what}; give GML as a Web Feature Service sends it."
         raise SourceError(msg)
     crs, swap = stated_crs(content)

@@ -73,9 +73,9 @@ def read_layer(
     r"""Read one layer of a vector file.
 
     A row that cannot be read is counted and reported, and the rest are read.
-    The file's own CRS holds; what `spec` and `crs` say is for a file without one. GeoJSON without a
-    ``crs`` member counts as such: it is WGS 84 only if nothing else is said and the coordinates
-    fit.
+    The file's own CRS is used; those of `spec` and `crs` are for a file without one. GeoJSON
+    without a ``crs`` member counts as such a file: it is WGS 84 only if no other is given and the
+    coordinates fit.
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ def read_layer(
     spec : LayerSpec
         Which layer and rows are wanted, and what they are.
     filters : bool, default True
-        Whether the specification's ``where`` holds.
+        Whether the specification's ``where`` is applied.
     crs : str, optional
-        CRS of a file that states none; it goes before the specification's.
+        CRS of a file that states none; it overrides the specification's.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def read_layer(
         return read_csv_layer(lines, spec, filters=filters, crs=crs, where=where)
     layer = describe(member)
     if layer.geometry == NO_GEOMETRY:
-        msg = f"{where} has no geometry; give the layer that holds the positions."
+        msg = f"{where} has no geometry; give the layer that contains the positions."
         raise SourceError(msg)
     rules = RowRules(spec, layer.fields, filters=filters, where=where)
     table = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
@@ -247,7 +247,7 @@ def _pick(path: Path, wanted: str | None) -> Member:
             f"its layers are {', '.join(names)}."
         )
         raise UnknownNameError(msg)
-    msg = f"{path} holds {len(matches)} layers ({', '.join(names)}); give the name of one."
+    msg = f"{path} contains {len(matches)} layers ({', '.join(names)}); give the name of one."
     raise SourceError(msg)
 
 
