@@ -30,7 +30,7 @@ def __getattr__(name: str) -> object:
     if name in _RENAMED:
         new, end = _RENAMED[name]
         warnings.warn(
-            f"semsig_gis.{name} is called {new} now; the old name goes with version {end}.",
+            f"semsig_gis.{name} is called {new} now; version {end} removes the old name.",
             DeprecationWarning,
             stacklevel=2,
         )

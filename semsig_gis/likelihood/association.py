@@ -251,7 +251,7 @@ def associate(
 
 
 def at_distances(table: NoiseTable, views: Views) -> NDArray[np.float64]:
-    """Return the distances of objects in metres; what is nearest is not at the very place."""
+    """Return the distances of objects in metres; the nearest is above 0."""
     return np.asarray(np.maximum(views.distances, table.distances[0]))
 
 

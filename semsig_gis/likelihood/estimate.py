@@ -63,7 +63,7 @@ class PlaceEstimate(Displayed):
         return math.sqrt(float(self.covariance[2, 2]))
 
     def ellipse(self, share: float = 0.9) -> tuple[float, float, float]:
-        """Return the ellipse that holds a share of a normal distribution of this covariance.
+        """Return the ellipse that contains a share of a normal distribution of this covariance.
 
         It is the longer and the shorter half axis in metres, and the bearing of the longer one in
         degrees clockwise from grid north, in [0, 180).
@@ -113,7 +113,7 @@ def cell_estimate(
 
     For a place in two streets at once the mean lies between them, as it has the least mean squared
     error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma`
-    is in degrees. Headings are tried every two degrees all round, cell by cell, if the query may be
+    is in degrees. Headings are tried every two degrees of the turn, by cell, if the query may be
     `turned`.
     """
     database, chances = posterior.database, posterior.chances

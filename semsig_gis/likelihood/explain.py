@@ -174,7 +174,7 @@ def explain_cell(
     database: SignatureDatabase,
     heading: float | Sequence[float] = 0.0,
 ) -> Explanation:
-    """Say which objects of a query are which objects of a cell, by the database alone.
+    """Say which objects of a query are which objects of a cell, using only the database.
 
     As `explain`, but a database does not know which objects a cell sees: the columns ``object``,
     ``source`` and ``source_id`` are missing, and places of objects are good to some decimetres.

@@ -2,7 +2,7 @@
 
 A first sum over the detections one by one, in which one lamp may explain three; the best cells are
 ranked again by one-to-one associations (`likelihood.association`). Errors of bearings and ranges
-are taken at `LEVELS` distances and `BINS` bearings, which is next to nothing beside the errors.
+are computed at `LEVELS` distances and `BINS` bearings, steps that are small beside the errors.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ BINS = 512
 FINE = 8 * BINS
 """Bearing steps of a detection."""
 LEVELS = 64
-"""Distances at which errors are taken."""
+"""Distances at which errors are computed."""
 TURNS = 64
 """Turns of a photo whose north is uncertain: steps of 5.625 degrees."""
 
@@ -52,7 +52,7 @@ VERSION = 6  # raised whenever the same database and noise give other likelihood
 LEAST_PRIOR = 1e-7  # turns that are less likely than this, against the likeliest, are left out
 STANDS = 3  # places a side of a cell, at which the best cells are compared
 LEAST_DENSITY = 1e-12
-CELLS_A_PART = 256  # that are worth a thread, looked at from aside
+CELLS_A_PART = 256  # that are worth a thread, at places beside their centres
 LAPS = np.arange(-3, 4)  # 180 degrees of deviation reach three turns
 
 

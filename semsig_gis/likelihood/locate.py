@@ -85,7 +85,7 @@ class Location(Answer):
     rule : AnswerRule
         What the decision rests on.
     region : ndarray of int64
-        Row numbers of the fewest cells that hold 90 % of the chance, likeliest first.
+        Row numbers of the fewest cells that contain 90 % of the chance, likeliest first.
     posterior : Posterior
         The chance of every cell.
     loglik : ndarray of float, shape (n,)

@@ -1,4 +1,4 @@
-"""Photos that are told of object by object: each goes on from where the last one ended."""
+"""Photos whose objects are given one by one: each answer continues from the last one."""
 
 from __future__ import annotations
 

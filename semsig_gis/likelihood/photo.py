@@ -8,11 +8,11 @@ sums over all one-to-one associations A of objects and detections:
         * sum_A prod_(i,j in A) p_i / (1 - w_i p_i) C_ij N(a_j - b_i) R(r_j; d_i) / lambda_j
 
 with ``p_i`` the chance of detection at its distance, ``w_i`` that its bearing comes out in S,
-``C_ij`` the chance of what is said of its class, R a log-normal density, 1 where no range is given,
+``C_ij`` the chance of the name that it got, R a log-normal density, 1 where no range is given,
 and ``lambda_j`` the density of false detections: uniform over the turn and, for a range, the disc.
 
-At the edge of range, who stands elsewhere in a cell misses objects that its middle sees, and sees
-as many others of the same class: ``p_i`` falls there, and ``lambda_j`` rises by what has left.
+At the edge of range, an observer elsewhere in a cell misses objects that are seen from its centre,
+and sees as many others of the same class: ``p_i`` falls there, and ``lambda_j`` rises by as much.
 """
 
 from __future__ import annotations

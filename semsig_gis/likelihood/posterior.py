@@ -100,12 +100,12 @@ class Posterior(Displayed):
 
     @property
     def entropy(self) -> float:
-        """How much is not known of the cell, in bits: 0 for one cell, 1 for two alike, ..."""
+        """How uncertain the cell is, in bits: 0 for one cell, 1 for two equally likely, ..."""
         chances = self.chances[self.chances > 0]
         return float(-(chances * np.log2(chances)).sum())
 
     def credible_cells(self, share: float = 0.9) -> NDArray[np.int64]:
-        """Return the row numbers of the fewest cells that hold a share of the chance.
+        """Return the row numbers of the fewest cells that contain a share of the chance.
 
         The share is above 0 and at most 1, or raises `InputError`. Likeliest first, equal chances
         in the order of the database; cells without any chance are never among them.

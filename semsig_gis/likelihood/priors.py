@@ -1,6 +1,6 @@
 """What is known of the place before a query is looked at: log-priors by cell, shape (n,).
 
-A prior is one number a cell, the logarithm of a chance up to a constant; minus infinity excludes
+A prior is one number per cell, the logarithm of a chance up to a constant; minus infinity excludes
 a cell. Priors that do not depend on each other are added.
 """
 
@@ -116,7 +116,7 @@ class KnownPosition:
 def _readings(
     values: list[float], letters: str, crs: CRS
 ) -> list[tuple[str, tuple[float, float, float, float]]]:
-    """Return what two numbers may be taken for, with x, y, longitude and latitude of each."""
+    """Return the places that two numbers may mean, with x, y, longitude and latitude of each."""
     first, second = values
     readings = []
     if letters in {"??", "MM"}:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 LOOKED_FOR = 0.95
-"""Chance that an object is seen by someone who was asked for it, at the least."""
+"""Least chance that somebody who is asked for an object sees it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,7 +194,7 @@ def with_unplaced(
     *,
     absent: Sequence[int] = (),
 ) -> LikelihoodLocator:
-    """Return what answers a query given what was seen beside it, as `unplaced_prior` has it."""
+    """Return the locator with the prior of `unplaced_prior` for what else was seen or not."""
     if not unplaced and not absent:
         return locator
     by_code = locator.index.database.taxonomy.by_code

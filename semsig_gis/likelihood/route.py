@@ -1,7 +1,7 @@
 """Several views along a route: each place is a known way from the one before.
 
-The views multiply: what one leaves open, the next one, twenty metres on, settles. A way that is
-known to some metres only blurs the chances before they are multiplied.
+The chances of the views are multiplied, so the next view, twenty metres on, can settle what one
+view leaves open. A step that is known to some metres blurs the chances before they are multiplied.
 """
 
 from __future__ import annotations

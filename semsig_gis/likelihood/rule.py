@@ -1,6 +1,6 @@
 """When to answer with a place at all, and how that is calibrated.
 
-A place is the answer where the chance that the true one lies near reaches a least value, which is
+A place is the answer if the chance that the true one lies near reaches a threshold, which is
 calibrated on queries whose true place is known.
 """
 

@@ -15,7 +15,7 @@ RENAMED: dict[str, tuple[str, str]] = vars(semsig_gis)["_RENAMED"]
 @pytest.mark.parametrize("old", RENAMED)
 def test_an_old_name_gives_what_the_new_one_does_with_a_warning(old: str) -> None:
     new, end = RENAMED[old]
-    said = f"semsig_gis.{old} is called {new} now; the old name goes with version {end}."
+    said = f"semsig_gis.{old} is called {new} now; version {end} removes the old name."
     with pytest.warns(DeprecationWarning, match=f"^{re.escape(said)}$") as warned:
         value = getattr(semsig_gis, old)
     assert warned[0].filename == __file__

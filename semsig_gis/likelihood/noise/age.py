@@ -171,11 +171,11 @@ def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Ageing:
-    """What some years do to each class that a database has, `names`.
+    """How each class of a database, `names`, changes in some years.
 
     `seen` is the mean number of objects in a signature. `gone` and `moved` are the shares that
-    stand there no longer, or a little aside, by `variances` in square metres each way; `come` is
-    the number of new objects a signature.
+    are gone, or have moved a little, by `variances` in square metres each way; `come` is
+    the number of new objects per signature.
     """
 
     names: list[str]
@@ -187,7 +187,7 @@ class _Ageing:
 
     @classmethod
     def of(cls, drift: Drift, years: float, database: SignatureDatabase) -> _Ageing:
-        """Return what so many years do; classes of few objects are drawn to all together."""
+        """Return the changes in some years; classes of few objects are drawn to the mean."""
         codes = database.present_codes
         names = [database.taxonomy.by_code(code).name for code in codes.tolist()]
         counts: dict[str, Counter[str]] = {name: Counter() for name in names}
@@ -223,7 +223,7 @@ class _Ageing:
 
     @property
     def variance(self) -> float:
-        """Of the place of an object, each way, in square metres, over all that are seen."""
+        """Mean variance of the place of an object in each direction, in square metres."""
         return float(np.average(self.moved * self.variances, weights=self.seen))
 
     def detection(self, spec: NoiseSpec) -> NDArray[np.float64]:
@@ -232,7 +232,7 @@ class _Ageing:
         return np.array([special.get(name, spec.detection) for name in self.names], np.float64)
 
     def clutter(self, spec: NoiseSpec) -> NDArray[np.float64]:
-        """Return the false objects a signature of each class by a model."""
+        """Return the false objects of each class per signature, by a model."""
         shares = spec.clutter_shares or dict.fromkeys(self.names, 1.0 / len(self.names))
         return spec.clutter * np.array([shares.get(name, 0.0) for name in self.names], np.float64)
 

@@ -161,7 +161,7 @@ def gather_evidence(
 def _starting_model(
     codes: NDArray[np.uint8], ranges: NDArray[np.float64], position_sigma: float
 ) -> NoiseTable:
-    """Return a usual detector, with the known deviation of places in metres."""
+    """Return a typical detector, with the known deviation of places in metres."""
     count = len(codes)
     return NoiseTable(
         codes=codes,

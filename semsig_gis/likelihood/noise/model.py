@@ -1,4 +1,4 @@
-"""Noise models: how a detector fails, as the likelihood method takes it.
+"""Noise models: how a detector fails, as the likelihood method assumes.
 
 A detector misses objects, gives some another class, invents some, and is a few degrees out.
 `NoiseSpec` says how often; `NoiseMixture` says that it is one of several models, unknown which.
@@ -259,7 +259,7 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
 
 
 def cell_noise(noise: Noise, step: float) -> Noise:
-    """Return a noise model for queries from anywhere in a cell, not from its middle alone.
+    """Return a noise model for queries from anywhere in a cell, not only from its centre.
 
     Parameters
     ----------
@@ -377,7 +377,7 @@ _NUMBERS = MappingProxyType(
 
 
 def _check_fading(name: str, points: object) -> None:
-    """Refuse a table of shares by distance that is none."""
+    """Refuse an invalid table of shares by distance."""
     try:
         table = np.array(points, dtype=np.float64)
     except (TypeError, ValueError):
@@ -405,7 +405,7 @@ def _check_shares(label: str, shares: Mapping[str, float]) -> None:
 
 
 def _table(label: str, value: object) -> Mapping[str, Any]:
-    """Return a mapping by class, or say that it is none."""
+    """Return a mapping by class, or refuse what is not one."""
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         msg = f"{label} of the noise is {value!r}; give a table by the names of the classes."
         raise InputError(msg)

@@ -64,7 +64,7 @@ class NoiseTable:
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
-        """Metres of each distance unit, shape (256,); what is nearest is not at the very place."""
+        """Metres of each distance unit, shape (256,); the nearest is above 0."""
         return np.asarray(np.maximum(np.arange(256), 0.5) * (self.reach / DISTANCE_UNITS))
 
     @cached_property
