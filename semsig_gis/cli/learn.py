@@ -46,7 +46,7 @@ Samples = Annotated[
     Path,
     typer.Option(
         help="Detections of known places: a CSV or JSON lines file of views with x and y "
-        "(metres) or cell_id (its middle)."
+        "(metres) or cell_id (its centre)."
     ),
 ]
 

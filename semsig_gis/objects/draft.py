@@ -114,7 +114,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     name = "town_benches"
     class = "bench"  # from the name: "benches"
     files = ["town_benches.csv"]
-    id_field = "id"  # a value of its own in every row
+    id_field = "id"  # a different value in every row
     geometry = "point"
     x_field = "lon"
     y_field = "lat"
@@ -236,7 +236,7 @@ def _metric_crs(layers: Sequence[Sample]) -> str:
         with contextlib.suppress(CrsError):
             require_metric_crs(crs)
             return f"metric_crs = {_text(str(crs))}"
-    return "# Without metric_crs, distances are taken in the UTM zone of the data."
+    return "# Without metric_crs, distances are computed in the UTM zone of the data."
 
 
 def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
@@ -282,7 +282,7 @@ def _stanza(name: str, draft: _Draft, *, several: bool) -> Iterator[str]:
     if draft.geometry:
         yield f"geometry = {_text(draft.geometry)}"
     else:
-        yield f"# geometry is of several kinds ({info.geometry}); centroids are taken."
+        yield f"# geometry is of several kinds ({info.geometry}); centroids are used."
     yield from _place(draft)
     least, most = (info.rows + 1) // 2, info.rows * 2
     yield (
@@ -302,7 +302,7 @@ def _class(guess: ClassGuess) -> str:
     line = f"{'role' if guess.is_role else 'class'} = {_text(guess.name)}  # "
     if guess.sure:
         return line + _plain(guess.reason)
-    others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is it so?"
+    others = f"; or is it {' or '.join(guess.others)}?" if guess.others else "; is this right?"
     return f"{line}{EDIT}: {_plain(guess.reason)}{others}"
 
 
@@ -314,11 +314,15 @@ def _identifier(draft: _Draft) -> Iterator[str]:
     numbers = [column for column in draft.columns if column.meant_for("row_number")]
     for column in [*named, *numbers]:
         if column.unique:
-            warning = "" if column in named else "; a program gave them, and may give others anew"
-            yield f"id_field = {_text(column.name)}  # a value of its own in {some}{warning}"
+            warning = (
+                ""
+                if column in named
+                else "; assigned by a program, which may assign others next time"
+            )
+            yield f"id_field = {_text(column.name)}  # a different value in {some}{warning}"
             return
     yield (
-        f"# No field that is named like an identifier has a value of its own in {some}; rows "
+        f"# No field that is named like an identifier has a different value in {some}; rows "
         "are identified by their number."
     )
     best = max(named, key=lambda column: len(column.counts), default=None)
@@ -330,7 +334,7 @@ def _identifier(draft: _Draft) -> Iterator[str]:
         # Numbers with decimals are different by chance.
         measured = any(str(value).count(".") == 1 for value in column.counts)
         if column.unique and not measured and column.name not in draft.position:
-            yield f"# id_field = {_text(column.name)}  # has one, if it is meant to identify a row"
+            yield f"# id_field = {_text(column.name)}  # different in {some}; use it if it is an id"
             return
 
 
@@ -365,12 +369,12 @@ def _filters(draft: _Draft) -> Iterator[str]:
             f"{_key(_exactly(str(value)))} = {_text(classes.get(value, draft.guess.name))}"
             for value, _ in counts.most_common()
         )
-        yield f"# If {_plain(field)} gives the class of a row, by all of its values{seen}:"
+        yield f"# If {_plain(field)} gives the class of a row, with all of its values{seen}:"
         yield f"# class_by = {{ field = {_text(field)}, values = {{ {values} }} }}"
     few = [column for column in draft.columns if column.few]
     few.sort(key=lambda column: not column.meant_for("filter"))  # the others keep their order
     if few:
-        yield f"# To keep some rows only, take one of these without the values not wanted{seen}:"
+        yield f"# To keep only some rows, use one of these without the unwanted values{seen}:"
     for column in few[:FILTERS_SHOWN]:
         values = ", ".join(_value(value) for value, _ in column.counts.most_common())
         numbers = ", ".join(f"{number:,}" for _, number in column.counts.most_common())
@@ -378,7 +382,7 @@ def _filters(draft: _Draft) -> Iterator[str]:
         yield f"# where = {{ {_key(column.name)} = [{values}] }}  # rows: {numbers}{missing}"
     if len(few) > FILTERS_SHOWN:
         names = ", ".join(_plain(column.name) for column in few[FILTERS_SHOWN:])
-        yield f"# More fields of few values: {names}"
+        yield f"# Other fields with few values: {names}"
 
 
 def _text(text: str) -> str:
