@@ -324,11 +324,11 @@ class RoughRanges(_AnyCity):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassScores:
-    """A detector that gives each object scores of all classes of the city, in place of one name.
+    """A detector that gives each object scores of all classes of the city, instead of one name.
 
-    The scores can be trusted: an object of any class is as likely to be given some scores as they
-    say. That of its own class is `right` in the mean (0.51 to 0.999). Methods that take names alone
-    have the one with the best score.
+    The scores can be trusted: the chance that an object gets certain scores is proportional to the
+    score of its class in them. That of its own class is `right` in the mean (0.51 to 0.999).
+    Methods that use only names take the one with the best score.
     """
 
     stream: ClassVar[int] = 1_530_938_417
