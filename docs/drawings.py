@@ -144,6 +144,34 @@ def _chances(rows: Sequence[dict[str, Any]]) -> sg.Plot:
     )
 
 
+def ages() -> Picture:
+    """Draw how many of the sure answers are right on old maps, by what is known of their age."""
+    rows = [
+        row
+        for row in _results("chances.json")
+        if row["map"] != "of the day" and row["city"] != "made up"
+    ]
+    rows.sort(key=lambda row: (row["city"], row["told"]))
+    names = [f"{row['city']}: {row['told'] or row['map'] + ', age not given'}" for row in rows]
+    places = np.arange(len(rows))[::-1]
+    shares = np.array([row["right"] / row["answered"] for row in rows])
+    ends = np.array([[row["low"], row["high"]] for row in rows]).T
+    title = "Answers with a chance of 0.9 or more, on old maps"
+    with blank_figure(6.6, 3.4) as figure:
+        axes = figure.add_axes((0.5, 0.17, 0.46, 0.71))
+        axes.axvline(0.9, color=COLOURS[1], linewidth=1, linestyle="--")
+        axes.errorbar(
+            shares, places, xerr=abs(ends - shares), fmt="o", color=COLOURS[0], elinewidth=1.5
+        )
+        axes.set(xlim=(0.65, 1.01), xlabel="share within 50 m", yticks=places)
+        axes.set_yticklabels(names)
+        axes.spines[["top", "right"]].set_visible(False)
+        figure.text(0.02, 0.94, title, weight="bold", size=10.5)
+        pairs = zip(names, shares, strict=True)
+        values = "; ".join(f"{name}: {share:.3f}" for name, share in pairs)
+        return saved(figure, title=title, description=f"{title}: share within 50 m. {values}.")
+
+
 def _curve(
     label: str, rows: Iterable[tuple[float, dict[str, Any]]], y: str, low: str, high: str
 ) -> sg.Curve:
@@ -156,7 +184,10 @@ def _curve(
 def write_drawings(folder: Path) -> None:
     """Draw all into a folder; a file that is the same is left."""
     folder.mkdir(exist_ok=True)
-    pictures = {plot.name: sg.draw_plot(plot) for plot in drawings()} | {"times": times()}
+    pictures = {plot.name: sg.draw_plot(plot) for plot in drawings()} | {
+        "times": times(),
+        "ages": ages(),
+    }
     for name, picture in pictures.items():
         path, svg = folder / f"{name}.svg", picture.svg
         if not path.is_file() or path.read_bytes() != svg:
