@@ -92,8 +92,9 @@ class Posterior(Displayed):
         """Return the row numbers of so many cells, likeliest first, or all if there are fewer."""
         cells = self._top(count)
         if len(cells) > 2 * count:
-            some, rest = self.chances[cells], len(cells) - count
-            least = np.partition(some, rest)[rest]
+            some = self.chances[cells]
+            # Of the negative, because equal zeros at the beginning would take ten times as long.
+            least = -np.partition(-some, count - 1)[count - 1]
             above, equal = cells[some > least], cells[some == least]
             cells = np.concatenate([above, equal[: count - len(above)]])
         return _likeliest_first(self.chances, cells)[:count]
