@@ -11,11 +11,12 @@ RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
 RELEASE := $(VENV)/.release
 TESTS := $(BIN)/python -m pytest -n auto --dist worksteal
+NOX := PATH="$$(printf '%s:' $$HOME/.pyenv/versions/*/bin)$$PATH:$(abspath $(BIN))" $(BIN)/nox -s
 BIOME := @biomejs/biome@2.6.8
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test coverage busy test-all oldest size lint bench accuracy views bayes chances reproduce golden soak stranger walks docs pictures plugin dist clean
+.PHONY: help demo test coverage busy test-all pythons oldest size lint bench accuracy views bayes chances reproduce golden soak stranger walks docs pictures plugin dist clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
@@ -32,11 +33,14 @@ coverage: $(DEV) ## the same, and whether it runs enough of the lines
 busy: $(DEV) ## the same beside six busy processes, because no test depends on time
 	$(BIN)/python -m benchmarks.busy $(TESTS)
 
-test-all: $(DEV) ## what is installed, over Pythons, dependencies and archives: hours
-	PATH="$$(printf '%s:' $$HOME/.pyenv/versions/*/bin)$$PATH:$(abspath $(BIN))" $(BIN)/nox -s matrix
+test-all: $(DEV) ## what is installed, over Pythons, dependencies and archives: half an hour
+	$(NOX) matrix
+
+pythons: $(DEV) ## a few tests of what is installed, on every Python of this machine
+	$(NOX) matrix -k 'wheel and newest' -- tests/storage
 
 oldest: $(DEV) ## what test-all calls oldest, into constraints-oldest.txt
-	PATH="$$PATH:$(abspath $(BIN))" $(BIN)/nox -s oldest
+	$(NOX) oldest
 
 size: ## the megabytes and seconds that the plain installation takes
 	$(PYTHON) -m benchmarks.installed
