@@ -208,12 +208,14 @@ def first_rows(
     """Yield every layer of a file, its first readable rows, and its coordinate columns if any."""
     for member in _layers(path):
         table = _csv(member, None, where=str(member))
+        info = _describe(member)
         if table is None:
-            yield _describe(member), tuple(first_rows_of(member, limit)), ()
+            count = min(limit, info.rows)
+            yield info, tuple(first_rows_of(member, info.fields, count)), ()
             continue
         good = (row for row in table.rows() if not isinstance(row, str))
         coordinates = (table.x, table.y) if table.x and table.y else ()
-        yield _describe(member), tuple(itertools.islice(good, limit)), coordinates
+        yield info, tuple(itertools.islice(good, limit)), coordinates
 
 
 def _layers(path: Path) -> tuple[Member, ...]:

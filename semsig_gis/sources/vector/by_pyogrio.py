@@ -171,20 +171,15 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
     return rows, (NOT_UTF8,) if blank else ()
 
 
-def first_rows_of(member: Member, limit: int) -> Iterator[dict[str, Any]]:
+def first_rows_of(member: Member, fields: Sequence[str], count: int) -> Iterator[dict[str, Any]]:
     """Yield the values of the first rows of a layer, without those that cannot be read."""
-    layer = describe(member)
-    limit = min(limit, layer.rows)
     try:
         with _listening():
-            values = _read(member, layer.fields, 0, limit)[1]
+            values = _read(member, fields, 0, count)[1]
     except Exception:  # noqa: BLE001 - a load reports it; here the other rows will do
-        values = []
-        for row in range(limit):
-            with contextlib.suppress(Exception), _listening():
-                values += _read(member, layer.fields, row, 1)[1]
+        values = read_each(member, fields, count)[0].values
     for value in values:
-        yield dict(zip(layer.fields, value, strict=True))
+        yield dict(zip(fields, value, strict=True))
 
 
 def _read(
