@@ -132,8 +132,9 @@ def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tupl
             wide += block.count(0)
             if not block.isascii():
                 text = decoder.decode(block)
-                bad += text.count(DAMAGED)
-                good += sum(not letter.isascii() for letter in text) - text.count(DAMAGED)
+                damaged = text.count(DAMAGED)
+                bad += damaged
+                good += len(text) - len(text.encode("ascii", "ignore")) - damaged
                 if len(words) < SAMPLE_WORDS:
                     some = NO_WORDS.split(block)
                     words |= dict.fromkeys(word for word in some if not word.isascii())
