@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
-import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
@@ -20,6 +19,7 @@ from pyproj import CRS, Transformer
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
     FULL_TURN,
+    HALF_TURN,
     cell_ids,
     crs_label,
     plane_distortion,
@@ -324,16 +324,15 @@ def _require_company(one: _Located, towns: _Towns) -> None:
 
 
 def _utm_zone(longitude: float, latitude: float) -> CRS:
-    point = gpd.GeoSeries.from_xy([longitude], [latitude], crs=WGS84)
-    try:
-        zone: CRS = point.estimate_utm_crs()
-    except RuntimeError as error:
+    if not -80 <= latitude <= 84:  # noqa: PLR2004 - the ends of UTM
         msg = (
             f"the data lies near {_place((longitude, latitude))}, where there is no UTM zone; give "
             "a projected CRS in metres as metric CRS."
         )
-        raise CrsError(msg) from error
-    return zone
+        raise CrsError(msg)
+    # PROJ would look through all zones for a tenth of a second.
+    zone = int((longitude + HALF_TURN) // 6) % 60 + 1
+    return CRS.from_epsg((32600 if latitude >= 0 else 32700) + zone)
 
 
 def _zone_label(centre: tuple[float, float] | None) -> str:
