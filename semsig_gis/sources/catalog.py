@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib.resources
 from dataclasses import dataclass
 from pathlib import Path
@@ -232,7 +233,7 @@ def load_catalog(name: str | Path) -> Catalog:
     except OSError as error:
         msg = f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
         raise CatalogError(msg) from error
-    return _catalog(parse_toml(content, text), text)
+    return _parsed(content, text)
 
 
 def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
@@ -305,6 +306,11 @@ def data_folder() -> Traversable:
     if shipped.is_dir():
         return shipped
     return Path(__file__).resolve().parents[2] / "data_sources"
+
+
+@functools.lru_cache
+def _parsed(content: str, where: str) -> Catalog:
+    return _catalog(parse_toml(content, where), where)
 
 
 def _catalog(content: dict[str, Any], where: str) -> Catalog:
