@@ -189,9 +189,9 @@ def raw_layer(
     table[GEOMETRY] = pd.Series(built_geometries(table[GEOMETRY]), table.index, dtype=object)
     off_globe = functools.partial(_off_globe, crs=crs, by_file=by_file, file=rules.file)
     for check in (_not_finite, off_globe):
-        bad = check(table)
-        errors |= bad
-        table = table.drop(index=list(bad))
+        if bad := check(table):
+            errors |= bad
+            table = table.drop(index=list(bad))
     repeated = 0
     if spec.unique_id:
         apart = APART_DEGREES if crs.is_geographic else APART_METRES

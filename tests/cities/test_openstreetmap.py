@@ -47,22 +47,24 @@ def tags_of(text: str) -> dict[str, str]:
     return dict(tag.split("=", 1) for tag in text.split(" "))
 
 
-def found(path: Path, text: str) -> dict[str, set[str]]:
-    """Return the layers that find something with these tags, and as which kinds of element."""
-    tags = tags_of(text)
-    write_osm(
-        path,
-        *PLACES,
-        node(4, 0.002, 0.002, tags),
-        way(5, [1, 2, 3, 1], tags),
-        relation(6, {5: "outer"}, {**tags, "type": "multipolygon"}),
-    )
-    kinds = {}
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Mapping[str, set[str]]]:
+    """Return, by tags, the layers that find something with them, and as which kinds of element."""
+    tagged = [*(text for _, _, texts in LAYERS.values() for text in texts), *TABLE["near_misses"]]
+    elements = [*PLACES]
+    for number, tags in enumerate(map(tags_of, tagged), 10):
+        elements += [
+            node(number, 0.002, 0.002, tags),
+            way(number, [1, 2, 3, 1], tags),
+            relation(number, {number: "outer"}, {**tags, "type": "multipolygon"}),
+        ]
+    path = write_osm(tmp_path_factory.mktemp("tags") / "city.osm", *elements)
+    layers: dict[str, dict[str, set[str]]] = {text: {} for text in tagged}
     for layer in read_layers(path, CATALOG.layers):
         assert layer.counts.unreadable == 0
-        if len(layer.table):
-            kinds[layer.spec.name] = set(layer.table.source_id.str.split("/").str[0])
-    return kinds
+        for kind, number in layer.table.source_id.str.split("/"):
+            layers[tagged[int(number) - 10]].setdefault(layer.spec.name, set()).add(kind)
+    return layers
 
 
 def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
@@ -91,14 +93,17 @@ def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
     ("name", "text"),
     [(name, text) for name, (_, _, texts) in LAYERS.items() for text in texts],
 )
-def test_every_tag_is_of_its_layer_alone(tmp_path: Path, name: str, text: str) -> None:
-    kinds = set(LAYERS[name][1].split(" "))
-    assert found(tmp_path / "city.osm", text) == {name: kinds}
+def test_every_tag_is_of_its_layer_alone(
+    found: Mapping[str, Mapping[str, set[str]]], name: str, text: str
+) -> None:
+    assert found[text] == {name: set(LAYERS[name][1].split(" "))}
 
 
 @pytest.mark.parametrize("text", TABLE["near_misses"])
-def test_near_misses_are_of_no_layer(tmp_path: Path, text: str) -> None:
-    assert found(tmp_path / "city.osm", text) == {}
+def test_near_misses_are_of_no_layer(
+    found: Mapping[str, Mapping[str, set[str]]], text: str
+) -> None:
+    assert found[text] == {}
 
 
 def test_a_stop_is_one_point(tmp_path: Path) -> None:
