@@ -37,7 +37,7 @@ from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,
     CitySpec,
     synthetic_city,
-    synthetic_surroundings,
+    synthetic_streets,
 )
 from semsig_gis.storage.runs import RunKind, read_json, write_json
 
@@ -348,7 +348,7 @@ def _make_city(
 ) -> None:
     layers = synthetic_city(spec)
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
-    _, streets = synthetic_surroundings(spec)
+    streets = synthetic_streets(spec)
     if note is not None:
         note(f"made up a city of {len(objects):,} street objects")
     database = build_database(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.core.geometry import Bounds
     from semsig_gis.sources.layers import GeometryKind, Role
     from semsig_gis.sources.synthetic.streets import Network
 
@@ -210,21 +211,32 @@ def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawL
     """
     spec = spec or CitySpec()
     network = lay_streets(spec.size, _random(spec, "streets"))
-    square = (-spec.size / 2, -spec.size / 2, spec.size / 2, spec.size / 2)
-
     built = np.ones(len(network.faces), bool)
     built[np.concatenate(open_ground(network, _random(spec, "open ground")))] = False
-    faces = shapely.clip_by_rect(network.faces[built], *square)
+    faces = shapely.clip_by_rect(network.faces[built], *_square(spec))
     houses = build_houses(network, faces[~shapely.is_empty(faces)], _random(spec, "houses"))
     numbers = [str(number) for number in range(len(houses))]
     buildings = _layer(spec, "buildings", _placed(spec, houses), numbers)
+    return buildings, _streets(spec, network)
 
-    lines = shapely.clip_by_rect(network.lines, *square)
+
+def synthetic_streets(spec: CitySpec) -> RawLayer:
+    """Make up the streets alone, those of `synthetic_surroundings`."""
+    return _streets(spec, lay_streets(spec.size, _random(spec, "streets")))
+
+
+def _streets(spec: CitySpec, network: Network) -> RawLayer:
+    lines = shapely.clip_by_rect(network.lines, *_square(spec))
     edges = np.flatnonzero(~shapely.is_empty(lines))
     numbers = [str(number) for number in edges]
     streets = _layer(spec, "streets", _placed(spec, lines[edges]), numbers)
     streets.table["half_width"] = network.half_width[edges]
-    return buildings, streets
+    return streets
+
+
+def _square(spec: CitySpec) -> Bounds:
+    half = spec.size / 2
+    return -half, -half, half, half
 
 
 def _random(spec: CitySpec, purpose: str) -> np.random.Generator:
