@@ -57,7 +57,7 @@ SHARP = NoiseSpec(detection=0.9, misnamed=0.05, clutter=0.5, bearing_sigma=4.0)
 
 
 # From well told apart to hardly.
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(
     st.integers(0, 1000),
     st.sampled_from([(6, 2), (12, 4), (9, 3)]),

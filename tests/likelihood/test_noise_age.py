@@ -175,7 +175,7 @@ def test_chances_on_an_old_map_come_true_once_its_age_is_told() -> None:
     new = later_city(old, 3, seed=9)
     year = compare_objects(old, later_city(old, 1, seed=10))
     database, now = build_database(old), build_database(new)
-    spec = QuerySpec(number=150, seen_from="anywhere", distortions=parse_chain("light"))
+    spec = QuerySpec(number=70, seen_from="anywhere", distortions=parse_chain("light"))
     queries = draw_queries(database, spec, store=ObjectStore.of(new), city=now)
     shares, counts = [], []
     for years in (0.0, 3.0):
