@@ -102,7 +102,7 @@ def test_tiles_that_are_too_small_or_too_many_are_refused(
 
 
 @given(world=worlds(), side=st.sampled_from([12.0, 30.0, 77.0, 1000.0]))
-@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+@settings(suppress_health_check=[HealthCheck.too_slow])
 def test_tiles_are_the_same_as_the_whole(world: World, side: float) -> None:
     # Ranges go up to 40 m, more than some tiles.
     with tempfile.TemporaryDirectory() as folder:
@@ -135,8 +135,10 @@ def houses_and_streets() -> dict[str, gpd.GeoDataFrame]:
     return {"buildings": houses, "streets": streets}
 
 
-@pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
-@pytest.mark.parametrize("suffix", [".parquet", ".gpkg"])
+@pytest.mark.parametrize(
+    ("mode", "suffix"),
+    [("all", ".parquet"), ("outdoor", ".parquet"), ("streets", ".parquet"), ("streets", ".gpkg")],
+)
 def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
     town: World, tmp_path: Path, mode: Mode, suffix: str
 ) -> None:
@@ -150,7 +152,7 @@ def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
         save(table, files[role])
         # Of other files than Parquet, no widths are read.
         tables[role] = read_surroundings(files[role], role=role, crs="EPSG:2154")  # type: ignore[arg-type]
-    found = tiled(town, 30.0, tmp_path, viewpoints=viewpoints, **files)
+    found = tiled(town, 50.0, tmp_path, viewpoints=viewpoints, **files)
     whole = build_database(
         town.street_objects,
         viewpoints=viewpoints,

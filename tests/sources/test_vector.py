@@ -243,7 +243,7 @@ things = st.lists(
 @pytest.mark.parametrize("suffix", FORMATS)
 @given(rows=things)
 @example(rows=[(0.0, 0.0, "x")])
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_round_trip(suffix: str, rows: list[tuple[float, float, str]]) -> None:
     x, y, kinds = zip(*rows, strict=True)
     table = frame(zip(x, y, strict=True), ident=np.arange(len(rows)) + 100, kind=list(kinds))
