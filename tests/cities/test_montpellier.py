@@ -79,6 +79,7 @@ def city(everything: tuple[StreetObjects, LoadReport]) -> SignatureDatabase:
 # --- Independent recomputations ---------------------------------------------------------------
 
 
+@pytest.fixture(scope="module")
 def published(geodata: Path) -> pd.DataFrame:
     """Read the twelve layers with another reader: class, x, y and the fields of the filters."""
     parts = []
@@ -145,10 +146,10 @@ def test_every_object_is_loaded(everything: tuple[StreetObjects, LoadReport]) ->
 
 
 def test_positions_are_those_of_another_reader(
-    everything: tuple[StreetObjects, LoadReport], geodata: Path
+    everything: tuple[StreetObjects, LoadReport], published: pd.DataFrame
 ) -> None:
     objects, _ = everything
-    frame = published(geodata)
+    frame = published
     assert objects.table["source"].tolist() == frame["layer"].tolist()
     # The files with a WKT of their own are moved by some micrometres at most.
     assert objects.xy == pytest.approx(frame[["x", "y"]].to_numpy(), abs=1e-3)
@@ -193,14 +194,14 @@ def test_the_database_survives_its_file(city: SignatureDatabase, tmp_path: Path)
 
 
 def test_the_catalogue_leaves_what_it_should(
-    chosen: tuple[StreetObjects, LoadReport], geodata: Path
+    chosen: tuple[StreetObjects, LoadReport], published: pd.DataFrame
 ) -> None:
     objects, report = chosen
     assert {item.name: item.counts.kept for item in report.layers} == {
         name: kept for name, (_, _, _, kept) in LAYERS.items()
     }
     assert len(objects) == 55_652
-    frame = published(geodata)
+    frame = published
     lamp = ["LANTERNE", "Lanterne", "LUMINAIRE AMBIANCE", "Luminaire en applique"]
     wanted = (
         (frame["layer"].ne("fountains") | frame["state"].eq("en fonction"))

@@ -148,7 +148,7 @@ def check(things: Sequence[Thing], radii: Mapping[str, float]) -> ConflationRepo
 
 
 @given(THINGS, RADII)
-@settings(max_examples=150)
+@settings(max_examples=80)
 def test_the_fast_way_gives_what_the_slow_way_gives(
     things: list[Thing], radii: dict[str, float]
 ) -> None:

@@ -480,7 +480,7 @@ def test_detection_naming_and_bearings_are_those_of_the_model(
     assert abs(off - expected) < 6.0 / sqrt(max(len(true), 1))
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(noise=noise_specs(), seed=seeds)
 def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> None:
     table = table_of(noise)
