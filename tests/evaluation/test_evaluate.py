@@ -437,9 +437,9 @@ def test_of_the_likelihood_method_its_answers_are_compared() -> None:
 def test_queries_from_other_places_are_refused() -> None:
     moved = SECOND.queries.set_geometry(SECOND.queries.geometry.translate(1.0))
     for queries in (SECOND.queries.head(99), moved):
-        with refused(InputError, "other queries", f"(100 and {len(queries)})", "same places"):
+        with refused(InputError, "different queries", f"(100 and {len(queries)})", "same places"):
             compare_evaluations(FIRST, replace(SECOND, queries=queries))
-        with refused(InputError, "other queries"):
+        with refused(InputError, "different queries"):
             changed_successes(FIRST, replace(SECOND, queries=queries))
 
 
