@@ -213,6 +213,16 @@ def test_corrupt_records_are_counted(fountains: Path, engine: str) -> None:
     assert layer.table.geometry.isna().sum() == 1
 
 
+def test_a_shapefile_that_does_not_state_its_encoding_is_latin(tmp_path: Path) -> None:
+    table = frame([(1, 2), (3, 4)], catégorie=["allée", "square"])
+    path = tmp_path / "things.shp"
+    table.to_file(path, encoding="ISO-8859-1")
+    path.with_suffix(".cpg").unlink()
+    layer = read(path, where=(("catégorie", ("allée",)),))
+    assert xy(layer) == [[1, 2]]
+    assert counts(layer) == (2, 1, 0)
+
+
 @pytest.mark.parametrize(
     ("suffix", "message"), [(".shp", "unreadable, or corrupt"), (".shx", "shx")]
 )

@@ -42,6 +42,7 @@ POINT = 1
 RING = 4  # coordinates of the shortest ring
 DIMENSIONS = 0xE0000000  # the bits that say of a third and a fourth
 LARGEST_STEP = 65_536
+LATIN = "ISO-8859-1"
 # A reader that fails so often without a good row between does not move on, and each of these
 # opens the file anew.
 FAILURES_IN_A_ROW = 20
@@ -189,12 +190,15 @@ def _read(
     size: int,
     *,
     undecoded: list[str] | None = None,
+    encoding: str | None = None,
 ) -> tuple[list[str], list[Sequence[Any]], list[bytes]]:
     """Return names, values and well-known binary of rows, all of them; else an error is raised.
 
-    Text that is not UTF-8 is an error, too, or None with its field added to `undecoded`.
+    Text that is not UTF-8 is an error, too, or None with its field added to `undecoded`. That of a
+    shapefile which does not state its encoding is Latin-1 then, for fiona as well.
     """
-    what = {"layer": member.layer, "columns": list(fields), "skip_features": start}
+    what: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
+    what |= {"skip_features": start}
     with open_arrow(
         member.address, return_fids=True, batch_size=size, use_pyarrow=True, **what
     ) as (_, reader):
@@ -205,11 +209,13 @@ def _read(
         raise ValueError(msg)
     columns = []
     for field in fields:
-        column = table.column(field)
         try:
+            column = table.column(field)
             columns.append([_plain(value) for value in column.to_pylist()])
-        except UnicodeDecodeError:
-            if undecoded is None:
+        except (KeyError, UnicodeDecodeError) as error:
+            if encoding is None and _encoding(member) == LATIN:
+                return _read(member, fields, start, size, encoding=LATIN)
+            if undecoded is None or isinstance(error, KeyError):
                 raise
             undecoded.append(field)
             columns.append([_text(value) for value in column.cast("binary").to_pylist()])
@@ -217,6 +223,11 @@ def _read(
     rows: list[Sequence[Any]] = [*zip(*columns, strict=True)] if columns else [()] * size
     # In a table without geometry that is another column, and nobody asks for places.
     return names, rows, table.column(table.num_columns - 1).to_pylist()
+
+
+def _encoding(member: Member) -> str:
+    encoding: str = pyogrio.read_info(member.address, layer=member.layer)["encoding"]
+    return encoding
 
 
 def _plain(value: object) -> object:
