@@ -65,8 +65,10 @@ class World:
         shutil.copytree(command.before, to, dirs_exist_ok=True)
 
 
-def made_world(folder: Path) -> World:
+def made_world(folder: Path, kills: int) -> World:
     """Make the city and its queries, run all commands on it, and keep what they change.
+
+    Of the long ones, no more are run than so many kills come to.
 
     Before a command is run again, its results are there already, with a byte more in each; but for
     folders, with which it goes on.
@@ -74,7 +76,8 @@ def made_world(folder: Path) -> World:
     now = folder / "now"
     commands = []
     words = _prepared(now, _portal(folder))
-    quick, long = _lines("writing", words), _lines("long", words)
+    quick = _lines("writing", words)
+    long = _lines("long", words)[: 1 + kills // (2 * len(quick))]
     for number, text in enumerate([*quick, *long]):
         before = folder / "before" / str(number)
         earlier = folder / "earlier"

@@ -61,11 +61,11 @@ class Case:
 
 
 def cases(kills: int, *, seed: int) -> Iterator[Case]:
-    """Yield so many kills, and of the other trials their share of it."""
+    """Yield so many kills, and of the other trials their share of it; commands take turns."""
     generator = random.Random(seed)  # noqa: S311 - no secrets
-    for part, share in PARTS.items():
-        for number in range(max(1, round(kills * share))):
-            yield Case(part=part, number=number, moment=generator.random())
+    parts = [part for part, share in PARTS.items() for _ in range(max(1, round(kills * share)))]
+    for number, part in enumerate(parts):
+        yield Case(part=part, number=number, moment=generator.random())
 
 
 def faults(world: World, case: Case, folder: Path) -> list[str]:

@@ -64,7 +64,7 @@ def main() -> None:
     # Not a TemporaryDirectory, which every forked process would remove at its end.
     folder = Path(tempfile.mkdtemp(prefix="soak-"))
     try:
-        place = _prepared(folder)
+        place = _prepared(folder, round(KILLS * options.share))
         print(f"{len(place.world.commands)} commands, {time.perf_counter() - start:.0f} s")
         rows = {
             part: {"part": part, "cases": 0, "clean": 0, **dict.fromkeys(FAULTS, 0)}
@@ -88,8 +88,8 @@ def main() -> None:
     sys.exit(int(any(row["cases"] != row["clean"] for row in rows.values())))
 
 
-def _prepared(folder: Path) -> Place:
-    world = made_world(folder / "world")
+def _prepared(folder: Path, kills: int) -> Place:
+    world = made_world(folder / "world", kills)
     forked(lambda: mutants.made_corpus(world, folder / "corpus"))
     disk = folder / "disk"
     disk.mkdir()
