@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import statistics
 import subprocess
@@ -24,7 +25,7 @@ from semsig_gis.likelihood.noise.model import cell_noise, named_noise
 from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
@@ -83,8 +84,9 @@ def comparisons(size: str) -> Iterator[Comparison]:
     with tempfile.TemporaryDirectory() as folder:
         city = Path(folder) / "city.parquet"
         save_database(database, city)
-        yield _batch_row(city, database, queries)
-        yield from _cold_rows(city, database, queries[0], max(1, repeats // 3))
+        timed = functools.partial(compare, warm_up=size == "full")
+        yield _batch_row(timed, city, database, queries)
+        yield from _cold_rows(timed, city, database, queries[0], max(1, repeats // 3))
 
 
 def _texts(database: SignatureDatabase) -> list[str]:
@@ -123,14 +125,19 @@ def _warm_rows(
         )
 
 
-def _batch_row(city: Path, database: SignatureDatabase, queries: Sequence[Signature]) -> Comparison:
+def _batch_row(
+    timed: Callable[..., Comparison],
+    city: Path,
+    database: SignatureDatabase,
+    queries: Sequence[Signature],
+) -> Comparison:
     """Measure a process that answers a file of queries."""
     file = city.with_name("queries.jsonl")
     lines = [json.dumps(query.to_dict(database.taxonomy)) for query in queries]
     file.write_text("\n".join(lines), encoding="utf-8")
     texts = _texts(database)
     asked = [json.loads(line)["types"] for line in lines]
-    return compare(
+    return timed(
         f"a process that answers {len(queries):,} queries by likelihood, {len(database):,} cells",
         lambda _: _process(*_localize(city), "--queries", str(file)),
         lambda _: cdist(asked, texts, scorer=Levenshtein.distance, dtype=np.uint8),
@@ -140,7 +147,11 @@ def _batch_row(city: Path, database: SignatureDatabase, queries: Sequence[Signat
 
 
 def _cold_rows(
-    city: Path, database: SignatureDatabase, query: Signature, repeats: int
+    timed: Callable[..., Comparison],
+    city: Path,
+    database: SignatureDatabase,
+    query: Signature,
+    repeats: int,
 ) -> Iterator[Comparison]:
     """Measure whole processes of the command."""
     asked = query.to_dict(database.taxonomy)
@@ -148,7 +159,7 @@ def _cold_rows(
     cells = f"{len(database):,} cells"
     plain = *_localize(city), *options
     before = sorted(city.parent.iterdir())
-    yield compare(
+    yield timed(
         f"cold: semsig localize by likelihood, {cells}",
         lambda _: _process(*plain),
         lambda _: _process(*plain, *_DISTANCE),
@@ -174,7 +185,7 @@ def _cold_rows(
         peer_name="before",
         bar=1.0,
     )
-    whole = compare(
+    whole = timed(
         f"cold: semsig localize by edit+edit but for answering, {cells}",
         lambda _: _process(*plain, *_DISTANCE),
         lambda _: _process("-c", _IMPORTS),
@@ -190,7 +201,7 @@ def _cold_rows(
         peer_name=whole.peer_name,
         bar=_LOADING,
     )
-    yield compare(
+    yield timed(
         "cold: semsig --help",
         lambda _: _process("-m", "semsig_gis.cli", "--help"),
         lambda _: _process("-c", "import typer, rich"),

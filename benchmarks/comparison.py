@@ -102,6 +102,7 @@ def compare(
     repeats: int,
     bar: float | None = None,
     paper: float | None = None,
+    warm_up: bool = True,
 ) -> Comparison:
     """Time two callables in turns and keep the median of each, in milliseconds.
 
@@ -114,11 +115,13 @@ def compare(
     peer_name : str
         What the peer is.
     repeats : int
-        How often each is timed, after one call that is not.
+        How often each is timed.
     bar : float, optional
         The ratio to reach.
     paper : float, optional
         The milliseconds that the source paper prints.
+    warm_up : bool, optional
+        Call each once before it is timed.
 
     Returns
     -------
@@ -126,7 +129,7 @@ def compare(
         The result.
     """
     times: tuple[list[float], list[float]] = ([], [])
-    for repeat in range(-1, repeats):
+    for repeat in range(-1 if warm_up else 0, repeats):
         for work, seconds in zip((ours, peer), times, strict=True):
             start = time.perf_counter()
             work(max(repeat, 0))

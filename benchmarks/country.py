@@ -84,14 +84,16 @@ def comparisons(size: str) -> Iterator[Comparison]:
         folder = Path(name)
         _save_country(folder / "few.parquet", scale.few, scale.metres)
         _save_country(folder / "country.parquet", scale.towns, scale.metres)
-        few = _build(folder, "few", scale, workers=2)
-        two = _build(folder, "country", scale, workers=2)
-        equal = _check_sample(folder, "country", scale)
-        one = _build(folder, "country", scale, workers=1)
-        if one.manifest != two.manifest:
-            msg = "two processes have built something else than one."
-            raise ArithmeticError(msg)
-        with _cluster(2) as (_, address):
+        with _cluster(2) as (client, address):
+            few = _build(folder, "few", scale, client, address)
+        with _cluster(1) as (client, address):
+            one = _build(folder, "country", scale, client, address)
+        with _cluster(2) as (client, address):
+            two = _build(folder, "country", scale, client, address)
+            equal = _check_sample(folder, "country", scale)
+            if one.manifest != two.manifest:
+                msg = "two processes have built something else than one."
+                raise ArithmeticError(msg)
             updates = list(_updates(folder, scale, address))
     what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
     print(
@@ -197,13 +199,12 @@ def _cluster(workers: int) -> Iterator[tuple[Client, str]]:
         yield client, cluster.scheduler_address
 
 
-def _build(folder: Path, name: str, scale: _Size, *, workers: int) -> _Run:
+def _build(folder: Path, name: str, scale: _Size, client: Client, scheduler: str) -> _Run:
     """Build a country on new processes."""
-    with _cluster(workers) as (client, address):
-        start = time.perf_counter()
-        manifest = _built(folder, name, scale, address)
-        seconds = time.perf_counter() - start
-        return _Run(manifest, seconds, max(client.run(own_peak).values()))
+    start = time.perf_counter()
+    manifest = _built(folder, name, scale, scheduler)
+    seconds = time.perf_counter() - start
+    return _Run(manifest, seconds, max(client.run(own_peak).values()))
 
 
 def _built(folder: Path, name: str, scale: _Size, scheduler: str) -> Manifest:

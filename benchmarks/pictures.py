@@ -43,7 +43,7 @@ from semsig_gis.objects.table import StreetObjects
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     import folium
     from selenium.webdriver import Chrome
@@ -58,7 +58,7 @@ GONE = 0.02  # share of the objects that a year takes away
 QUERIES, TRIALS = 500, 5
 WORKBENCH, MARKS = "workbench", 6
 MOST_MB, MOST_MEDIAN_MS, MOST_LATE_MS = 6.5, 20.0, 100.0
-ZOOMS = (-1, -1, 1, 1)
+ZOOMS = {"full": (-1, -1, 1, 1), "small": (1,)}
 SETTLED_S = 1.0  # until what moves and fades is at rest
 # Clicks the middle of the map.
 ASK = """
@@ -94,7 +94,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.pictures", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("pictures"), metavar="FOLDER")
     parser.add_argument("--size", choices=["full", "small"], default="full")
-    parser.add_argument("--map", metavar="NAME", help="take pictures of this map alone")
+    parser.add_argument(
+        "--map", nargs="+", metavar="NAME", help="take pictures of these maps alone"
+    )
     parser.add_argument(
         "--database", type=Path, metavar="FILE", help="take pictures of its workbench, too"
     )
@@ -107,6 +109,7 @@ def main() -> None:
     )
     options = parser.parse_args()
     small = options.size == "small" or options.geodata is None
+    zooms = ZOOMS["small" if small else "full"]
     objects = made_up(CitySpec(size=300.0)) if small else real(Path(options.geodata), MONTPELLIER)
     options.out.mkdir(parents=True, exist_ok=True)
     chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
@@ -117,19 +120,19 @@ def main() -> None:
         browser = started(chromium, driver, folder)
         try:
             for name, draw in _maps(objects, 50 if small else QUERIES).items():
-                if options.map not in {None, name}:
+                if options.map and name not in options.map:
                     continue
                 page = options.out / f"{name}.html"
                 save_map(draw(), page, self_contained=True, title=None if small else MONTPELLIER)
-                for picture in _pictures(browser, page, options.out):
+                for picture in _pictures(browser, page, options.out, zooms):
                     print(_line(picture), flush=True)
                     pictures.append(picture)
             cities = [] if options.database is None else [options.database]
-            if options.map in {None, WORKBENCH}:
+            if not options.map or WORKBENCH in options.map:
                 cities.insert(0, Path(folder, "city.parquet"))
                 save_with_store(build_database(objects), ObjectStore.of(objects), cities[0])
             for city in cities:
-                for picture in _workbench(browser, city, options.out, 2 if small else MARKS):
+                for picture in _workbench(browser, city, options.out, zooms, 2 if small else MARKS):
                     print(_line(picture), flush=True)
                     pictures.append(picture)
         finally:
@@ -181,7 +184,7 @@ def _maps(objects: StreetObjects, queries: int) -> dict[str, Callable[[], folium
     }
 
 
-def _pictures(browser: Chrome, page: Path, out: Path) -> Iterator[Picture]:
+def _pictures(browser: Chrome, page: Path, out: Path, zooms: Sequence[int]) -> Iterator[Picture]:
     """Yield the pictures of one page: on each screen, on each ground."""
     url = page.resolve().as_uri()
     for screen, ground in _screens(browser):
@@ -191,10 +194,12 @@ def _pictures(browser: Chrome, page: Path, out: Path) -> Iterator[Picture]:
         picture = _picture(browser, out, (page.stem, screen, ground), page.stat().st_size)
         browser.get(url)
         browser.execute_async_script(DRAWN)
-        yield _moved(browser, picture)
+        yield _moved(browser, picture, zooms)
 
 
-def _workbench(browser: Chrome, path: Path, out: Path, marks: int) -> Iterator[Picture]:
+def _workbench(
+    browser: Chrome, path: Path, out: Path, zooms: Sequence[int], marks: int
+) -> Iterator[Picture]:
     """Yield the pictures of the workbench of a city; print how soon it answers."""
     city = open_city(path)
     times: dict[bool, list[float]] = {True: [], False: []}
@@ -212,7 +217,7 @@ def _workbench(browser: Chrome, path: Path, out: Path, marks: int) -> Iterator[P
             browser.execute_script("document.getElementById('map').scrollIntoView()")
             browser.save_screenshot(str(out / f"{name}-{screen}-{ground}-map.png"))
             browser.execute_script("window.moved = semsig.map")
-            yield _moved(browser, picture)
+            yield _moved(browser, picture, zooms)
     for known, own in times.items():
         median, late = statistics.median(own), statistics.quantiles(own, n=10)[-1]
         print(
@@ -241,7 +246,7 @@ def _picture(
     """Take a picture of the page that is open, which may ask its own server alone."""
     time.sleep(SETTLED_S)
     browser.save_screenshot(str(out / f"{'-'.join(names)}.png"))
-    broken = Axe().run(browser)["violations"]
+    broken = Axe().run(browser, options={"resultTypes": ["violations"]})["violations"]
     requests = browser.execute_script(
         "return performance.getEntriesByType('resource').map((one) => one.name)"
     )
@@ -258,9 +263,9 @@ def _picture(
     )
 
 
-def _moved(browser: Chrome, picture: Picture) -> Picture:
+def _moved(browser: Chrome, picture: Picture, zooms: Sequence[int]) -> Picture:
     """Return a picture with how smoothly the map that is open moves."""
-    frames = browser.execute_async_script(FRAMES, ZOOMS)
+    frames = browser.execute_async_script(FRAMES, zooms)
     late = statistics.quantiles(frames, n=20)[-1]
     return replace(picture, median_ms=statistics.median(frames), late_ms=late)
 
