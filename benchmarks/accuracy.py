@@ -72,7 +72,7 @@ class _Size:
 
 _SIZES = {
     "full": _Size(PARIS_LIKE, 2000),
-    "small": _Size(CitySpec(size=600.0), 24),
+    "small": _Size(CitySpec(size=300.0), 8),
 }
 
 

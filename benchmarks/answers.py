@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["comparisons"]
 
 # The city, the queries of a batch, and how often a single query is timed.
-_SIZES = {"full": (PARIS_LIKE, 1000, 15), "small": (CitySpec(size=600.0), 20, 2)}
+_SIZES = {"full": (PARIS_LIKE, 1000, 15), "small": (CitySpec(size=300.0), 5, 2)}
 _SEED = 20
 _WARM, _WARM_REFINED = 15.0, 4.0
 _COLD, _MEMORY = 1 / 1.3, 1 / 1.5  # of what edit+edit takes

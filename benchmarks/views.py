@@ -187,7 +187,7 @@ def _rows(
     if not lines:
         return
     if name == PARIS_LIKE or geodata is None:
-        spec = CitySpec(size=600.0) if small else LIKE_PARIS
+        spec = CitySpec(size=300.0) if small else LIKE_PARIS
         objects = made_up(spec)
         database = made_up_streets(spec, objects)
     else:
