@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import replace
@@ -30,18 +31,28 @@ from semsig_gis.reports.evaluation import evaluation_tables
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from semsig_gis.evaluation.result import Evaluation
+
 
 ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)
 DATABASE = random_database(5, cells=150)
-EVALUATION = evaluate(DATABASE, queries=100, method=Method(keep=20), distortion=ALL_MISSED, seed=3)
 QUERIES = 60
 INDEX = build_index(DATABASE, named_noise("generic"))
-LIKELY = evaluate(DATABASE, queries=QUERIES, method=INDEX, distortion="medium", seed=2)
 OTHER = build_index(random_database(6), named_noise("light"))
 ASKED = [
     query.asked.signature for query in draw_queries(DATABASE, QuerySpec(number=QUERIES, seeds=(2,)))
 ]
 FOUR_ALIKE = database_of([("DD", [10, 200])] * 4 + [("B", [300])], height=5)
+
+
+@functools.cache
+def by_distance() -> Evaluation:
+    return evaluate(DATABASE, queries=100, method=Method(keep=20), distortion=ALL_MISSED, seed=3)
+
+
+@functools.cache
+def by_likelihood() -> Evaluation:
+    return evaluate(DATABASE, queries=QUERIES, method=INDEX, distortion="medium", seed=2)
 
 
 def test_hand_computed_rows_curve_and_recall_of_equal_cells() -> None:
@@ -120,7 +131,7 @@ def test_the_best_candidate_is_drawn_from_the_ties() -> None:
 
 
 def test_columns_tell_the_truth() -> None:
-    table = EVALUATION.queries
+    table = by_distance().queries
     cells = table["cell"].to_numpy()
     assert len(set(cells)) == len(table) == 100
     assert table.crs == DATABASE.crs
@@ -131,7 +142,7 @@ def test_columns_tell_the_truth() -> None:
     assert (table["query_length"] == table["query_types"].str.len()).all()
     counts = [len(text.split(",")) if text else 0 for text in table["query_bearings"]]
     assert (table["query_length"] == counts).all()
-    assert (EVALUATION.successful == (table["p50"] >= 0.5)).all()
+    assert (by_distance().successful == (table["p50"] >= 0.5)).all()
     assert (table[["query_ranges", "query_sectors"]] == "").all(axis=None)
 
 
@@ -155,8 +166,8 @@ def test_methods_on_sequences_take_types_and_bearings_alone() -> None:
 
 
 def test_a_query_of_which_nothing_is_left() -> None:
-    empty = EVALUATION.queries[EVALUATION.queries["query_length"] == 0]
-    assert len(empty) == EVALUATION.unlocalized > 0
+    empty = by_distance().queries[by_distance().queries["query_length"] == 0]
+    assert len(empty) == by_distance().unlocalized > 0
     zeros = ["tied", *(f"p{x}" for x in THRESHOLDS), *(f"near{x}" for x in NEAR_PLACES)]
     for columns, value in (
         (zeros, 0),
@@ -165,8 +176,8 @@ def test_a_query_of_which_nothing_is_left() -> None:
     ):
         assert (empty[columns] == value).all(axis=None)
     assert empty["best_cell_id"].isna().all()
-    assert EVALUATION.recall(99.9) < EVALUATION.recall(100) == 1
-    assert EVALUATION.cdf()[-1] == pytest.approx(1 - len(empty) / 100)
+    assert by_distance().recall(99.9) < by_distance().recall(100) == 1
+    assert by_distance().cdf()[-1] == pytest.approx(1 - len(empty) / 100)
 
 
 def test_nothing_left_of_any_query() -> None:
@@ -186,12 +197,12 @@ def test_false_objects_have_classes_of_the_database() -> None:
 
 
 def test_by_length() -> None:
-    table = EVALUATION.by_length()
+    table = by_distance().by_length()
     assert table["length"].to_list() == ["1-4", "5-9", "10-19", "20+"]
-    lengths = EVALUATION.queries["length"]
+    lengths = by_distance().queries["length"]
     more = (lengths >= 10).sum()
     assert table["n"].to_list() == [(lengths < 5).sum(), (lengths >= 5).sum() - more, more, 0]
-    assert table.loc[0, "p50"] == pytest.approx(EVALUATION.queries["p50"][lengths < 5].mean())
+    assert table.loc[0, "p50"] == pytest.approx(by_distance().queries["p50"][lengths < 5].mean())
     assert table.loc[3, "p10":].isna().all()
 
 
@@ -199,7 +210,7 @@ def test_progress_counts_every_query_and_the_time_is_that_of_the_matching() -> N
     seen: list[tuple[int, int]] = []
     evaluate(DATABASE, queries=9, progress=lambda done, total: seen.append((done, total)))
     assert seen == [(done, 9) for done in range(1, 10)]
-    assert 0 < EVALUATION.seconds_per_query < 1
+    assert 0 < by_distance().seconds_per_query < 1
 
 
 @pytest.mark.parametrize("top", [1, 2, 20, 150])
@@ -303,7 +314,7 @@ def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
 def test_the_queries_are_those_of_the_other_methods() -> None:
     same = ["cell", "query_types", "query_bearings", "query_length", "geometry"]
     other = evaluate(DATABASE, queries=QUERIES, method="edit+edit", seed=2)
-    assert other.queries[same].equals(LIKELY.queries[same])
+    assert other.queries[same].equals(by_likelihood().queries[same])
     assert other.queries[["chance", "right", "in_region"]].isna().all(axis=None)
     assert other.answers() == {}
     assert "coverage" not in other.by_length()
@@ -311,10 +322,10 @@ def test_the_queries_are_those_of_the_other_methods() -> None:
 
 
 def test_how_it_answers_is_counted() -> None:
-    table = LIKELY.queries
+    table = by_likelihood().queries
     given = table[table["chance"] >= 0.9]
     assert 0 < len(given) < QUERIES
-    answers = LIKELY.answers()
+    answers = by_likelihood().answers()
     assert answers == pytest.approx(
         {
             "coverage": len(given) / QUERIES,
@@ -322,18 +333,18 @@ def test_how_it_answers_is_counted() -> None:
             "in_region": table["in_region"].mean(),
         }
     )
-    by_length = LIKELY.by_length()
+    by_length = by_likelihood().by_length()
     share = (by_length["n"] * by_length["coverage"]).sum() / QUERIES
     assert share == pytest.approx(answers["coverage"])
-    assert LIKELY.summary()["results"].items() >= answers.items()
-    silent = replace(LIKELY, queries=table.assign(chance=0.0))
+    assert by_likelihood().summary()["results"].items() >= answers.items()
+    silent = replace(by_likelihood(), queries=table.assign(chance=0.0))
     assert silent.summary()["results"]["precision"] is None
 
 
 def test_the_report_tells_of_the_answers(snapshot: Callable[[str, str], None]) -> None:
-    tables = evaluation_tables(replace(LIKELY, seconds_per_query=0.0125))
+    tables = evaluation_tables(replace(by_likelihood(), seconds_per_query=0.0125))
     snapshot("likelihood.md", "\n".join(table.markdown() for table in tables))
-    silent = replace(LIKELY, queries=LIKELY.queries.assign(chance=0.0))
+    silent = replace(by_likelihood(), queries=by_likelihood().queries.assign(chance=0.0))
     assert ("Right answers, of these", "", "") in evaluation_tables(silent)[1].rows
 
 
@@ -356,7 +367,7 @@ def test_what_is_refused(options: dict[str, Any], words: list[str]) -> None:
 
 def test_a_threshold_that_was_not_kept_is_refused() -> None:
     with refused(SemsigError, "error of 12 m", "choose from 0, 5"):
-        EVALUATION.cdf([10, 12])
+        by_distance().cdf([10, 12])
 
 
 FIRST, SECOND = PAIR = tuple(

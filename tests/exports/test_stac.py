@@ -15,8 +15,6 @@ import pytest
 from pyproj import CRS
 from pystac.extensions.file import FileExtension
 from pystac.extensions.projection import ProjectionExtension
-from pystac.validation import RegisteredValidator
-from pystac.validation.stac_validator import JsonSchemaSTACValidator
 from sentences import refused
 from small_city import small_city
 
@@ -50,6 +48,10 @@ FIELDS: dict[str, dict[str, Any]] = {
 @pytest.fixture(autouse=True)
 def _schemas() -> Iterator[None]:
     """Have pystac validate without a network."""
+    # Here, because jsonschema takes more than a second.
+    from pystac.validation import RegisteredValidator
+    from pystac.validation.stac_validator import JsonSchemaSTACValidator
+
     validator = JsonSchemaSTACValidator()
     for name, fields in FIELDS.items():
         prefix = next(iter(fields)).partition(":")[0]

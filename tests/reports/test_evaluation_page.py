@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -24,15 +25,25 @@ from semsig_gis.reports.evaluation_page import evaluation_page
 from semsig_gis.reports.page import write_page
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from selenium.webdriver import Chrome
 
+    from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.reports.parts import Section
 
 CITY = random_town().database
-BY_DISTANCE = evaluate(CITY, queries=60, method=Method.parse("edit+edit:5%"))
-BY_LIKELIHOOD = evaluate(CITY, queries=60, method=build_index(CITY, named_noise("generic")))
+
+
+@functools.cache
+def by_distance() -> Evaluation:
+    return evaluate(CITY, queries=60, method=Method.parse("edit+edit:5%"))
+
+
+@functools.cache
+def by_likelihood() -> Evaluation:
+    return evaluate(CITY, queries=60, method=build_index(CITY, named_noise("generic")))
 
 
 def sections(evaluation: object) -> dict[str, Section]:
@@ -52,14 +63,14 @@ def sections(evaluation: object) -> dict[str, Section]:
 )
 def test_the_headline(near: float, chance: float | None, top: int, said: str) -> None:
     told = {"chance": np.nan if chance is None else chance, "right": 0.75}
-    queries = BY_DISTANCE.queries.assign(p50=near, **told)
-    assert said in evaluation_headline(replace(BY_DISTANCE, queries=queries, top=top))
+    queries = by_distance().queries.assign(p50=near, **told)
+    assert said in evaluation_headline(replace(by_distance(), queries=queries, top=top))
 
 
-@pytest.mark.parametrize("evaluation", [BY_DISTANCE, BY_LIKELIHOOD])
-def test_curves_and_numbers_are_those_of_the_evaluation(evaluation: object) -> None:
+@pytest.mark.parametrize("ask", [by_distance, by_likelihood])
+def test_curves_and_numbers_are_those_of_the_evaluation(ask: Callable[[], Evaluation]) -> None:
+    evaluation = ask()
     parts = sections(evaluation)
-    assert isinstance(evaluation, type(BY_DISTANCE))
     errors, groups = parts["errors"], parts["groups"]
     (curve,) = errors.plots[0].curves
     assert errors.plots[0].log
@@ -85,11 +96,11 @@ def test_curves_and_numbers_are_those_of_the_evaluation(evaluation: object) -> N
 
 
 def test_the_paper_stands_beside_the_same_settings() -> None:
-    (plot,) = sections(BY_DISTANCE)["errors"].plots
+    (plot,) = sections(by_distance())["errors"].plots
     assert [point[:2] for point in plot.paper] == [(50.0, 0.3733)]
-    shown = {number.row: number.paper for number in sections(BY_DISTANCE)["errors"].numbers}
+    shown = {number.row: number.paper for number in sections(by_distance())["errors"].numbers}
     assert (shown["P(error ≤ 50 m)"], shown["recall@10 %"]) == (0.3733, 0.6462)
-    assert sections(BY_LIKELIHOOD)["errors"].plots[0].paper == ()
+    assert sections(by_likelihood())["errors"].plots[0].paper == ()
 
 
 @pytest.mark.parametrize(
@@ -102,41 +113,41 @@ def test_the_paper_stands_beside_the_same_settings() -> None:
     ],
 )
 def test_what_the_paper_reads_off_its_plots(asked: str, point: list[tuple[float, float]]) -> None:
-    spec = replace(BY_DISTANCE.asked, distortions=parse_chain(asked))
-    points = paris_points(replace(BY_DISTANCE, asked=spec))
+    spec = replace(by_distance().asked, distortions=parse_chain(asked))
+    points = paris_points(replace(by_distance(), asked=spec))
     assert [one[:2] for one in points] == point
 
 
 def test_chances_are_told_where_a_method_states_them() -> None:
-    assert "chances" not in sections(BY_DISTANCE)
-    chances = sections(BY_LIKELIHOOD)["chances"]
+    assert "chances" not in sections(by_distance())
+    chances = sections(by_likelihood())["chances"]
     calibration, coverage = chances.plots
     assert calibration.diagonal
-    bins = BY_LIKELIHOOD.calibration().dropna(subset="true")
+    bins = by_likelihood().calibration().dropna(subset="true")
     assert calibration.curves[0].y == tuple(bins["true"])
     answered, right = coverage.curves
-    assert answered.y[0] == pytest.approx(BY_LIKELIHOOD.queries["chance"].notna().mean())
+    assert answered.y[0] == pytest.approx(by_likelihood().queries["chance"].notna().mean())
     assert len(right.y) == len(answered.y)
 
 
 def test_queries_of_which_nothing_was_left_and_none_failed() -> None:
-    lost = BY_LIKELIHOOD.queries.assign(
+    lost = by_likelihood().queries.assign(
         query_length=0, error_m=np.inf, chance=np.nan, right=np.nan, best_cell_id=None
     )
-    page = evaluation_page(replace(BY_LIKELIHOOD, queries=lost), CITY, name="town")
+    page = evaluation_page(replace(by_likelihood(), queries=lost), CITY, name="town")
     assert "Of 60 the distortion left nothing" in page.sections[0].text[0]
     assert "failures" not in [section.name for section in page.sections]
 
 
 def test_another_database_is_refused() -> None:
     with refused(InputError, "searched", "give the database"):
-        evaluation_page(BY_DISTANCE, CITY.select(slice(5)), name="town")
+        evaluation_page(by_distance(), CITY.select(slice(5)), name="town")
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the page of an evaluation."""
-    page = evaluation_page(BY_LIKELIHOOD, CITY, name="town <1>", command="semsig evaluate 'a b'")
+    page = evaluation_page(by_likelihood(), CITY, name="town <1>", command="semsig evaluate 'a b'")
     file = tmp_path_factory.mktemp("page") / "report.html"
     write_page(page, file)
     return file
@@ -145,7 +156,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_page_holds_everything(written: Path) -> None:
     page = HtmlPage(written.read_text("utf-8"))
     assert all(one.startswith("data:") for one in page.loaded)
-    headline = evaluation_headline(BY_LIKELIHOOD)
+    headline = evaluation_headline(by_likelihood())
     for text in ("town <1>", headline, "semsig evaluate 'a b'", "processors"):
         assert text in page.text
 

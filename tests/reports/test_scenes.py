@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -26,16 +28,23 @@ from semsig_gis.reports.scenes import (
 )
 from semsig_gis.sources.catalog import paper_taxonomy
 
+if TYPE_CHECKING:
+    from semsig_gis.evaluation.result import Evaluation
+
 CLASSES = paper_taxonomy()
 TOWN = random_town()
 CITY = TOWN.database
-FOUND = evaluate(CITY, queries=40, distortion="strong")
+
+
+@functools.cache
+def evaluation() -> Evaluation:
+    return evaluate(CITY, queries=40, distortion="strong")
 
 
 @pytest.mark.parametrize("successful", [True, False])
 def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
-    scenes = example_scenes(FOUND, CITY, successful=successful, count=3)
-    chosen = FOUND.queries[FOUND.successful == successful].head(3)
+    scenes = example_scenes(evaluation(), CITY, successful=successful, count=3)
+    chosen = evaluation().queries[evaluation().successful == successful].head(3)
     assert len(scenes) == len(chosen) == 3
     for shown, row in zip(scenes, chosen.to_dict("records"), strict=True):
         x, y = CITY.xy[row["cell"]]
@@ -63,8 +72,9 @@ def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
 
 
 def test_the_worst_failures_are_shown_in_pairs() -> None:
-    pairs = failure_pairs(FOUND, CITY, count=3)
-    told = FOUND.queries[~FOUND.successful & np.isfinite(FOUND.queries["error_m"])]
+    pairs = failure_pairs(evaluation(), CITY, count=3)
+    queries = evaluation().queries
+    told = queries[~evaluation().successful & np.isfinite(queries["error_m"])]
     worst = told.sort_values("error_m", ascending=False, kind="stable").head(3)
     assert len({scene.name for pair in pairs for scene in pair.scenes}) == 6
     for pair, (number, row) in zip(pairs, worst.iterrows(), strict=True):
