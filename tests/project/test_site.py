@@ -33,7 +33,7 @@ DOCS = ROOT / "docs"
 MOST_BYTES = 300_000
 MAIN = (
     *("index", "install", "tutorial", "gallery", "beside_the_paper", "how_sure"),
-    *("commands/localize", "api/core"),
+    *("commands/localize", "api/matching"),
 )
 
 pytestmark = pytest.mark.skipif(
