@@ -2,6 +2,8 @@
 # pyproject.toml or constraints.txt change. Only python3 with venv and pip is needed.
 
 PYTHON ?= python3
+# Where this is set, as in containers, every process compiles all modules again.
+export PYTHONDONTWRITEBYTECODE :=
 
 VENV := .venv
 BIN := $(VENV)/bin
