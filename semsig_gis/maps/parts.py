@@ -62,6 +62,18 @@ def page_element(file: str) -> str:
     return f"<script>{text}//# sourceURL=semsig/{file}\n</script>"
 
 
+class PageFile(Element):
+    """A file of the folder ``js`` in a page, as it is: to read it as a template would take long."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+        self.file = file
+
+    def render(self, **_kwargs: Any) -> str:  # noqa: ANN401 - as branca has it
+        """Return the element."""
+        return page_element(self.file)
+
+
 class Call(MacroElement):
     """A call of a function of the page's script, with elements of the map or plain values."""
 
@@ -83,7 +95,7 @@ class Call(MacroElement):
         """Put the style and the script into the page, then the call."""
         header = cast("Figure", self.get_root()).header
         for file in self.files:
-            header.add_child(Element(page_element(file)), name=file)
+            header.add_child(PageFile(file), name=file)
         return super().render(**kwargs)  # type: ignore[no-untyped-call]
 
 

@@ -13,7 +13,6 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from folium.template import Template
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machine import PATIENCE_S
@@ -186,10 +185,8 @@ def test_what_cannot_be_drawn(
 
 
 @pytest.mark.parametrize("file", BROWSER_FILES)
-def test_style_and_script_are_no_templates_themselves(file: str) -> None:
-    element = page_element(file)
-    assert Template(element).render() == element
-    assert element.count("</") == 1
+def test_style_and_script_end_where_their_element_does(file: str) -> None:
+    assert page_element(file).count("</") == 1
 
 
 HARMFUL = hostile_database(CITY)
