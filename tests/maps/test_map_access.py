@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import pytest
@@ -58,25 +58,27 @@ MAPS: dict[str, Callable[[], folium.Map]] = {
 }
 
 
-def violations(page: MapPage) -> list[tuple[str, list[Any]]]:
-    """Return the rules of axe that a page breaks, and where."""
-    found = Axe().run(page.browser)["violations"]
-    return [(one["id"], [node["target"] for node in one["nodes"]]) for one in found]
+# The rules of axe that a page breaks, and where.
+VIOLATIONS = """
+axe.run({resultTypes: ["violations"]}).then(({violations}) => arguments[0](
+  violations.map(({id, nodes}) => [id, nodes.map(({target}) => target)])));
+"""
 
 
 @pytest.mark.parametrize("name", MAPS)
 def test_axe_finds_nothing_in_light_and_dark_on_desk_and_phone(name: str, page: MapPage) -> None:
     broken = {}
     page.open(MAPS[name]())
+    page.browser.execute_script(Axe().axe_script)
     for screen in ((1440, 900), (390, 844)):
         with page.screen(*screen, mobile=screen[0] < 800):
             for colours in ("light", "dark"):
                 page.ask("map.fire('click', {latlng: map.getCenter()})")
                 page.told()
-                broken[(screen, colours, "told")] = violations(page)
+                broken[(screen, colours, "told")] = page.ask_later(VIOLATIONS)
                 page.ask("semsig.hide(map)")
                 page.ask("document.querySelectorAll('details').forEach((one) => one.open = true)")
-                broken[(screen, colours, "")] = violations(page)
+                broken[(screen, colours, "")] = page.ask_later(VIOLATIONS)
                 page.ask("document.querySelector('.semsig-colours').click()")
     assert {key: rules for key, rules in broken.items() if rules} == {}
 
