@@ -70,7 +70,7 @@ def test_what_is_refused(run: Run, done: Done) -> None:
     sentence(run(EXPERIMENT, "results"), "another experiment", "distortions")
     write_spec(SPEC.replace("paper", "best").replace("30", "20"))
     done(EXPERIMENT, "other")
-    sentence(run("compare results other"), "other queries")
+    sentence(run("compare results other"), "different queries")
     pair = "compare results/phone/paper-top1 other"
     sentence(run(pair), "a single evaluation", "none in common")
 
