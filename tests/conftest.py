@@ -200,7 +200,8 @@ def _chromium(
     switches = (
         "--headless=new --no-sandbox --disable-dev-shm-usage --disable-gpu --disable-quic "
         "--enable-unsafe-swiftshader "  # WebGL, drawn by the processor
-        "--disable-component-update --window-size=1200,900"
+        "--disable-component-update --window-size=1200,900 "
+        "--force-prefers-reduced-motion"  # a map that glides is drawn thirty times
     )
     for argument in (
         *switches.split(),

@@ -9,6 +9,7 @@ from map_pages import MapPage, assert_quiet
 from small_city import small_city, small_evaluation
 
 from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.maps.page import save_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,8 +25,16 @@ def page(browser: Chrome, tmp_path: Path, carried: None) -> Iterator[MapPage]:  
     assert_quiet(browser)
 
 
+@pytest.fixture(scope="session")
+def evaluation_page(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the address of the map of an evaluation."""
+    file = tmp_path_factory.mktemp("evaluation") / "map.html"
+    save_map(evaluation_map(small_evaluation("medium"), small_city()[0]), file, self_contained=True)
+    return file.as_uri()
+
+
 @pytest.fixture
-def evaluated(page: MapPage) -> MapPage:
+def evaluated(page: MapPage, evaluation_page: str) -> MapPage:
     """Return the page with the map of an evaluation."""
-    page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
+    page.visit(evaluation_page)
     return page

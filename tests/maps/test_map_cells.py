@@ -97,7 +97,7 @@ def test_buttons_go_through_the_group_and_to_its_ends(page: MapPage) -> None:
 
 def choices(page: MapPage) -> list[str]:
     """Return the cells that the panel offers to compare with."""
-    return [one.text for one in page.all(".semsig-choices li > button:first-child")]
+    return page.texts(".semsig-choices li > button:first-child")
 
 
 def test_three_lookalikes_are_told_of_with_their_places(page: MapPage) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,8 +21,6 @@ from semsig_gis.maps.objects import objects_map
 from semsig_gis.maps.parts import to_latlon
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from map_pages import MapPage
 
 CITY = random_town().database
@@ -38,21 +35,17 @@ for (const [number, place] of arguments[0].entries()) {
   if (top && !top.closest(".semsig-panel, .leaflet-control")) return [number, x, y];
 }
 """
+# Click at a share of the half width from the middle: does the map glide?
+GLIDES = """
+map.once("semsig-told", () => arguments[1](Boolean(map._panAnim?._inProgress)));
+const x = (1 + arguments[0]) * map.getSize().x / 2;
+map.fire("click", {latlng: map.containerPointToLatLng([x, map.getSize().y / 2])});
+"""
 BESIDE_THE_PANEL = """
 const {x, y} = map.latLngToContainerPoint(toldPlace());
 const box = document.querySelector(".semsig-panel").getBoundingClientRect();
 return 0 <= x && x <= innerWidth && 0 <= y && y <= innerHeight && !(box.x <= x && box.y <= y);
 """
-
-
-@contextmanager
-def still(page: MapPage, width: int, height: int) -> Iterator[None]:
-    """Make the window as large as a screen, whose owner wants nothing to move by itself."""
-    with page.screen(width, height, mobile=False):
-        features = [{"name": "prefers-reduced-motion", "value": "reduce"}]
-        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-        yield
-        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
 def press(page: MapPage, x: float, y: float) -> None:
@@ -69,7 +62,7 @@ def wait_for(page: MapPage, key: str | None) -> None:
 @pytest.mark.parametrize("screen", SCREENS)
 def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int]) -> None:
     rng = np.random.default_rng(7)
-    with still(page, *screen):
+    with page.screen(*screen, mobile=False):
         page.open(ambiguity_map(CITY))
         page.ask("map.setView(arguments[0], 18, {animate: false})", PLACES.mean(axis=0).tolist())
         for _ in range(20):
@@ -82,12 +75,24 @@ def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int
 
 @pytest.mark.parametrize("screen", SCREENS)
 def test_what_is_told_of_is_never_covered(page: MapPage, screen: tuple[int, int]) -> None:
-    with still(page, *screen):
+    with page.screen(*screen, mobile=False):
         page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
         count = page.ask("return signs('failed').length")
         for query in range(0, count, max(1, count // 12)):
             page.ask("signs('failed')[arguments[0]].fire('click')", query)
             assert page.ask(BESIDE_THE_PANEL)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_the_map_glides_unless_that_is_disliked(page: MapPage, moving: bool) -> None:  # noqa: FBT001
+    with page.screen(1440, 900, mobile=False, moving=moving):
+        page.open(ambiguity_map(CITY))
+        page.ask("map.setView(arguments[0], 19, {animate: false})", PLACES[0].tolist())
+        for side in (-0.95, 0.95):
+            assert page.ask_later(GLIDES, side) == moving
+            page.rest()
+            assert page.ask(BESIDE_THE_PANEL)
+            page.ask("semsig.hide(map)")
 
 
 def test_a_click_beside_the_cells_is_answered_too(page: MapPage) -> None:
@@ -110,7 +115,7 @@ def test_a_click_beside_the_cells_is_answered_too(page: MapPage) -> None:
 
 
 def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
-    with still(page, 390, 844):
+    with page.screen(390, 844, mobile=False):
         page.open(ambiguity_map(CITY))
         panel = page.one(".semsig-panel")
         names = [panel.get_attribute(name) for name in ("role", "aria-live", "aria-label")]
@@ -137,7 +142,7 @@ def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
             swipe.move_by_offset(0, far).release().perform()
             wait_for(page, key if open_ else None)
         page.ask("semsig.hide(map)")  # which is closed
-    with still(page, 1440, 900):
+    with page.screen(1440, 900, mobile=False):
         page.click(CITY, 0)
         swipe = ActionChains(page.browser).click_and_hold(page.one(head))
         swipe.move_by_offset(100, 0).release().perform()
@@ -182,7 +187,7 @@ def lit(page: MapPage) -> list[list[bool]]:
 def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
     """The oracle is where the objects are that the city was made from."""
     cell = int(CITY.lengths.argmax())
-    with still(page, 1440, 900):
+    with page.screen(1440, 900, mobile=False):
         page.open(ambiguity_map(CITY))
         page.ask("map.setView(arguments[0], 19, {animate: false})", PLACES[cell].tolist())
         page.click(CITY, cell)
