@@ -5,6 +5,7 @@ Equal scores are common, so every figure is an expectation over all orders of th
 
 from __future__ import annotations
 
+import functools
 import math
 import platform
 from dataclasses import replace
@@ -233,6 +234,7 @@ def make_evaluation(
     )
 
 
+@functools.cache
 def versions() -> dict[str, str]:
     """Return the versions of the software that decides the figures and their speed."""
     parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}

@@ -210,12 +210,12 @@ def test_workers_write_the_same_files_as_one_process(
 
 @pytest.mark.usefixtures("_parts_as_elsewhere")
 def test_several_experiments_at_once_are_as_one_by_one(
-    folder: Path, results: Path, tmp_path: Path
+    folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
 ) -> None:
     other = replace(SPEC, queries=5, seeds=(3, 4))
     run_experiment(other, tmp_path / "alone", folder=folder)
     specs = {tmp_path / "a": SPEC, tmp_path / "b": other}
-    found = run_experiments(specs, folder=folder, workers=2)
+    found = run_experiments(specs, folder=folder, scheduler=cluster.scheduler_address)
     assert contents(tmp_path / "a") == contents(results)
     assert contents(tmp_path / "b") == contents(tmp_path / "alone")
     again = run_experiments(specs, folder=folder)
@@ -352,7 +352,7 @@ def test_experiments_that_do_not_fit(folder: Path, tmp_path: Path) -> None:
 def test_a_later_city_is_looked_at_from_anywhere(folder: Path, tmp_path: Path) -> None:
     spec = replace(
         SPEC,
-        queries=40,
+        queries=20,
         seen_from="anywhere",
         city="later.parquet",
         methods={**SPEC.methods, "generic": parse_method("likelihood:light:refined:heading=10")},
@@ -370,7 +370,7 @@ def test_a_later_city_is_looked_at_from_anywhere(folder: Path, tmp_path: Path) -
     assert (lost[["rank_low", "rank_high"]] == len(TOWN.database)).all(axis=None)
     assert (lost["type_group"] == 0).all()
     districts = pd.read_csv(tmp_path / "out" / "phone" / "generic-top1" / "districts.csv")
-    assert districts["n"].sum() == 40
+    assert districts["n"].sum() == 20
     assert districts["district"].tolist()[0] == "west"
     assert set(districts["district"]) <= {"west", "nook", "elsewhere"}
     assert set(open_results(tmp_path / "out")) == set(found)
