@@ -89,7 +89,7 @@ UPDATE = "--objects objects.parquet --json"
 @pytest.mark.parametrize(
     ("line", "every"),
     [
-        (f"update city.parquet {UPDATE}", 4),
+        (f"update city.parquet {UPDATE}", 8),
         (f"update other.parquet {UPDATE} --out city.parquet", 9),
     ],
 )
@@ -118,7 +118,7 @@ def test_a_city_in_parts_is_the_old_one_or_the_new(
     code, _, err = run("build before.parquet --out city --tile 100")
     assert code == 0, err
     names, outcomes = names_in(prepared), set()
-    for folder, change in kills(prepared, TILES, every=13):
+    for folder, change in kills(prepared, TILES, every=26):
         outcomes.add(CELLS[len(open_city(folder / "city").database)])
         monkeypatch.chdir(folder)
         code, _, err = run(TILES)
