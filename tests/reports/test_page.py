@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import io
 import json
 import math
@@ -44,6 +45,19 @@ def written(given: Report, folder: Path) -> dict[str, bytes]:
     return contents(folder)
 
 
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return what gives the folder of a report, with texts that try to do harm if any are given."""
+
+    @functools.cache
+    def folder(harm: str) -> Path:
+        place = tmp_path_factory.mktemp("reported")
+        write_report(hostile_report(harm) if harm else ordinary_report(), place)
+        return place
+
+    return folder
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
@@ -73,9 +87,11 @@ def harmless(text: str) -> HtmlPage:
     return page
 
 
-def test_what_is_written(tmp_path: Path, snapshot: Callable[[str, str], None]) -> None:
+def test_what_is_written(
+    reported: Callable[[str], Path], tmp_path: Path, snapshot: Callable[[str, str], None]
+) -> None:
     files = written(ordinary_report(), tmp_path / "new" / "folder")
-    assert files == written(ordinary_report(), tmp_path / "again")
+    assert files == contents(reported(""))
     texts = {"numbers.csv", "figures/errors.csv", "report.json", "report.md"}
     for name in texts:
         text = files[name].decode().replace(__version__, "VERSION")
@@ -93,9 +109,9 @@ def test_what_is_written(tmp_path: Path, snapshot: Callable[[str, str], None]) -
 
 
 @pytest.mark.parametrize("harm", [HARM, LONG, "\ud83d"])
-def test_text_from_data_stays_text(harm: str, tmp_path: Path) -> None:
+def test_text_from_data_stays_text(harm: str, reported: Callable[[str], Path]) -> None:
     given = hostile_report(harm)
-    files = written(given, tmp_path)
+    files = contents(reported(harm))
     harmless(files["report.html"].decode())
     assert strict(files["report.json"])["title"] == given.title
     assert len(rows(files["numbers.csv"])) == 3
@@ -133,8 +149,8 @@ def test_wide_and_long_tables() -> None:
 
 
 @pytest.mark.parametrize("harm", [HARM, LONG])
-def test_markdown_keeps_its_shape(harm: str, tmp_path: Path) -> None:
-    text = written(hostile_report(harm), tmp_path)["report.md"].decode()
+def test_markdown_keeps_its_shape(harm: str, reported: Callable[[str], Path]) -> None:
+    text = (reported(harm) / "report.md").read_bytes().decode()
     # No mark of the data's own is left: not of HTML, images, code, emphasis, tables or formulas.
     assert "<" not in text
     bare = re.sub(r"\\.", "", text.replace("![", "").replace("](figures/", ""))
@@ -196,7 +212,7 @@ def test_other_files_of_the_folder_are_left_alone(tmp_path: Path) -> None:
     assert files["numbers.csv"].count(b"\n") == 1
     assert not list(tmp_path.rglob(".semsig-*"))
     with refused(InputError, "mine.txt"):
-        write_report(ordinary_report(), tmp_path / "mine.txt")
+        write_report(report(), tmp_path / "mine.txt")
 
 
 NO_NAMES = ["", "../up", "a b", "a.b", "a/b", "é", "a\n"]
@@ -240,10 +256,9 @@ def assert_only_its_pictures(page: MapPage, count: int) -> None:
 
 
 @pytest.mark.parametrize("width", [1400, 400])
-def test_a_page_in_a_browser(page: MapPage, width: int) -> None:
-    write_report(ordinary_report(), page.folder)
+def test_a_page_in_a_browser(page: MapPage, width: int, reported: Callable[[str], Path]) -> None:
     with page.screen(width, 900, mobile=width < 500):
-        page.browser.get((page.folder / "report.html").as_uri())
+        page.browser.get((reported("") / "report.html").as_uri())
         assert page.browser.title == "Report"
         assert max(image.size["width"] for image in page.all("figure img")) <= width
         overflow = "return document.documentElement.scrollWidth - window.innerWidth"
@@ -251,12 +266,11 @@ def test_a_page_in_a_browser(page: MapPage, width: int) -> None:
         assert_only_its_pictures(page, 6)
 
 
-def test_a_page_is_dark_where_that_is_liked(page: MapPage) -> None:
-    write_page(ordinary_report(), page.folder / "report.html")
+def test_a_page_is_dark_where_that_is_liked(page: MapPage, reported: Callable[[str], Path]) -> None:
     for mode, most in (("light", 256), ("dark", 90)):
         liked = {"features": [{"name": "prefers-color-scheme", "value": mode}]}
         page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", liked)
-        page.browser.get((page.folder / "report.html").as_uri())
+        page.browser.get((reported("") / "report.html").as_uri())
         for image in page.all("img"):
             pixels = np.asarray(Image.open(io.BytesIO(image.screenshot_as_png)).convert("L"))
             assert most - 90 < np.median(pixels) < most
@@ -288,11 +302,10 @@ def test_tables_fit_a_screen_and_a_sheet(page: MapPage, width: int, media: str) 
 
 
 @pytest.mark.parametrize("harm", [HARM, LONG])
-def test_harm_in_a_browser(page: MapPage, harm: str) -> None:
-    write_report(hostile_report(harm), page.folder)
-    page.browser.get((page.folder / "report.html").as_uri())
+def test_harm_in_a_browser(page: MapPage, harm: str, reported: Callable[[str], Path]) -> None:
+    page.browser.get((reported(harm) / "report.html").as_uri())
     assert page.all("script") == []
     assert one_line(HOSTILE) in page.browser.execute_script("return document.body.textContent")
     assert_only_its_pictures(page, 5)
-    page.browser.get((page.folder / "figures" / "errors.svg").as_uri())
+    page.browser.get((reported(harm) / "figures" / "errors.svg").as_uri())
     assert page.all("script") == []
