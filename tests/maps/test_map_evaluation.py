@@ -192,20 +192,15 @@ def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
             assert abs(turn) <= 0.51  # north up, clockwise, whole degrees
             assert np.hypot(x, y) < 54.0
     # Every object of both has one verdict, and the key counts them.
-    counts = [
-        Counter(
-            str(one.get_attribute("class")).split()[1]
-            for one in wheel.find_elements(By.CSS_SELECTOR, ".object")
-        )
-        for wheel in wheels
-    ]
+    kinds = "return [...arguments[0].querySelectorAll('.object')].map((one) => one.classList[1])"
+    counts = [Counter(evaluated.ask(kinds, wheel)) for wheel in wheels]
     asked, cell = counts
     assert (
         asked["matched"] == cell["matched"] <= (Counter(seen[0][1]) & Counter(seen[1][1])).total()
     )
     assert asked["misnamed"] == cell["misnamed"]
     assert (asked["missed"], cell["false"]) == (0, 0)
-    key = [one.text for one in evaluated.all(".semsig-key span")]
+    key = evaluated.texts(".semsig-key span")
     both = asked | {"missed": cell["missed"]}
     words = {one: one for one in ("matched", "misnamed", "missed")} | {"false": "extra"}
     assert key == [f"{both[one]} {word}" for one, word in words.items() if both[one]]

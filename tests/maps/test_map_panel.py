@@ -173,15 +173,15 @@ def test_what_a_key_names_is_told_again(page: MapPage) -> None:
         assert not page.ask(opened, kind, rest)[0]
 
 
+LIT = """
+return [...document.querySelectorAll(".semsig-wheels figure")].map((wheel) =>
+  [...wheel.querySelectorAll(".object")].map((one) => one.classList.contains("lit")));
+"""
+
+
 def lit(page: MapPage) -> list[list[bool]]:
     """Return of each object of each wheel whether it is lit."""
-    return [
-        [
-            "lit" in str(one.get_attribute("class")).split()
-            for one in wheel.find_elements(By.CSS_SELECTOR, ".object")
-        ]
-        for wheel in page.all(".semsig-wheels figure")
-    ]
+    return list(page.ask(LIT))
 
 
 def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:

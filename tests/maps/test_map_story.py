@@ -35,10 +35,14 @@ def story() -> folium.Map:
 
 def checked(page: MapPage) -> list[str]:
     """Return the colours of the cells that are chosen."""
-    boxes = page.all("[data-group=cells] label")
-    return [
-        one.text.strip() for one in boxes if one.find_element("css selector", "input").is_selected()
-    ]
+    return page.texts("[data-group=cells] label:has(:checked)")
+
+
+# Of images, what they show, and in which order they lie.
+LOOKS = """
+return [...document.querySelectorAll(arguments[0])].map((one) =>
+  [one.getAttribute("src"), getComputedStyle(one).zIndex]);
+"""
 
 
 def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
@@ -55,9 +59,10 @@ def test_layers_are_in_groups_and_cells_have_one_colour(page: MapPage) -> None:
     for name in names:
         page.switch(name)
         assert checked(page) == [name]
-        seen[name] = tuple(one.get_attribute("src") for one in page.all(IMAGES))
+        images = page.ask(LOOKS, IMAGES)
+        seen[name] = tuple(source for source, _ in images)
         assert len(page.all(".semsig-field")) == (name == "Share of queries that fail")
-        orders = [one.value_of_css_property("z-index") for one in page.all(IMAGES)]
+        orders = [order for _, order in images]
         assert orders == sorted(orders)  # the first is below
     (city,) = seen["Objects seen from a cell"]
     assert seen["Share of queries that fail"] == (city,)
