@@ -66,7 +66,7 @@ class PageFile(Element):
     """A file of the folder ``js`` in a page, as it is: to read it as a template would take long."""
 
     def __init__(self, file: str) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
+        super().__init__()
         self.file = file
 
     def render(self, **_kwargs: Any) -> str:  # noqa: ANN401 - as branca has it
