@@ -134,8 +134,10 @@ def test_every_picture_has_an_alternative(pages: dict[str, Page]) -> None:
         if not (picture.get("alt") or "").strip()
     ]
     assert without == []
-    main = ("index", "install", "tutorial", "gallery", "how_sure", "beside_the_paper")
-    assert all(pages[name].pictures for name in main)
+    main = {"index", "install", "tutorial", "gallery", "how_sure", "beside_the_paper"}
+    if "SEMSIG_SITE" not in os.environ:
+        main.remove("tutorial")  # whose commands draw them
+    assert [name for name in main if not pages[name].pictures] == []
 
 
 def test_tables_that_the_tutorial_prints_are_whole(site: Path) -> None:
