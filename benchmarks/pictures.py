@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import itertools
 import json
 import math
 import os
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.identify.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
 
+    Looks = Sequence[tuple[str, str]]
+
 SCREENS = {"desk": (1440, 900, 1.0), "phone": (390, 844, 2.0)}
 GROUNDS = ("light", "dark")
 SEED = 20
@@ -59,6 +62,11 @@ QUERIES, TRIALS = 500, 5
 WORKBENCH, MARKS = "workbench", 6
 MOST_MB, MOST_MEDIAN_MS, MOST_LATE_MS = 6.5, 20.0, 100.0
 ZOOMS = {"full": (-1, -1, 1, 1), "small": (1,)}
+# Every screen with every ground, or each of them once.
+LOOKS = {
+    "full": tuple(itertools.product(SCREENS, GROUNDS)),
+    "small": tuple(zip(SCREENS, GROUNDS, strict=True)),
+}
 SETTLED_S = 1.0  # until what moves and fades is at rest
 # Clicks the middle of the map.
 ASK = """
@@ -109,7 +117,8 @@ def main() -> None:
     )
     options = parser.parse_args()
     small = options.size == "small" or options.geodata is None
-    zooms = ZOOMS["small" if small else "full"]
+    size = "small" if small else "full"
+    zooms, looks = ZOOMS[size], LOOKS[size]
     objects = made_up(CitySpec(size=300.0)) if small else real(Path(options.geodata), MONTPELLIER)
     options.out.mkdir(parents=True, exist_ok=True)
     chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
@@ -124,7 +133,7 @@ def main() -> None:
                     continue
                 page = options.out / f"{name}.html"
                 save_map(draw(), page, self_contained=True, title=None if small else MONTPELLIER)
-                for picture in _pictures(browser, page, options.out, zooms):
+                for picture in _pictures(browser, page, options.out, looks, zooms):
                     print(_line(picture), flush=True)
                     pictures.append(picture)
             cities = [] if options.database is None else [options.database]
@@ -132,7 +141,8 @@ def main() -> None:
                 cities.insert(0, Path(folder, "city.parquet"))
                 save_with_store(build_database(objects), ObjectStore.of(objects), cities[0])
             for city in cities:
-                for picture in _workbench(browser, city, options.out, zooms, 2 if small else MARKS):
+                marks = 2 if small else MARKS
+                for picture in _workbench(browser, city, options.out, looks, zooms, marks=marks):
                     print(_line(picture), flush=True)
                     pictures.append(picture)
         finally:
@@ -184,10 +194,12 @@ def _maps(objects: StreetObjects, queries: int) -> dict[str, Callable[[], folium
     }
 
 
-def _pictures(browser: Chrome, page: Path, out: Path, zooms: Sequence[int]) -> Iterator[Picture]:
+def _pictures(
+    browser: Chrome, page: Path, out: Path, looks: Looks, zooms: Sequence[int]
+) -> Iterator[Picture]:
     """Yield the pictures of one page: on each screen, on each ground."""
     url = page.resolve().as_uri()
-    for screen, ground in _screens(browser):
+    for screen, ground in _screens(browser, looks):
         browser.get(url)
         browser.execute_async_script(DRAWN)
         browser.execute_script(ASK)
@@ -198,7 +210,7 @@ def _pictures(browser: Chrome, page: Path, out: Path, zooms: Sequence[int]) -> I
 
 
 def _workbench(
-    browser: Chrome, path: Path, out: Path, zooms: Sequence[int], marks: int
+    browser: Chrome, path: Path, out: Path, looks: Looks, zooms: Sequence[int], *, marks: int
 ) -> Iterator[Picture]:
     """Yield the pictures of the workbench of a city; print how soon it answers."""
     city = open_city(path)
@@ -206,7 +218,7 @@ def _workbench(
     name = WORKBENCH if path.stem == "city" else f"{WORKBENCH}-{path.stem}"
     with tempfile.TemporaryDirectory() as folder, serving(city) as address:
         photo = photo_in(city, Path(folder))
-        for screen, ground in _screens(browser):
+        for screen, ground in _screens(browser, looks):
             for known in times:  # pictures are of the one that is not known
                 times[known] += asked(browser, address, photo, marks=marks, known=known)
             browser.execute_script("scroll(0, 0); document.querySelector('#seen').scrollTop = 0")
@@ -227,17 +239,17 @@ def _workbench(
         )
 
 
-def _screens(browser: Chrome) -> Iterator[tuple[str, str]]:
+def _screens(browser: Chrome, looks: Looks) -> Iterator[tuple[str, str]]:
     """Yield the names of each screen and ground, once the browser has them."""
-    for screen, (width, height, dots) in SCREENS.items():
+    for screen, ground in looks:
+        width, height, dots = SCREENS[screen]
         browser.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",
             {"width": width, "height": height, "deviceScaleFactor": dots, "mobile": dots > 1.0},
         )
-        for ground in GROUNDS:
-            scheme = {"name": "prefers-color-scheme", "value": ground}
-            browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
-            yield screen, ground
+        scheme = {"name": "prefers-color-scheme", "value": ground}
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+        yield screen, ground
 
 
 def _picture(

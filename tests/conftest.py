@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import hypothesis
 import pytest
 from browser_coverage import BrowserCoverage
+from filelock import FileLock
 from machine import PATIENCE_S, Part, qgis_variables, required, unavailable
 
 if TYPE_CHECKING:
@@ -265,11 +266,21 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder in which the experiments of the paper were run on a small town."""
+    """Return a folder in which the experiments of the paper were run on a small town.
+
+    One worker of the tests runs them; the others copy what it made.
+    """
     from worlds import QUERIES, save_town
 
     from semsig_gis.experiments.paper.reproduce import reproduce
 
     place = tmp_path_factory.mktemp("reproduced")
-    reproduce(place / "out", database=save_town(place), queries=QUERIES)
+    base = tmp_path_factory.getbasetemp()
+    whole = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "reproduced"
+    with FileLock(whole.with_suffix(".lock")):
+        if not whole.exists():
+            reproduce(place / "out", database=save_town(place), queries=QUERIES)
+            shutil.copytree(place, whole)
+            return place / "out"
+    shutil.copytree(whole, place, dirs_exist_ok=True)
     return place / "out"

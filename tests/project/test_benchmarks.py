@@ -130,9 +130,9 @@ def test_pictures_of_pages_are_taken(tmp_path: Path) -> None:
         timeout=6 * PATIENCE_S,
     )
     rows = json.loads((tmp_path / "pictures.json").read_text(encoding="utf-8"))
-    assert Counter(row["map"] for row in rows) == {"drift": 4, "workbench": 4}
+    assert Counter(row["map"] for row in rows) == {"drift": 2, "workbench": 2}
     drawn = Counter(path.name.partition("-")[0] for path in tmp_path.glob("*.png"))
-    assert drawn == {"drift": 4, "workbench": 8}
+    assert drawn == {"drift": 2, "workbench": 4}
     assert not any(row["errors"] or row["requests"] or row["violations"] for row in rows)
 
 
