@@ -15,7 +15,7 @@ from machine import PATIENCE_S
 def test_some_of_the_soak(tmp_path: Path) -> None:
     out = tmp_path / "soak.json"
     done = subprocess.run(
-        [*(sys.executable, "-m", "benchmarks.soak"), *f"--share 0.0115 --out {out}".split()],
+        [*(sys.executable, "-m", "benchmarks.soak"), *f"--share 0.0086 --out {out}".split()],
         cwd=Path(__file__).parents[2],
         capture_output=True,
         check=False,
@@ -24,6 +24,6 @@ def test_some_of_the_soak(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     rows = {row["part"]: row for row in json.loads(out.read_text(encoding="utf-8"))}
-    assert rows["kills"]["cases"] == 8
-    assert rows["damaged files"]["cases"] >= 500
+    assert rows["kills"]["cases"] == 6
+    assert rows["damaged files"]["cases"] >= 350
     assert all(row["clean"] == row["cases"] for row in rows.values())
