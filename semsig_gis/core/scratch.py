@@ -110,7 +110,11 @@ def _claimed(parent: Path) -> tuple[Path, int]:
         except OSError:
             folder.rmdir()
             raise
-        locked(owner, wait=True)
+        try:
+            locked(owner, wait=True)
+        except KeyboardInterrupt:  # likely here, as a module is loaded
+            _remove(folder, owner)
+            raise
         if (folder / OWNER).exists():
             return folder, owner
         os.close(owner)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from semsig_gis.core import scratch
 from semsig_gis.core.scratch import ASIDE, HALF_DONE, MACHINE, OWNER, own_folder, remove_abandoned
 
 if TYPE_CHECKING:
@@ -27,6 +28,18 @@ def test_a_folder_is_there_for_a_block(tmp_path: Path) -> None:
         (folder / "deep").mkdir()
         (folder / "deep" / "a.txt").touch()
         (folder / "link").symlink_to(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_while_a_folder_is_made_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(_: int, **_options: bool) -> bool:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scratch, "locked", interrupted)
+    with pytest.raises(KeyboardInterrupt), own_folder(tmp_path):
+        pytest.fail("there is no folder to work in")
     assert list(tmp_path.iterdir()) == []
 
 
