@@ -200,7 +200,7 @@ def _cluster(workers: int) -> Iterator[tuple[Client, str]]:
 
 
 def _build(folder: Path, name: str, scale: _Size, client: Client, scheduler: str) -> _Run:
-    """Build a country on new processes."""
+    """Build a country on the processes of a scheduler, which have built nothing larger before."""
     start = time.perf_counter()
     manifest = _built(folder, name, scale, scheduler)
     seconds = time.perf_counter() - start
