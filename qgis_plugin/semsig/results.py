@@ -12,6 +12,7 @@ from qgis.core import (
     QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QTimer
+from qgis.PyQt.QtGui import QPainter
 
 from .answers import CANDIDATE_FIELDS, PLACE_FIELDS
 from .words import tr
@@ -72,7 +73,8 @@ def gather(identifier: str, title: str) -> None:
     QTimer.singleShot(0, move)
 
 
-# What belongs above what, so that nothing is painted over: points, then lines, then areas.
+# What belongs above what, so that nothing is painted over: points, then lines, then areas, and
+# lowest those areas that are blended with what is below.
 HEIGHT = {0: 0, 1: 1, 2: 2}
 
 
@@ -87,7 +89,9 @@ def _height(layer: Any) -> int:  # noqa: ANN401 - any kind of layer
     if not isinstance(layer, QgsVectorLayer):
         return len(HEIGHT) + 1
     kind = layer.geometryType()
-    return HEIGHT.get(int(getattr(kind, "value", kind)), len(HEIGHT))
+    height = HEIGHT.get(int(getattr(kind, "value", kind)), len(HEIGHT))
+    blended = layer.blendMode() != QPainter.CompositionMode.CompositionMode_SourceOver
+    return max(height, len(HEIGHT)) if blended else height
 
 
 def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN401 - a function

@@ -40,17 +40,12 @@ from semsig_gis.exports.styles import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY,
 from semsig_gis.maps.parts import OUTLINES, mark_svg
 from semsig_gis.reports import axes, plots, scenes
 
-with warnings.catch_warnings(), np.printoptions():  # which it sets as they were long ago
-    warnings.simplefilter("ignore")  # it tells what it lacks, and of its tritanopia
-    import colour
-
-    SIGHTS = {
-        "normal": np.eye(3),
-        "deuteranopia": colour.matrix_cvd_Machado2009("Deuteranomaly", 1.0),
-        "protanopia": colour.matrix_cvd_Machado2009("Protanomaly", 1.0),
-        "tritanopia": colour.matrix_cvd_Machado2009("Tritanomaly", 1.0),
-    }
-
+SIGHTS = {
+    "normal": None,
+    "deuteranopia": "Deuteranomaly",
+    "protanopia": "Protanomaly",
+    "tritanopia": "Tritanomaly",
+}
 APART = 15.0
 MARKS = [mark.colour for mark in OUTCOMES.values()]
 ANSWER_MARKS = [mark.colour for mark in ANSWERS.values()]
@@ -74,9 +69,16 @@ def lifted(colours: list[str]) -> np.ndarray:
 
 def distances(ones: np.ndarray, others: np.ndarray, sight: str) -> np.ndarray:
     """Return how far apart colours are for a sight, shape (ones, others)."""
+    # Imported here, because it takes half a second. It sets how numpy prints.
+    with warnings.catch_warnings(), np.printoptions():
+        warnings.simplefilter("ignore")  # it tells what it lacks, and of its tritanopia
+        import colour
+
+        lack = SIGHTS[sight]
+        seen_of = colour.matrix_cvd_Machado2009(lack, 1.0).T if lack else np.eye(3)
     labs = []
     for colours in (ones, others):
-        light = np.clip(colour.models.eotf_sRGB(colours) @ SIGHTS[sight].T, 0.0, 1.0)
+        light = np.clip(colour.models.eotf_sRGB(colours) @ seen_of, 0.0, 1.0)
         seen = colour.models.eotf_inverse_sRGB(light)
         labs.append(colour.XYZ_to_Lab(colour.sRGB_to_XYZ(seen)))
     return np.asarray(colour.delta_E(labs[0][:, None], labs[1][None], method="CIE 2000"))

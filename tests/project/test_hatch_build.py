@@ -14,8 +14,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from cyclonedx.schema import SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
 from readme_renderer.markdown import render
 
 ROOT = Path(__file__).parents[2]
@@ -158,6 +156,10 @@ def test_what_cannot_be_brought_is_one_line_and_nothing_is_written(
 def test_what_is_carried_is_in_the_licences_and_in_a_bill_of_materials(
     hook: SimpleNamespace, folder: Path
 ) -> None:
+    # Here, because jsonschema takes a second.
+    from cyclonedx.schema import SchemaVersion
+    from cyclonedx.validation.json import JsonStrictValidator
+
     metadata = told(hook, folder.parents[1])
     assert contents(folder) == FILES
     assert metadata["license"] == "BSD-3-Clause AND MIT"

@@ -1,4 +1,4 @@
-"""A session with QGIS, played by its own Python: `qgis_session.py FOLDER CATALOGUE`.
+"""A session with QGIS, played by its own Python: `qgis_session.py FOLDER CATALOGUE QUERY`.
 
 The last line that is printed is JSON with what happened. This is not a module of the tests.
 """
@@ -50,6 +50,7 @@ class Feedback(QgsProcessingFeedback):
         self.infos: list[str] = []
         self.percents: list[float] = []
         self.ended: list[bool] = []  # well, or not
+        self.results: dict[str, Any] = {}
 
     def setProgress(self, percent: float) -> None:  # noqa: N802
         self.percents.append(percent)
@@ -77,7 +78,12 @@ def run(name: str, *, cancelling: bool = False, **parameters: Any) -> Feedback: 
     context.setProject(QgsProject.instance())
     ready = algorithm(name)
     task = QgsProcessingAlgRunnerTask(ready, parameters, context, feedback)
-    task.executed.connect(lambda successful, _results: feedback.ended.append(successful))
+
+    def keep(successful: bool, results: dict[str, Any]) -> None:  # noqa: FBT001 - as Qt calls it
+        feedback.results = results
+        feedback.ended.append(successful)
+
+    task.executed.connect(keep)
     QgsApplication.taskManager().addTask(task)
     while not feedback.ended:
         application.processEvents()
@@ -131,17 +137,33 @@ def show_twice() -> dict[str, Any]:
     return layers
 
 
-def show() -> dict[str, Any]:
-    """Run what gives layers, and return how each is drawn."""
-    run_well("localize", TYPES="DDB", CANDIDATES=shown(), PLACE=shown(), REGIONS=shown())
-    run_well("evaluate", QUERIES=20, OUTPUT=TEMPORARY, LAYERS=shown())
-    run_well("identify", NOISE="light")
-    run_well("export", OBJECTS=str(PLACE / "objects.parquet"), OUTPUT=shown())
+def show(query: dict[str, str]) -> dict[str, Any]:
+    """Run what gives layers, and return what is told of it and how each layer is drawn."""
+
+    def file(name: str) -> str:
+        return str(PLACE / name)
+
+    places = {name: shown(file(f"{name}.gpkg")) for name in ("CANDIDATES", "PLACE", "REGIONS")}
+    evaluation = {"OUTPUT": file("evaluation"), "MAP": file("evaluation.html")}
+    cells = {"CELLS": shown(file("cells.gpkg")), "MAP": file("cells.html")}
+    run_well("localize", TOP=3, METHOD="likelihood", MAP=file("place.html"), **places, **query)
+    done = run_well(
+        "evaluate",
+        QUERIES=20,
+        DISTORTION="light",
+        MORE="compass:5",
+        METHOD="edit+edit",
+        LAYERS=shown(file("evaluation.gpkg")),
+        **evaluation,
+    )
+    run_well("identify", NOISE="light", **cells)
+    run_well("export", OBJECTS=file("objects.parquet"), OUTPUT=shown())
     layers = QgsProject.instance().mapLayers().values()
-    return {
+    drawn = {
         layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
         for layer in layers
     }
+    return {"evaluated": done.results, "shown": drawn}
 
 
 def groups() -> dict[str, list[str]]:
@@ -226,7 +248,7 @@ def play() -> dict[str, Any]:
         "help": algorithm("localize").shortHelpString(),
         "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUTPUT=loaded).ended[0],
         **show_twice(),
-        "shown": show(),
+        **show(json.loads(sys.argv[3])),
         "groups": groups(),
         "order": [layer.name() for layer in QgsProject.instance().layerTreeRoot().layerOrder()],
         "failed": stop("export", DATABASE=objects, OUTPUT=str(PLACE / "fails.gpkg")),

@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 import json
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-import jsonschema
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -36,8 +36,9 @@ from semsig_gis.sources.layers import (
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from jsonschema import Draft202012Validator
+
 SCHEMA = json.loads((data_folder() / "catalog.schema.json").read_text("utf-8"))
-VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 DATA = Path(__file__).with_name("data")
 TOWN = (DATA / "town.toml").read_text("utf-8")
 MISTAKES = (DATA / "mistakes.txt").read_text("utf-8").splitlines()[2:]
@@ -71,8 +72,15 @@ def changed(row: str) -> str:
     return TOWN.replace(old, new)
 
 
+@cache
+def validator() -> Draft202012Validator:
+    from jsonschema import Draft202012Validator  # which takes a second
+
+    return Draft202012Validator(SCHEMA)
+
+
 def test_the_schema_is_one_and_names_what_the_reader_knows() -> None:
-    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    validator().check_schema(SCHEMA)
     layer, of_class = SCHEMA["$defs"]["layer"]["properties"], SCHEMA["$defs"]["class"]["properties"]
     assert SCHEMA["properties"].keys() == CATALOG_KEYS.keys()
     assert layer.keys() == LAYER_KEYS.keys()
@@ -92,7 +100,7 @@ def test_the_schema_is_one_and_names_what_the_reader_knows() -> None:
 def test_a_catalogue_says_where_its_schema_is(name: str) -> None:
     text = (data_folder() / f"{name}.toml").read_text("utf-8")
     assert text.startswith("#:schema ./catalog.schema.json\n")
-    VALIDATOR.validate(tomllib.loads(text))
+    validator().validate(tomllib.loads(text))
 
 
 @pytest.mark.parametrize("row", MISTAKES)
@@ -103,7 +111,7 @@ def test_a_mistake_is_one_to_both(row: str) -> None:
         assert "not valid TOML" in row
         return
     assert not accepts(content)
-    assert VALIDATOR.is_valid(content) == any(words in row for words in BEYOND)
+    assert validator().is_valid(content) == any(words in row for words in BEYOND)
 
 
 VALUES = st.sampled_from([
@@ -152,7 +160,7 @@ def names_that_exist(content: dict[str, Any]) -> bool:
 @settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
 @given(catalogs())
 def test_the_schema_and_the_reader_agree(content: dict[str, Any]) -> None:
-    valid, taken = VALIDATOR.is_valid(content), accepts(content)
+    valid, taken = validator().is_valid(content), accepts(content)
     assert valid or not taken  # what the schema refuses, the reader refuses
     if valid and names_that_exist(content):
         assert taken
