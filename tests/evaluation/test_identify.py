@@ -52,7 +52,7 @@ DATABASE = random_database(5, cells=90, longest=8)
 INDEX = build_index(DATABASE, named_noise("medium"))
 COLUMNS = symbol_columns(INDEX)
 TOLD = chances_of(DATABASE)
-REPEATS, FEW = 40, 50
+REPEATS, FEW = 25, 50
 SHARP = NoiseSpec(detection=0.9, misnamed=0.05, clutter=0.5, bearing_sigma=4.0)
 
 
@@ -76,7 +76,7 @@ def test_chances_are_those_of_very_many_queries(
         ours = getattr(told, name) / most
         truth = getattr(tried, name).reshape(REPEATS, FEW).mean(axis=0) / most
         assert abs(ours.mean() - truth.mean()) < 0.05
-        # The means of so few queries are off by 0.08 themselves.
+        # The means of so few queries are off by 0.1 themselves.
         assert np.sqrt(((ours - truth) ** 2).mean()) < 0.15
         # Cells that are all told apart alike have no order.
         assert np.std(truth) < 0.2 or spearmanr(ours, truth).statistic > 0.7
