@@ -87,8 +87,12 @@ def test_scores_are_the_formula(
     expected = [
         cell_loglik(database, view, noise, cell, form=set_loglik) for cell in range(len(database))
     ]
-    # The scan takes bearings in steps and distances in levels, by which ranges go most.
-    assert scores.loglik == pytest.approx(np.array(expected), abs=0.5 * len(view))
+    # The scan takes bearings in steps and distances in levels, by which ranges go most. A level is
+    # up to 9 % off, and so is a spread; where all that explains a thing is an object that hardly
+    # fits, the square of that counts.
+    errors = np.abs(scores.loglik - expected)
+    assert np.median(errors) < 0.25 * len(view)
+    assert (errors < 0.5 * len(view) + 0.2 * np.abs(expected)).all()
 
 
 @settings(max_examples=15)
