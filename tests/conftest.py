@@ -43,6 +43,8 @@ BROWSER_COVERAGE = BrowserCoverage()
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # The workers of the tests keep all processors busy already.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if config.getoption("cov_source", None):
         config.pluginmanager.register(BROWSER_COVERAGE)
     unknown = required() - {*get_args(Part)}

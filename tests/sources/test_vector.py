@@ -423,6 +423,17 @@ def test_gdal_keeps_quiet(
         assert "Error in fread" in caplog.text
 
 
+@pytest.mark.parametrize("wish", [None, False])
+def test_the_crs_of_others_is_looked_for_as_they_wish(tmp_path: Path, wish: object) -> None:
+    path = write(frame([(0, 0)], n=[1]), tmp_path, "shp")
+    pyogrio.set_gdal_config_options({"USE_OSR_FIND_MATCHES": wish})
+    try:
+        assert counts(read(path)) == (1, 1, 0)
+        assert pyogrio.get_gdal_config_option("USE_OSR_FIND_MATCHES") is wish
+    finally:
+        pyogrio.set_gdal_config_options({"USE_OSR_FIND_MATCHES": None})
+
+
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
 @pytest.mark.parametrize("header", ["lon lat", "Longitude LATITUDE", "X Y", "lat lon", "y x"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])

@@ -46,6 +46,7 @@ LATIN = "ISO-8859-1"
 # A reader that fails so often without a good row between does not move on, and each of these
 # opens the file anew.
 FAILURES_IN_A_ROW = 20
+CRS_SEARCH = "USE_OSR_FIND_MATCHES"
 # In FlatGeobuf, GDAL's faster way leaves it to chance where a missing geometry begins and ends.
 pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
@@ -68,18 +69,27 @@ _lock = threading.RLock()
 
 
 @contextlib.contextmanager
-def _listening() -> Iterator[list[warnings.WarningMessage]]:
-    """Collect the warnings of GDAL in the block, one thread at a time: Python has one list."""
+def _listening(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
+    """Collect the warnings of GDAL in the block, one thread at a time: Python has one list.
+
+    Only if `crs`, GDAL looks for the CRS of a shapefile in all of PROJ's, which takes 50 ms.
+    """
     with _lock, warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
-        yield heard
+        before = pyogrio.get_gdal_config_option(CRS_SEARCH)
+        if not crs:
+            pyogrio.set_gdal_config_options({CRS_SEARCH: False})
+        try:
+            yield heard
+        finally:
+            pyogrio.set_gdal_config_options({CRS_SEARCH: before})
 
 
 def describe(member: Member) -> Layer:
     """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind."""
     member.require_sound()
     try:
-        with _listening():
+        with _listening(crs=True):
             info = pyogrio.read_info(
                 member.address,
                 layer=member.layer,
