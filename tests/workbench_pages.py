@@ -6,8 +6,10 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pytest
 from machine import PATIENCE_S
 from map_pages import requested
+from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
@@ -25,6 +27,17 @@ QUIET = """
 const {session} = semsig;
 return Boolean(session) && !session.asking && !document.body.ariaBusy
   && Number(document.body.dataset.answered) === session.changedAt;
+"""
+
+# The page itself looks whether it is so far, which is cheaper than to ask it again and again.
+UNTIL = """
+const [given, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
+const ask = function () { %s };
+const look = () => {
+  const value = ask.apply(null, given);
+  if (value) done(value); else setTimeout(look, 20);
+};
+look();
 """
 
 
@@ -117,11 +130,10 @@ class WorkbenchPage:
 
     def until(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
         """Wait until a script returns something, and return that."""
-        end = time.monotonic() + PATIENCE_S
-        while not (value := self.ask(script, *arguments)):
-            assert time.monotonic() < end, f"{script}\n{self.text('#notice')}"
-            time.sleep(0.02)
-        return value
+        try:
+            return self.browser.execute_async_script(UNTIL % script, *arguments)
+        except TimeoutException:
+            pytest.fail(f"{script}\n{self.text('#notice')}")
 
     def question(self) -> str:
         """Return what is asked next, a moment after an answer."""
