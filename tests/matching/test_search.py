@@ -194,7 +194,7 @@ def test_parts_rank_the_cells_beyond_the_second_stage_alike(text: str) -> None:
 
 
 def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    parted = in_parts(CITY, np.arange(len(CITY)) % 8, tmp_path)
+    parted = in_parts(CITY, np.arange(len(CITY)) % 4, tmp_path)
     opened: list[weakref.ref[SignatureDatabase]] = []
 
     def watched(path: Path) -> SignatureDatabase:
@@ -206,7 +206,7 @@ def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr("semsig_gis.database.file.open_database", watched)
     localize(parted, CITY.signature(3), method=Method(keep=5), top=100)
-    assert len(opened) == 16  # twice in two stages
+    assert len(opened) == 8  # twice in two stages
 
 
 def test_cells_in_parts_are_ranked_together(tmp_path: Path) -> None:
