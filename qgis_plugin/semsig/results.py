@@ -73,8 +73,8 @@ def gather(identifier: str, title: str) -> None:
     QTimer.singleShot(0, move)
 
 
-# What belongs above what, so that nothing is painted over: points, then lines, then areas, and
-# lowest those areas that are blended with what is below.
+# What belongs above what, so that nothing is painted over: points, then lines, then areas. What
+# is blended with what is below lies below its like.
 HEIGHT = {0: 0, 1: 1, 2: 2}
 
 
@@ -85,13 +85,14 @@ def _below(there: QgsVectorLayer, new: QgsVectorLayer) -> bool:
     return _height(there) >= _height(new)
 
 
-def _height(layer: Any) -> int:  # noqa: ANN401 - any kind of layer
+def _height(layer: Any) -> float:  # noqa: ANN401 - any kind of layer
     if not isinstance(layer, QgsVectorLayer):
         return len(HEIGHT) + 1
     kind = layer.geometryType()
     height = HEIGHT.get(int(getattr(kind, "value", kind)), len(HEIGHT))
-    blended = layer.blendMode() != QPainter.CompositionMode.CompositionMode_SourceOver
-    return max(height, len(HEIGHT)) if blended else height
+    if layer.blendMode() == QPainter.CompositionMode.CompositionMode_SourceOver:
+        return height
+    return height + 0.5
 
 
 def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN401 - a function

@@ -144,26 +144,26 @@ def show(query: dict[str, str]) -> dict[str, Any]:
         return str(PLACE / name)
 
     places = {name: shown(file(f"{name}.gpkg")) for name in ("CANDIDATES", "PLACE", "REGIONS")}
-    evaluation = {"OUTPUT": file("evaluation"), "MAP": file("evaluation.html")}
-    cells = {"CELLS": shown(file("cells.gpkg")), "MAP": file("cells.html")}
     run_well("localize", TOP=3, METHOD="likelihood", MAP=file("place.html"), **places, **query)
-    done = run_well(
+    evaluated = run_well(
         "evaluate",
         QUERIES=20,
         DISTORTION="light",
         MORE="compass:5",
         METHOD="edit+edit",
+        OUTPUT=file("evaluation"),
         LAYERS=shown(file("evaluation.gpkg")),
-        **evaluation,
+        MAP=file("evaluation.html"),
     )
-    run_well("identify", NOISE="light", **cells)
+    cells = shown(file("cells.gpkg"))
+    identified = run_well("identify", NOISE="light", CELLS=cells, MAP=file("cells.html"))
     run_well("export", OBJECTS=file("objects.parquet"), OUTPUT=shown())
     layers = QgsProject.instance().mapLayers().values()
     drawn = {
         layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
         for layer in layers
     }
-    return {"evaluated": done.results, "shown": drawn}
+    return {"evaluated": evaluated.results, "identified": identified.results, "shown": drawn}
 
 
 def groups() -> dict[str, list[str]]:

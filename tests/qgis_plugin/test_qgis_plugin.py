@@ -294,8 +294,8 @@ def test_qgis_lists_the_algorithms_and_loads_a_file(session: dict[str, Any], qgi
     assert "?&lt;=10" in text
 
 
-def test_what_is_localized_is_written_with_its_styles(session: dict[str, Any], qgis: Qgis) -> None:
-    assert session["shown"]
+@pytest.mark.usefixtures("session")
+def test_what_is_localized_is_written_with_its_styles(qgis: Qgis) -> None:
     database, _ = small_city()
     names = ("CANDIDATES", "PLACE", "REGIONS")
     candidates, place, regions = (qgis.place / f"{name}.gpkg" for name in names)
@@ -394,8 +394,8 @@ def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> N
     assert "install it with Plugins > Semantic signatures > Engine..." in session["lost"]
 
 
-@pytest.mark.usefixtures("session")
-def test_cells_are_identified_and_exported(qgis: Qgis) -> None:
+def test_cells_are_identified_and_exported(session: dict[str, Any], qgis: Qgis) -> None:
+    assert set(session["identified"]) == {"CELLS", "MAP"}
     source = qgis.place / "session.parquet"  # of which everything is known by now
     cells = gpd.read_file(qgis.place / "cells.gpkg", layer="cells")
     assert cells["chance_found"].between(0, 1).all()

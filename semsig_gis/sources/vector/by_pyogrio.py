@@ -77,8 +77,7 @@ def _listening(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
     with _lock, warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         before = pyogrio.get_gdal_config_option(CRS_SEARCH)
-        if not crs:
-            pyogrio.set_gdal_config_options({CRS_SEARCH: False})
+        pyogrio.set_gdal_config_options({CRS_SEARCH: before if crs else False})
         try:
             yield heard
         finally:
