@@ -12,9 +12,9 @@ import numpy as np
 
 from semsig_gis.core.geometry import cell_ids, wrap_degrees
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.views import views_at
-from semsig_gis.likelihood.route import Leg
-from semsig_gis.queries.distortions import distort, named_distortion
+from semsig_gis.database.sightings import views_at
+from semsig_gis.evaluation.queries.distortions import distort, named_distortion
+from semsig_gis.localization.route import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -21,7 +21,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import semsig_gis
 from semsig_gis.cli import main as semsig
-from semsig_gis.evaluation.identify import identify as identifying
+from semsig_gis.evaluation.identifiability import identify as identifying
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

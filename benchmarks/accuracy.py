@@ -32,10 +32,10 @@ from benchmarks._cities import MONTPELLIER, made_up, made_up_streets, real
 from benchmarks._cities import PARIS_LIKE as PARIS
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.database.build import build_database
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.noise.model import cell_noise, named_noise
-from semsig_gis.likelihood.rule import calibrate
-from semsig_gis.matching.method import Method
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.answer_rule import calibrate
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.noise.model import cell_noise, named_noise
 from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from benchmarks._accuracy_methods import Outcome
     from benchmarks._accuracy_queries import Query
-    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.likelihood.index import LikelihoodIndex
 
 __all__ = ["main"]
 

@@ -19,9 +19,9 @@ from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database.file import save_database
 from semsig_gis.database.store import ObjectStore
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.noise.model import cell_noise, named_noise
 from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from benchmarks.comparison import compare
-from semsig_gis.likelihood.association import rerank
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.noise.model import named_noise
+from semsig_gis.localization.likelihood.association import rerank
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.noise.model import named_noise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

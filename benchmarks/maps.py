@@ -13,13 +13,13 @@ import numpy as np
 from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison
 from semsig_gis.database.build import build_database
-from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.localization.distance.method import Method
 from semsig_gis.maps.cells import ambiguity_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import available, save_map
-from semsig_gis.matching.method import Method
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.sources.synthetic.city import (
     PARIS_LIKE,

@@ -27,11 +27,12 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.identify.identify import identify
-from semsig_gis.evaluation.methods import localize
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.evaluation.identifiability.identify import identify
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.locator import localize
+from semsig_gis.localization.noise.model import cell_noise, named_noise
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 from semsig_gis.maps.city import city_map
 from semsig_gis.maps.drift import drift_map
@@ -39,7 +40,6 @@ from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import localization_map, location_map
 from semsig_gis.maps.objects import objects_map
 from semsig_gis.maps.page import available, save_map
-from semsig_gis.matching.method import Method
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.sources.synthetic.city import CitySpec
 
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import folium
     from selenium.webdriver import Chrome
 
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
 
     Looks = Sequence[tuple[str, str]]

@@ -14,7 +14,7 @@ from selenium.webdriver.support.ui import Select
 
 from benchmarks.street_photos import WIDTH, street_photo
 from semsig_gis.cli.options import object_store
-from semsig_gis.queries.sight import Sight
+from semsig_gis.evaluation.queries.true_view import Sight
 from semsig_gis.serve import server
 from semsig_gis.serve.workbench import Workbench
 

@@ -3,9 +3,9 @@
 from .core.errors import SemsigError as SemsigError
 from .core.geometry import GridSpec as GridSpec
 from .core.signature import Signature as Signature, SignatureSpec as SignatureSpec
-from .core.signs import class_signs as class_signs
+from .core.symbology import class_signs as class_signs
 from .core.statistics import wilson_interval as wilson_interval
-from .core.view import Photo as Photo, View as View
+from .observation.view import Photo as Photo, View as View
 from .core.taxonomy import ObjectClass as ObjectClass, Taxonomy as Taxonomy
 from .sources import RawLayer as RawLayer, find_files as find_files
 from .sources.catalog import (
@@ -31,7 +31,7 @@ from .objects.fetch import (
     find_area as find_area,
     open_cache as open_cache,
 )
-from .objects.frame import objects_from_frame as objects_from_frame
+from .objects.from_geodataframe import objects_from_frame as objects_from_frame
 from .objects.load import (
     Loaded as Loaded,
     assemble as assemble,
@@ -57,11 +57,11 @@ from .database.file import (
     open_dataset as open_dataset,
     save_database as save_database,
 )
-from .database.north import North as North
-from .database.observation import parse_view as parse_view
+from .observation.north import North as North
+from .observation.sentences import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
-from .database.properties import database_summary as database_summary
-from .database.answer import Requirement as Requirement
+from .database.summary import database_summary as database_summary
+from .localization.answers import Requirement as Requirement
 from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,
@@ -74,74 +74,74 @@ from .database.update import (
     update_file as update_file,
     update_tiles as update_tiles,
 )
-from .database.views import ViewpointSpec as ViewpointSpec
-from .matching.method import Method as Method
-from .matching.scores import score_cells as score_cells
-from .matching.search import Localization as Localization
-from .likelihood.posterior import open_posterior as open_posterior
-from .likelihood.rule import (
+from .database.sightings import ViewpointSpec as ViewpointSpec
+from .localization.distance.method import Method as Method
+from .localization.distance.scores import score_cells as score_cells
+from .localization.distance.search import Localization as Localization
+from .localization.likelihood.posterior import open_posterior as open_posterior
+from .localization.likelihood.answer_rule import (
     AnswerRule as AnswerRule,
     calibrate as calibrate,
     open_rule as open_rule,
     save_rule as save_rule,
 )
-from .likelihood.index import (
+from .localization.likelihood.index import (
     LikelihoodIndex as LikelihoodIndex,
     build_index as build_index,
 )
-from .likelihood.locate import (
+from .localization.likelihood.locate import (
     Location as Location,
     locate as locate,
     locate_route as locate_route,
 )
-from .likelihood.method import LikelihoodMethod as LikelihoodMethod
-from .likelihood.questions import next_questions as next_questions
-from .likelihood.noise.age import (
+from .localization.likelihood.method import LikelihoodMethod as LikelihoodMethod
+from .localization.suggest import next_questions as next_questions
+from .localization.noise.age import (
     Drift as Drift,
     aged_noise as aged_noise,
     fresh_noise as fresh_noise,
     named_drift as named_drift,
     open_drift as open_drift,
 )
-from .likelihood.noise.learn import learn_noise as learn_noise, read_samples as read_samples
-from .likelihood.noise.model import (
+from .localization.noise.learn import learn_noise as learn_noise, read_samples as read_samples
+from .localization.noise.model import (
     NoiseMixture as NoiseMixture,
     NoiseSpec as NoiseSpec,
     cell_noise as cell_noise,
     named_noise as named_noise,
 )
-from .likelihood.posterior import Posterior as Posterior
-from .likelihood.priors import (
+from .localization.likelihood.posterior import Posterior as Posterior
+from .localization.likelihood.priors import (
     KnownPosition as KnownPosition,
     area_prior as area_prior,
     position_prior as position_prior,
     raster_prior as raster_prior,
     weight_prior as weight_prior,
 )
-from .likelihood.route import Leg as Leg
-from .queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
-from .queries.distortions import (
+from .localization.route import Leg as Leg
+from .evaluation.queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
+from .evaluation.queries.distortions import (
     Distortion as Distortion,
     distort as distort,
     named_distortion as named_distortion,
 )
-from .queries.sight import Sight as Sight
+from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.evaluate import evaluate as evaluate
-from .evaluation.field import ErrorField as ErrorField, error_field as error_field
+from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
-from .evaluation.identify.check import (
+from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,
     check_identifiability as check_identifiability,
 )
-from .evaluation.identify.identify import identify as identify
-from .evaluation.identify.result import (
+from .evaluation.identifiability.identify import identify as identify
+from .evaluation.identifiability.result import (
     Identifiability as Identifiability,
     open_identifiability as open_identifiability,
     save_identifiability as save_identifiability,
 )
-from .evaluation.identify.trials import leave_class_out as leave_class_out
-from .evaluation.methods import localize as localize, parse_method as parse_method
+from .evaluation.identifiability.trials import leave_class_out as leave_class_out
+from .localization.locator import localize as localize, parse_method as parse_method
 from .evaluation.result import Evaluation as Evaluation
 from .evaluation.spec import (
     ExperimentSpec as ExperimentSpec,
@@ -165,7 +165,7 @@ from .exports.geopackage import (
     read_geopackage as read_geopackage,
 )
 from .exports.rasters import export_geotiff as export_geotiff
-from .exports.regions import SearchRegions as SearchRegions, search_regions as search_regions
+from .localization.regions import SearchRegions as SearchRegions, search_regions as search_regions
 from .reports.axes import (
     plot_answer as plot_answer,
     plot_database as plot_database,
@@ -176,7 +176,7 @@ from .reports.axes import (
 from .reports.evaluation import evaluation_tables as evaluation_tables
 from .reports.evaluation_page import evaluation_page as evaluation_page
 from .reports.page import write_page as write_page
-from .reports.parts import Curve as Curve, Plot as Plot
+from .reports.report_model import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables
 from .reports.plots import draw_plot as draw_plot
 from .reports.scenes import (
@@ -185,8 +185,11 @@ from .reports.scenes import (
     draw_scenes as draw_scenes,
 )
 from .reports.tables import Table as Table
-from .experiments.run import open_results as open_results
-from .experiments.paper.reproduce import Reproduction as Reproduction, reproduce as reproduce
-from .experiments.run import run_experiment as run_experiment, run_experiments as run_experiments
+from .evaluation.experiments.run import open_results as open_results
+from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
+from .evaluation.experiments.run import (
+    run_experiment as run_experiment,
+    run_experiments as run_experiments,
+)
 
 __version__: str

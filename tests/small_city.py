@@ -10,12 +10,12 @@ import numpy as np
 
 from semsig_gis.database.build import build_database
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.identify.result import BANDS, ClassGain, Identifiability
-from semsig_gis.evaluation.methods import localize
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.matching.method import Method
+from semsig_gis.evaluation.identifiability.result import BANDS, ClassGain, Identifiability
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.locator import localize
+from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import Licence
 from semsig_gis.sources.catalog import paper_taxonomy
@@ -24,8 +24,8 @@ from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.likelihood.locate import Location
-    from semsig_gis.matching.search import Localization
+    from semsig_gis.localization.distance.search import Localization
+    from semsig_gis.localization.likelihood.locate import Location
     from semsig_gis.objects.table import StreetObjects
 
 

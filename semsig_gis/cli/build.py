@@ -30,7 +30,7 @@ from semsig_gis.cli.console import (
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.database.beside import Companion
+    from semsig_gis.database.companions import Companion
 
 MB = 1e6
 
@@ -93,7 +93,7 @@ def build(
     from semsig_gis.core.geometry import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.views import ViewpointSpec
+    from semsig_gis.database.sightings import ViewpointSpec
     from semsig_gis.objects.surroundings import read_area
     from semsig_gis.objects.table import open_objects
     from semsig_gis.storage.geoparquet import NOWHERE
@@ -260,8 +260,8 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     if as_json:
         print_json(_info(database))
         return
-    from semsig_gis.database.beside import companions
     from semsig_gis.database.city import open_city
+    from semsig_gis.database.companions import companions
     from semsig_gis.reports.database import database_tables
     from semsig_gis.reports.identifiability import identifiability_tables
 
@@ -279,9 +279,9 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
 
 
 def _info(path: Path) -> dict[str, Any]:
-    from semsig_gis.database.beside import companions
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.properties import database_summary
+    from semsig_gis.database.companions import companions
+    from semsig_gis.database.summary import database_summary
 
     city = open_city(path)
     counts = city.object_counts
@@ -317,7 +317,7 @@ def clean(
 
     Older versions and interrupted runs leave them; the database is not changed.
     """
-    from semsig_gis.database.beside import remove_companions
+    from semsig_gis.database.companions import remove_companions
 
     removed = remove_companions(database, objects=objects, dry_run=dry_run)
     total = sum(one.bytes for one in removed)

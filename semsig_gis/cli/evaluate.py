@@ -40,8 +40,8 @@ from semsig_gis.cli.options import (
     OnGrid,
     read_noise,
 )
+from semsig_gis.core.defaults import LIKELIHOOD
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.method import LIKELIHOOD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -109,10 +109,10 @@ def evaluate(
     from semsig_gis.database.city import open_city
     from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.evaluation.file import save_evaluation
-    from semsig_gis.likelihood.index import build_index
-    from semsig_gis.matching.method import Method
-    from semsig_gis.queries.chain import parse_chain
-    from semsig_gis.queries.distortions import Distortion
+    from semsig_gis.evaluation.queries.distortion_text import parse_chain
+    from semsig_gis.evaluation.queries.distortions import Distortion
+    from semsig_gis.localization.distance.method import Method
+    from semsig_gis.localization.likelihood.index import build_index
     from semsig_gis.reports.evaluation import evaluation_headline, evaluation_tables
 
     if report is not None:  # what draws, and is missed before the work rather than after it
@@ -179,8 +179,8 @@ def experiment(
     as_json: AsJson = False,
 ) -> None:
     """Run the evaluations of an experiment, or resume them."""
+    from semsig_gis.evaluation.experiments.run import run_experiment
     from semsig_gis.evaluation.spec import open_experiment_spec
-    from semsig_gis.experiments.run import run_experiment
     from semsig_gis.reports.evaluation import experiment_tables
 
     opened = open_experiment_spec(spec)
@@ -208,8 +208,8 @@ def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None
         common_cases,
         compare_evaluations,
     )
+    from semsig_gis.evaluation.experiments.run import open_results
     from semsig_gis.evaluation.figures import plain_records
-    from semsig_gis.experiments.run import open_results
     from semsig_gis.reports.evaluation import comparison_sentence, comparison_table
 
     pairs = common_cases(open_results(first), open_results(second))
@@ -260,9 +260,9 @@ def reproduce(
     """Repeat the paper's experiments and compare the results."""
     import contextlib
 
-    from semsig_gis.experiments.paper.report import reproduction_report
-    from semsig_gis.experiments.paper.reproduce import reproduce as run
+    from semsig_gis.evaluation.paper.reproduction import reproduce as run
     from semsig_gis.reports.page import write_report
+    from semsig_gis.reports.paper.report import reproduction_report
 
     if workers is None:
         workers = (os.cpu_count() or 1) if size == "full" else 0
@@ -362,11 +362,11 @@ def identify(
     Adds columns to the database, which `semsig info`, `map` and `export` show.
     """
     from semsig_gis.database.city import open_city
-    from semsig_gis.evaluation.identify.check import check_identifiability
-    from semsig_gis.evaluation.identify.identify import identify as run
-    from semsig_gis.evaluation.identify.result import save_identifiability
-    from semsig_gis.likelihood.index import build_index
-    from semsig_gis.likelihood.noise.model import cell_noise
+    from semsig_gis.evaluation.identifiability.check import check_identifiability
+    from semsig_gis.evaluation.identifiability.identify import identify as run
+    from semsig_gis.evaluation.identifiability.result import save_identifiability
+    from semsig_gis.localization.likelihood.index import build_index
+    from semsig_gis.localization.noise.model import cell_noise
     from semsig_gis.reports.identifiability import (
         check_tables,
         identifiability_page,

@@ -113,7 +113,7 @@ def import_(
 ) -> None:
     """Restore a database from an exported GeoPackage."""
     from semsig_gis.database.file import save_database
-    from semsig_gis.evaluation.identify.result import save_identifiability
+    from semsig_gis.evaluation.identifiability.result import save_identifiability
     from semsig_gis.exports.geopackage import read_geopackage
     from semsig_gis.objects.table import save_objects
 

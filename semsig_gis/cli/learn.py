@@ -30,7 +30,7 @@ from semsig_gis.cli.options import (
     object_store,
     read_drift,
 )
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.text import percent
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.noise.learn import NoiseEstimate, Sample
+    from semsig_gis.localization.noise.learn import NoiseEstimate, Sample
 
 Samples = Annotated[
     Path,
@@ -69,9 +69,9 @@ def learn(
     from dataclasses import replace
 
     from semsig_gis.database.city import open_city
-    from semsig_gis.likelihood.noise.age import check_map_age, fresh_noise
-    from semsig_gis.likelihood.noise.learn import read_samples
-    from semsig_gis.likelihood.noise.model import save_noise
+    from semsig_gis.localization.noise.age import check_map_age, fresh_noise
+    from semsig_gis.localization.noise.learn import read_samples
+    from semsig_gis.localization.noise.model import save_noise
 
     keep_inputs(out, read=(database, samples, objects, drift_report))
     check_map_age(map_age)
@@ -109,7 +109,7 @@ def learn(
 def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
     import numpy as np
 
-    from semsig_gis.likelihood.noise.learn import Sample, learn_noise
+    from semsig_gis.localization.noise.learn import Sample, learn_noise
 
     database = city.database
     places = _places(database, samples)
@@ -144,7 +144,7 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
 
 def _rates(rates: pd.DataFrame) -> list[list[str]]:
     """Return rates as rows of a table; those of classes far away are in the file alone."""
-    from semsig_gis.likelihood.noise.fit import ALL
+    from semsig_gis.localization.noise.fit import ALL
 
     told = rates[(rates["quantity"] != "fading") | (rates["class"] == ALL)]
     return [_rate(row) for row in told.to_dict("records")]
@@ -188,8 +188,8 @@ def calibrate(
     import numpy as np
 
     from semsig_gis.database.city import open_city
-    from semsig_gis.likelihood import rule as abstention
-    from semsig_gis.likelihood.noise.learn import read_samples
+    from semsig_gis.localization.likelihood import rule as abstention
+    from semsig_gis.localization.noise.learn import read_samples
 
     keep_inputs(out, read=(database, samples, noise, drift_report, objects))
     city = open_city(database)

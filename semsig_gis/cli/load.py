@@ -27,7 +27,7 @@ from semsig_gis.core.errors import InputError
 if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
     from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.conditions import Rules
+    from semsig_gis.sources.filters import Rules
     from semsig_gis.sources.layers import LayerSpec
 
 
@@ -119,10 +119,10 @@ def load(
 ) -> None:
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
-    from semsig_gis.objects.told import told_catalogs
-    from semsig_gis.objects.unread import passed_by, read_small
+    from semsig_gis.objects.skipped_layers import passed_by, read_small
     from semsig_gis.sources.area import BOX, clip_layers, parse_area
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
+    from semsig_gis.sources.detect import told_catalogs
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)

@@ -35,21 +35,21 @@ from semsig_gis.cli.options import (
     command,
     seen_north,
 )
+from semsig_gis.core.defaults import LIKELIHOOD
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
-from semsig_gis.core.method import LIKELIHOOD
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.text import percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.core.view import View
-    from semsig_gis.database.answer import Answer, Locator
     from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
-    from semsig_gis.database.north import North
-    from semsig_gis.matching.method import Method
-    from semsig_gis.queries.file import QueryLine
+    from semsig_gis.localization.answers import Answer, Locator
+    from semsig_gis.localization.distance.method import Method
+    from semsig_gis.observation.files import QueryLine
+    from semsig_gis.observation.north import North
+    from semsig_gis.observation.view import View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +78,7 @@ class RankedOptions(QueryOptions):
 
     def read_queries(self, dataset: SignatureDatabase | PartitionedDatabase) -> Iterator[QueryLine]:
         """Return the queries of --queries, each when it is needed."""
-        from semsig_gis.queries.file import parse_queries, read_queries
+        from semsig_gis.observation.files import parse_queries, read_queries
 
         city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
         if self.queries == "-":
@@ -170,7 +170,7 @@ def localize(options: LocalizeOptions) -> None:
 
     method = None
     if options.ranking != LIKELIHOOD:
-        from semsig_gis.matching.method import Method
+        from semsig_gis.localization.distance.method import Method
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
@@ -208,7 +208,7 @@ def _beside(
             "all objects or to none, or leave out the method."
         )
         raise InputError(msg)
-    from semsig_gis.likelihood.questions import with_unplaced
+    from semsig_gis.localization.suggest import with_unplaced
 
     likelihood: Any = locator
     return with_unplaced(likelihood, query, unplaced, absent=absent)
@@ -228,8 +228,8 @@ def _locator(
 def _distance_locator(
     options: LocalizeOptions, city: City, method: Method, north: North
 ) -> Locator[Any]:
-    from semsig_gis.database.answer import Requirement
-    from semsig_gis.matching.search import DistanceLocator
+    from semsig_gis.localization.answers import Requirement
+    from semsig_gis.localization.distance.search import DistanceLocator
 
     database, require = city.dataset, options.require
     requirement = None if require is None else Requirement.parse(require, database.taxonomy)
@@ -315,8 +315,8 @@ def _write(
     options: LocalizeOptions, out: Path, city: City, answer: Answer, locator: Locator[Answer]
 ) -> dict[str, Any]:
     """Write the regions to search, or all chances, and return what there is to say of regions."""
-    from semsig_gis.database.answer import REGION_SHARE
     from semsig_gis.exports import export_answer
+    from semsig_gis.localization.answers import REGION_SHARE
 
     if answer.tied_beyond:
         # No cell is left out of the search that is as good as the last candidate.

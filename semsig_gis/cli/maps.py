@@ -136,7 +136,7 @@ def map_(
     from semsig_gis.database.city import open_city
     from semsig_gis.database.database import require_same_place
     from semsig_gis.evaluation.file import open_evaluation
-    from semsig_gis.likelihood.posterior import open_posterior
+    from semsig_gis.localization.likelihood.posterior import open_posterior
     from semsig_gis.maps.answer import RASTERS
     from semsig_gis.maps.city import city_map
     from semsig_gis.maps.page import save_map

@@ -20,12 +20,12 @@ from semsig_gis.cli.options import (
     command,
     seen_north,
 )
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.text import percent
 
 if TYPE_CHECKING:
     from semsig_gis.database.city import City
-    from semsig_gis.database.north import North
-    from semsig_gis.queries.file import Route
+    from semsig_gis.observation.files import Route
+    from semsig_gis.observation.north import North
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +53,8 @@ class ViewOptions:
 
     def read(self, city: City, north: North) -> Route:
         """Return the views with their names, and the legs between them."""
-        from semsig_gis.queries.file import parse_route, read_route
-        from semsig_gis.queries.track import read_track
+        from semsig_gis.observation.files import parse_route, read_route
+        from semsig_gis.observation.track import read_track
 
         dataset = city.dataset
         way: dict[str, Any] = {

@@ -35,7 +35,7 @@ def serve(
     with extra("serve", "the workbench"):
         from semsig_gis.serve import server
     from semsig_gis.database.city import open_city
-    from semsig_gis.likelihood.noise.model import NOISES
+    from semsig_gis.localization.noise.model import NOISES
     from semsig_gis.serve.workbench import Workbench
 
     city = open_city(database)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections import Counter
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.queries.detections.views import Tally
+    from semsig_gis.observation.detectors.views import Tally
 
 MOST_NAMES = 8
 
@@ -118,10 +118,10 @@ def view(
     as_json: AsJson = False,
 ) -> None:
     """Turn the boxes of an object detector into views for semsig localize."""
-    from semsig_gis.queries.detections.formats import read_pictures
-    from semsig_gis.queries.detections.labels import LabelMap
-    from semsig_gis.queries.detections.pictures import Shot
-    from semsig_gis.queries.detections.views import Detector, north_sigma, read_shots
+    from semsig_gis.observation.detectors.formats import read_pictures
+    from semsig_gis.observation.detectors.labels import LabelMap
+    from semsig_gis.observation.detectors.pictures import Shot
+    from semsig_gis.observation.detectors.views import Detector, north_sigma, read_shots
     from semsig_gis.storage.whole import write_whole
 
     keep_inputs(out, read=(*files, *(labels or ()), database, photos))
@@ -178,7 +178,7 @@ def _taxonomy(database: Path | None) -> Taxonomy:
 
         return built_in_taxonomy()
     from semsig_gis.database.city import open_city
-    from semsig_gis.queries.detections.views import with_heights
+    from semsig_gis.observation.detectors.views import with_heights
 
     return with_heights(open_city(database).database.taxonomy)
 

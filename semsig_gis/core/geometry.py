@@ -12,9 +12,9 @@ import numpy as np
 from pyproj import CRS, Geod, Proj, Transformer
 from pyproj.exceptions import CRSError
 
+from semsig_gis.core.checks import require_number
 from semsig_gis.core.effort import require_memory
 from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.ranges import require_number
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from semsig_gis import __version__
+from semsig_gis.core.checks import MOST_WORKERS, require_number
 from semsig_gis.core.errors import InputError, SemsigError, extra
-from semsig_gis.core.ranges import MOST_WORKERS, require_number
-from semsig_gis.core.scratch import own_folder
+from semsig_gis.core.temporary import own_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence

@@ -15,8 +15,8 @@ from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec, distance_units_of
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
+from semsig_gis.database.sightings import ViewpointSpec, clockwise_order, sightings
 from semsig_gis.database.viewpoints import choose_viewpoints
-from semsig_gis.database.views import ViewpointSpec, clockwise_order, sightings
 from semsig_gis.objects.table import StreetObjects, licenses_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.database.views import Sightings
+    from semsig_gis.database.sightings import Sightings
 
 # So many that the arrays of a block stay in the cache of a processor.
 CELLS_A_BLOCK = 1 << 14
@@ -100,7 +100,7 @@ def build_database(
     np.True_
     """
     if not isinstance(objects, StreetObjects):
-        from semsig_gis.objects.frame import objects_from_frame  # noqa: PLC0415 - it loads slowly
+        from semsig_gis.objects.from_geodataframe import objects_from_frame  # noqa: PLC0415 - it loads slowly
 
         objects = objects_from_frame(objects)
     footprints, streets = elements_of(footprints, "buildings"), elements_of(streets, "streets")

@@ -22,7 +22,7 @@ from semsig_gis.core.display import Displayed, bounds_text
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.geometry import cell_ids, consecutive, crs_label
 from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
-from semsig_gis.database.views import ViewpointSpec, Views
+from semsig_gis.database.sightings import ViewpointSpec, Views
 from semsig_gis.storage.geoparquet import whole_numbers
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ import pyarrow as pa
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, SemsigError
 from semsig_gis.core.geometry import NOTES, GridSpec, split_ids
-from semsig_gis.core.scratch import remove_abandoned
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.core.temporary import remove_abandoned
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
-from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.storage.geoparquet import (
     geo_metadata,
     points_to_wkb,

@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 import shapely
 
 from semsig_gis import __version__
+from semsig_gis.core.checks import MOST_METRES, require_number
 from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
@@ -30,9 +31,8 @@ from semsig_gis.core.geometry import (
     split_ids,
 )
 from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.ranges import MOST_METRES, require_number
-from semsig_gis.core.scratch import HALF_DONE
 from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.temporary import HALF_DONE
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -51,10 +51,10 @@ from semsig_gis.database.file import (
     read_manifest,
     save_database,
 )
-from semsig_gis.database.inputs import copy_by_box, fingerprint, in_files, widest_street
 from semsig_gis.database.occlusion import TOLERANCE_M
+from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
 from semsig_gis.database.viewpoints import require_surroundings
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.surroundings import read_surroundings
 from semsig_gis.objects.table import open_objects
 from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.inputs import Input
+    from semsig_gis.database.tile_inputs import Input
 
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]

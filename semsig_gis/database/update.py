@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis import __version__
+from semsig_gis.core.checks import MOST_METRES
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import ROW_SPAN, SOURCE, cell_ids, cells_near, split_ids
 from semsig_gis.core.parallel import check_workers
-from semsig_gis.core.ranges import MOST_METRES
 from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.text import percent
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
@@ -30,9 +30,10 @@ from semsig_gis.database.file import (
     part_name,
     read_manifest,
 )
-from semsig_gis.database.inputs import folder_beside
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
+from semsig_gis.database.sightings import sightings
 from semsig_gis.database.store import save_with_store, stored_inputs
+from semsig_gis.database.tile_inputs import folder_beside
 from semsig_gis.database.tiles import (
     TileSpec,
     build_parts,
@@ -41,7 +42,6 @@ from semsig_gis.database.tiles import (
     save_tile,
     tile_cells,
 )
-from semsig_gis.database.views import sightings
 from semsig_gis.objects.changes import compare_objects, replace_layers
 from semsig_gis.objects.table import licenses_of, open_objects, save_objects
 from semsig_gis.storage.runs import read_json, write_json

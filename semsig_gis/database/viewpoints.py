@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.geometry import GridSpec
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.views import ViewpointSpec
+    from semsig_gis.database.sightings import ViewpointSpec
 
 CELLS_A_BLOCK = 1 << 18
 CURVES = 1  # dimensions

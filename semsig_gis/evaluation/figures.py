@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import ERROR_BREAKS
 from semsig_gis.core.statistics import quantile_ranks, wilson_interval
-from semsig_gis.likelihood.rule import DEFAULT_RULE
-from semsig_gis.matching.ties import NEAR_PLACES, expected_recall
+from semsig_gis.core.symbology import ERROR_BREAKS
+from semsig_gis.localization.distance.ties import NEAR_PLACES, expected_recall
+from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

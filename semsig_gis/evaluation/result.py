@@ -14,7 +14,7 @@ import numpy as np
 import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.text import percent
 from semsig_gis.database.database import rows_of_result
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
@@ -32,8 +32,8 @@ from semsig_gis.evaluation.figures import (
     query_figures,
     range_labels,
 )
-from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS, expected_recall
-from semsig_gis.queries.chain import chain_text
+from semsig_gis.evaluation.queries.distortion_text import chain_text
+from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS, expected_recall
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.display import Axes, MapFrame
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.methods import AnyMethod
-    from semsig_gis.queries.draw import QuerySpec
+    from semsig_gis.evaluation.queries.draw import QuerySpec
+    from semsig_gis.localization.locator import AnyMethod
 
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),

@@ -21,10 +21,9 @@ from semsig_gis.core.errors import (
     extra,
     nearest_name,
 )
-from semsig_gis.database.answer import REGION_SHARE
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import require_same_place
-from semsig_gis.evaluation.field import error_field
+from semsig_gis.evaluation.error_field import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
 from semsig_gis.exports.files import write_csv, write_flatgeobuf, write_geojson, write_geoparquet
@@ -36,6 +35,7 @@ from semsig_gis.exports.layers import (
     objects_layer,
 )
 from semsig_gis.exports.rasters import cell_errors, export_field, export_geotiff
+from semsig_gis.localization.answers import REGION_SHARE
 from semsig_gis.objects.table import open_objects
 
 if TYPE_CHECKING:
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.table import CellGeometry
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.layers import Layer
-    from semsig_gis.exports.regions import SearchRegions
+    from semsig_gis.localization.answers import Answer
+    from semsig_gis.localization.regions import SearchRegions
     from semsig_gis.objects.table import StreetObjects
 
     Progress = Callable[[int, int], None]
@@ -231,7 +231,7 @@ def export_database(
     if evaluation is not None:
         by_name |= {one.name: one for one in evaluation_layers(evaluation, database)}
     if h3 is not None:
-        from semsig_gis.exports.areas import hexagons_layer  # noqa: PLC0415 - where it is used
+        from semsig_gis.exports.hexagons import hexagons_layer  # noqa: PLC0415 - where it is used
 
         by_name["hexagons"] = hexagons_layer(
             database, h3, objects=objects, identifiability=identifiability, evaluation=evaluation
@@ -424,7 +424,7 @@ def export_answer(
             "use the likelihood method, or write a GeoPackage."
         )
         raise InputError(msg)
-    from semsig_gis.exports.regions import search_regions  # noqa: PLC0415 - only where it is used
+    from semsig_gis.localization.regions import search_regions  # noqa: PLC0415 - only where it is used
 
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:

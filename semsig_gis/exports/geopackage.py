@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from numpy.typing import DTypeLike
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.exports.layers import Layer
     from semsig_gis.objects.table import StreetObjects
 
@@ -202,7 +202,7 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         database = database_of(signatures, specs, crs, path=path)
         identifiability = None
         if specs["identifiability"]:
-            from semsig_gis.evaluation.identify.result import (  # noqa: PLC0415 - where it is used
+            from semsig_gis.evaluation.identifiability.result import (  # noqa: PLC0415 - where it is used
                 identifiability_of,
             )
 

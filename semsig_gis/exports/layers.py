@@ -23,7 +23,7 @@ from semsig_gis.core.geometry import (
     SOURCE,
     SOURCE_ID,
 )
-from semsig_gis.core.signs import OUTCOMES
+from semsig_gis.core.symbology import OUTCOMES
 from semsig_gis.database.file import database_specs
 from semsig_gis.database.table import CellTable
 from semsig_gis.exports.styles import (
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.table import CellGeometry
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.exports.regions import SearchRegions
     from semsig_gis.exports.styles import Style
+    from semsig_gis.localization.answers import Answer
+    from semsig_gis.localization.regions import SearchRegions
     from semsig_gis.objects.table import StreetObjects
 
 

@@ -11,8 +11,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import CELL_CHANCES, ERROR_BREAKS, FAILURES
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.symbology import CELL_CHANCES, ERROR_BREAKS, FAILURES
+from semsig_gis.core.text import percent
 from semsig_gis.exports.styles import AMBIGUITY, IDENTIFIABILITY
 from semsig_gis.storage.whole import write_whole
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.field import ErrorField
+    from semsig_gis.evaluation.error_field import ErrorField
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.styles import Classes
 

@@ -17,8 +17,8 @@ from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import Writer
 
 from semsig_gis.core.geometry import GEOMETRY, to_degrees
-from semsig_gis.exports.areas import summary
 from semsig_gis.exports.files import feature_stream, whole_by_gdal
+from semsig_gis.exports.hexagons import summary
 from semsig_gis.exports.layers import cells_layer, table_layer
 from semsig_gis.storage.whole import whole_file
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.exports.layers import Layer
 
 

@@ -11,11 +11,11 @@ import pyogrio
 import shapely
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import CHANCES
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.symbology import CHANCES
+from semsig_gis.core.text import percent
 from semsig_gis.database.database import require_same_place
 from semsig_gis.maps.location import CANDIDATE
-from semsig_gis.maps.parts import (
+from semsig_gis.maps.page_elements import (
     add_city,
     corners_of,
     draw,

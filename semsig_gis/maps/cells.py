@@ -13,14 +13,14 @@ from folium.template import Template
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
 from semsig_gis.core.signature import BEARING_UNITS
-from semsig_gis.core.signs import (
+from semsig_gis.core.symbology import (
     FOUND_RAMP,
     GROUP_COLOURS,
     SAME_LEVELS,
     SAME_TYPES,
     group_labels,
 )
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.text import percent
 from semsig_gis.maps.image import (
     QUANTUM_M,
     CellPixels,
@@ -30,7 +30,7 @@ from semsig_gis.maps.image import (
     script_json,
     steps,
 )
-from semsig_gis.maps.parts import (
+from semsig_gis.maps.page_elements import (
     LIFTING,
     NAMED_CLASSES,
     PAGE_FILES,
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
 
 
 BESIDE_M = 50.0  # from a cell, where a click tells of it

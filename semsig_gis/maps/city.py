@@ -12,7 +12,7 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import posterior_map
 from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.parts import cell_colours
+from semsig_gis.maps.page_elements import cell_colours
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     import folium
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.likelihood.posterior import Posterior
+    from semsig_gis.localization.likelihood.posterior import Posterior
     from semsig_gis.objects.table import StreetObjects
 
 

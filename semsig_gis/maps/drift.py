@@ -10,13 +10,13 @@ import pandas as pd
 
 from semsig_gis.core.errors import CrsError
 from semsig_gis.core.geometry import SOURCE, SOURCE_ID
-from semsig_gis.core.signs import DRIFT_COLOURS, OBJECT_COLOURS
-from semsig_gis.core.terminal import percent
+from semsig_gis.core.symbology import DRIFT_COLOURS, OBJECT_COLOURS
+from semsig_gis.core.text import percent
 from semsig_gis.database.database import join_databases, require_same_place
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.cells import CellFacts, Cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image, packed
-from semsig_gis.maps.parts import (
+from semsig_gis.maps.page_elements import (
     FLIPPING,
     LIFTING,
     NAMED_CLASSES,

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.signs import ERROR_BREAKS, FAILURES, OUTCOMES
-from semsig_gis.core.terminal import percent
-from semsig_gis.database.observation import parse_view
-from semsig_gis.evaluation.field import ENOUGH, error_field
+from semsig_gis.core.symbology import ERROR_BREAKS, FAILURES, OUTCOMES
+from semsig_gis.core.text import percent
+from semsig_gis.evaluation.error_field import ENOUGH, error_field
+from semsig_gis.evaluation.queries.distortion_text import chain_text
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.maps.image import mercator_places, packed
-from semsig_gis.maps.parts import (
+from semsig_gis.maps.page_elements import (
     OUTLINES,
     PAGE_FILES,
     Call,
@@ -44,7 +44,7 @@ from semsig_gis.maps.parts import (
     ties_text,
     to_latlon,
 )
-from semsig_gis.queries.chain import chain_text
+from semsig_gis.observation.sentences import parse_view
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,9 +52,9 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import NDArray
 
-    from semsig_gis.core.view import View
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.field import ErrorField
+    from semsig_gis.evaluation.error_field import ErrorField
+    from semsig_gis.observation.view import View
 
 QUERY_FIELDS = (
     *(

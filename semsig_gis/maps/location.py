@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.signs import (
+from semsig_gis.core.symbology import (
     ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
@@ -15,14 +15,12 @@ from semsig_gis.core.signs import (
     VERDICTS,
     mixed,
 )
-from semsig_gis.core.terminal import percent
-from semsig_gis.core.view import View
+from semsig_gis.core.text import percent
 from semsig_gis.database.database import rows_of_result
-from semsig_gis.database.north import GRID_NORTH
-from semsig_gis.likelihood.explain import VERDICTS as COUNTED
-from semsig_gis.likelihood.rule import DEFAULT_RULE
+from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
+from semsig_gis.localization.likelihood.explain import VERDICTS as COUNTED
 from semsig_gis.maps.image import level_image
-from semsig_gis.maps.parts import (
+from semsig_gis.maps.page_elements import (
     FLIPPING,
     OUTLINES,
     add_city,
@@ -50,17 +48,19 @@ from semsig_gis.maps.parts import (
     ties_text,
     to_latlon,
 )
+from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation.view import View
 
 if TYPE_CHECKING:
     import folium
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.answer import Answer
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.explain import Explanation
-    from semsig_gis.likelihood.locate import Location
-    from semsig_gis.likelihood.posterior import Posterior
-    from semsig_gis.matching.search import Localization
+    from semsig_gis.localization.answers import Answer
+    from semsig_gis.localization.distance.search import Localization
+    from semsig_gis.localization.likelihood.explain import Explanation
+    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization.likelihood.posterior import Posterior
 
 
 Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners

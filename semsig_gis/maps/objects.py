@@ -10,9 +10,9 @@ import shapely
 
 from semsig_gis.core.errors import CrsError, EmptyResultError
 from semsig_gis.core.geometry import COUNT, MERGED, NAME, SOURCE, SOURCE_ID
-from semsig_gis.core.signs import class_signs
+from semsig_gis.core.symbology import class_signs
 from semsig_gis.maps.image import mercator, packed, steps
-from semsig_gis.maps.parts import (
+from semsig_gis.maps.page_elements import (
     Call,
     add_city,
     corners_of,

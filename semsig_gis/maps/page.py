@@ -24,7 +24,7 @@ import folium
 from folium.raster_layers import WmsTileLayer
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.maps.parts import layers_of
+from semsig_gis.maps.page_elements import layers_of
 from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:

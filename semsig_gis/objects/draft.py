@@ -25,8 +25,8 @@ from semsig_gis.core.errors import (
     SourceError,
 )
 from semsig_gis.core.geometry import require_metric_crs
-from semsig_gis.core.scratch import own_folder
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
+from semsig_gis.core.temporary import own_folder
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,
@@ -36,14 +36,14 @@ from semsig_gis.objects.guesses import (
     guess_position,
     samples_of,
 )
-from semsig_gis.objects.keywords import words_of
 from semsig_gis.objects.load import assemble, read_files
 from semsig_gis.sources import reader
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.conditions import ANY_VALUE, BETWEEN_SLASHES, Condition
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
+from semsig_gis.sources.filters import ANY_VALUE, BETWEEN_SLASHES, Condition
+from semsig_gis.sources.keywords import words_of
 from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.raw_layer import WGS84, off_the_globe
+from semsig_gis.sources.rows import WGS84, off_the_globe
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

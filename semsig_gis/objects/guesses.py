@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from shapely.geometry.base import BaseGeometry
 
 from semsig_gis.core.errors import SourceError
-from semsig_gis.objects.keywords import keywords, words_of
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.decimals import decimal
+from semsig_gis.sources.keywords import keywords, words_of
+from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.osm.file import FORMATS
-from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT
+from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT
 from semsig_gis.sources.services.layers import POINT, SHAPE, fold
 from semsig_gis.sources.services.table import Record, open_table
 from semsig_gis.sources.vector import LayerInfo, first_rows

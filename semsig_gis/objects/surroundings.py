@@ -19,7 +19,7 @@ from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm.features import frame_fields, frame_layers, tells_elements
 from semsig_gis.sources.parquet import SUFFIXES, read_parquet
-from semsig_gis.sources.raw_layer import WGS84
+from semsig_gis.sources.rows import WGS84
 from semsig_gis.storage.geoparquet import (
     CHECKED_PAGES,
     GROUP_ROWS,

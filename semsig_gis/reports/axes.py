@@ -18,7 +18,7 @@ from semsig_gis.core.errors import (
     extra,
     nearest_name,
 )
-from semsig_gis.core.signs import (
+from semsig_gis.core.symbology import (
     ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
@@ -30,9 +30,9 @@ from semsig_gis.core.signs import (
     class_signs,
     group_labels,
 )
+from semsig_gis.evaluation.queries.distortion_text import chain_text
 from semsig_gis.evaluation.result import PlotKind
-from semsig_gis.likelihood.locate import Location
-from semsig_gis.queries.chain import chain_text
+from semsig_gis.localization.likelihood.locate import Location
 from semsig_gis.reports.plots import INK, cell_pixels, draw_curve, draw_frame, label
 from semsig_gis.reports.scenes import MARKERS
 from semsig_gis.reports.shares import curve_of, plot_of
@@ -54,11 +54,11 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.signs import Mark
-    from semsig_gis.database.answer import Answer
+    from semsig_gis.core.symbology import Mark
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identify.result import Identifiability
+    from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.localization.answers import Answer
     from semsig_gis.objects.table import StreetObjects
 
 SIZE = (7.5, 6.0)  # inches of a new figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.evaluation.figures import percentile
-from semsig_gis.likelihood.rule import DEFAULT_RULE
+from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.reports.evaluation import (
     FIGURES,
     evaluation_headline,
@@ -16,7 +16,7 @@ from semsig_gis.reports.evaluation import (
     paris_points,
 )
 from semsig_gis.reports.outcomes import outcome_map
-from semsig_gis.reports.parts import Curve, Number, Plot, Report, Section
+from semsig_gis.reports.report_model import Curve, Number, Plot, Report, Section
 from semsig_gis.reports.scenes import failure_pairs
 from semsig_gis.reports.shares import calibration_plot, curve_of, plot_of
 from semsig_gis.reports.tables import length

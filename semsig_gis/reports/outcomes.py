@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core.errors import extra
-from semsig_gis.core.signs import OUTCOMES, WHITE
-from semsig_gis.reports.parts import OutcomeMap
+from semsig_gis.core.symbology import OUTCOMES, WHITE
 from semsig_gis.reports.plots import SOFT, blank_figure, cell_pixels, draw_legend, label, saved
+from semsig_gis.reports.report_model import OutcomeMap
 from semsig_gis.reports.scenes import MARKERS, draw_north, draw_scale
 
 with extra("plot", "a report or a figure"):
@@ -18,7 +18,7 @@ with extra("plot", "a report or a figure"):
     from matplotlib.lines import Line2D
 
 if TYPE_CHECKING:
-    from semsig_gis.core.signs import Mark
+    from semsig_gis.core.symbology import Mark
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.reports.plots import Picture

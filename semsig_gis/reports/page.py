@@ -18,7 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import escaped, one_line
+from semsig_gis.core.symbology import escaped, one_line
 from semsig_gis.reports.outcomes import draw_map
 from semsig_gis.reports.plots import draw_plot, in_the_dark
 from semsig_gis.reports.scenes import draw_scene
@@ -28,8 +28,8 @@ from semsig_gis.storage.whole import write_whole
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.reports.parts import OutcomeMap, Plot, Report, Scene
     from semsig_gis.reports.plots import Picture
+    from semsig_gis.reports.report_model import OutcomeMap, Plot, Report, Scene
 
 
 # What has a meaning to Markdown anywhere, besides what `escaped` knows, and at the beginning.

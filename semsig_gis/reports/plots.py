@@ -18,7 +18,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from semsig_gis.core.errors import extra
-from semsig_gis.core.signs import one_line
+from semsig_gis.core.symbology import one_line
 
 with extra("plot", "a report or a figure"):
     import matplotlib as mpl
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.reports.parts import Curve, Plot
+    from semsig_gis.reports.report_model import Curve, Plot
 
 
 COLOURS = (
@@ -234,7 +234,7 @@ def draw_plot(plot: Plot) -> Picture:
 
     Examples
     --------
-    >>> from semsig_gis.reports.parts import Curve, Plot
+    >>> from semsig_gis.reports.report_model import Curve, Plot
     >>> half = Curve(label="edit", x=(0.0, 50.0), y=(0.5, 1.0))
     >>> plot = Plot(name="a", title="Errors", x_label="m", y_label="share", curves=(half,))
     >>> draw_plot(plot).description

@@ -12,10 +12,10 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError, extra
 from semsig_gis.core.geometry import to_degrees
-from semsig_gis.core.signs import OUTCOMES, ClassSign, class_signs, one_line
-from semsig_gis.queries.sight import Sight
-from semsig_gis.reports.parts import Pair, Scene, SceneObject
+from semsig_gis.core.symbology import OUTCOMES, ClassSign, class_signs, one_line
+from semsig_gis.evaluation.queries.true_view import Sight
 from semsig_gis.reports.plots import GROUND, INK, SOFT, blank_figure, draw_legend, label, saved
+from semsig_gis.reports.report_model import Pair, Scene, SceneObject
 from semsig_gis.reports.tables import length
 
 with extra("plot", "a report or a figure"):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.matching.ties import THRESHOLDS, expected_recall
-from semsig_gis.reports.parts import Curve, Number, Plot
+from semsig_gis.localization.distance.ties import THRESHOLDS, expected_recall
+from semsig_gis.reports.report_model import Curve, Number, Plot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -8,12 +8,12 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from semsig_gis.core.signs import escaped, one_line
+from semsig_gis.core.symbology import escaped, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.reports.parts import Number
+    from semsig_gis.reports.report_model import Number
 
 
 @dataclass(frozen=True, slots=True)

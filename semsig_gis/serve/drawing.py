@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.signs import CHANCES
-from semsig_gis.core.terminal import percent
-from semsig_gis.likelihood.explain import UNKNOWN_NAME
+from semsig_gis.core.symbology import CHANCES
+from semsig_gis.core.text import percent
+from semsig_gis.localization.likelihood.explain import UNKNOWN_NAME
 from semsig_gis.maps.location import REGION_COLOURS, region_levels
-from semsig_gis.maps.parts import data_url, exact_latlon, to_metres
+from semsig_gis.maps.page_elements import data_url, exact_latlon, to_metres
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.likelihood.explain import Explanation
-    from semsig_gis.likelihood.locate import Location
-    from semsig_gis.likelihood.noise.table import NoiseTable
+    from semsig_gis.localization.likelihood.explain import Explanation
+    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.maps.image import CellPixels
     from semsig_gis.serve.question import MarkNumber, Question
 

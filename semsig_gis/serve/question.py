@@ -12,17 +12,17 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import wrap_degrees
-from semsig_gis.core.view import View
-from semsig_gis.database.observation import parse_view
-from semsig_gis.likelihood.route import Leg
-from semsig_gis.queries.detections.camera import Camera
-from semsig_gis.queries.detections.views import (
+from semsig_gis.evaluation.queries.draw import SeenFrom
+from semsig_gis.localization.route import Leg
+from semsig_gis.observation.detectors.camera import Camera
+from semsig_gis.observation.detectors.views import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
     METRE_DIGITS,
     placed,
 )
-from semsig_gis.queries.draw import SeenFrom
+from semsig_gis.observation.sentences import parse_view
+from semsig_gis.observation.view import View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -23,8 +23,8 @@ from starlette.routing import Route
 
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.core.threads import NotWantedError, while_wanted
-from semsig_gis.serve.ground import city_ground
 from semsig_gis.serve.page import policy, workbench_page
+from semsig_gis.serve.streets import city_ground
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
 from semsig_gis.storage.text import parse_json
 

@@ -19,7 +19,7 @@ from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
 from semsig_gis.sources import FILE_SUFFIXES
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.raw_layer import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
+from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -15,8 +15,8 @@ from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources.csv_file import open_csv
-from semsig_gis.sources.decimals import decimal
-from semsig_gis.sources.raw_layer import (
+from semsig_gis.sources.numbers import decimal
+from semsig_gis.sources.rows import (
     BadFeatureError,
     RowRules,
     Rows,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.csv_file import CsvFile
     from semsig_gis.sources.layers import LayerSpec
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
 
     Row = Mapping[str, str | None]
 

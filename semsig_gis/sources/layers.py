@@ -12,14 +12,14 @@ from semsig_gis.core.errors import (
     CatalogError,
     UnknownNameError,
 )
-from semsig_gis.sources.conditions import COMPARES, Condition, Value
+from semsig_gis.sources.filters import COMPARES, Condition, Value
 from semsig_gis.storage.toml import check_keys, metres, one_of, texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.sources.conditions import Rules
+    from semsig_gis.sources.filters import Rules
 
 
 GeometryKind = Literal["point", "line", "polygon"]

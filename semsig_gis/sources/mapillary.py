@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from semsig_gis.core.errors import SourceError
 from semsig_gis.sources.area import tiles_of
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
-from semsig_gis.sources.raw_layer import WGS84, RowRules, Rows, raw_layer, settle_crs
+from semsig_gis.sources.rows import WGS84, RowRules, Rows, raw_layer, settle_crs
 from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layers import LayerSpec
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
 
 FIELDS = ("id", "object_value", "object_type", "geometry", "first_seen_at", "last_seen_at")
 MOST_FEATURES = 2000  # in an answer, which says nothing of the others

@@ -19,11 +19,11 @@ import shapely
 from pyarrow import fs
 
 from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources.conditions import ANY_VALUE, as_text
+from semsig_gis.sources.filters import ANY_VALUE, as_text
 from semsig_gis.sources.http.cache import Fetched, checksum
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, NotCachedError
 from semsig_gis.sources.osm.elements import TagIndex
-from semsig_gis.sources.raw_layer import WGS84, RowRules, Rows, raw_layer, settle_crs
+from semsig_gis.sources.rows import WGS84, RowRules, Rows, raw_layer, settle_crs
 from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:

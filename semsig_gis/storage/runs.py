@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.scratch import HALF_DONE, own_folder, remove_abandoned
+from semsig_gis.core.temporary import HALF_DONE, own_folder, remove_abandoned
 from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import put_in_place, reason, write_whole
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.scratch import ASIDE, locked, own_folder
+from semsig_gis.core.temporary import ASIDE, locked, own_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

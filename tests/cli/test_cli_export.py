@@ -20,7 +20,7 @@ from semsig_gis.cli.localize import print_answer
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.evaluation.file import save_evaluation
-from semsig_gis.evaluation.identify.result import save_identifiability
+from semsig_gis.evaluation.identifiability.result import save_identifiability
 from semsig_gis.exports.rasters import cell_errors
 from semsig_gis.objects.table import open_objects, save_objects
 

@@ -15,7 +15,7 @@ from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.evaluation.identify import identify as identifying
+from semsig_gis.evaluation.identifiability import identify as identifying
 from semsig_gis.objects.table import save_objects
 
 if TYPE_CHECKING:

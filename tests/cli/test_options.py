@@ -10,20 +10,20 @@ import typer
 from sentences import refused, sentence
 
 from semsig_gis.cli.commands import app
+from semsig_gis.core.checks import MOST_METRES, MOST_SEED
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.parallel import check_workers
-from semsig_gis.core.ranges import MOST_METRES, MOST_SEED
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.view import check_north
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tiles import TileSpec
-from semsig_gis.database.views import ViewpointSpec
-from semsig_gis.evaluation.identify.lookalikes import check_radius
-from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.noise.model import NoiseSpec, named_noise
-from semsig_gis.likelihood.route import Leg
-from semsig_gis.queries.chain import parse_chain
-from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.evaluation.identifiability.lookalikes import check_radius
+from semsig_gis.evaluation.queries.distortion_text import parse_chain
+from semsig_gis.evaluation.queries.draw import QuerySpec
+from semsig_gis.localization.likelihood.method import LikelihoodMethod
+from semsig_gis.localization.noise.model import NoiseSpec, named_noise
+from semsig_gis.localization.route import Leg
+from semsig_gis.observation.view import check_north
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:

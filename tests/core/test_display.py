@@ -43,7 +43,7 @@ from semsig_gis import (
 )
 from semsig_gis.core.display import Displayed
 from semsig_gis.objects.load import assemble
-from semsig_gis.reports.parts import Scene
+from semsig_gis.reports.report_model import Scene
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:

@@ -26,10 +26,10 @@ def test_code_is_kept_for_later_processes_which_load_no_compiler(tmp_path: Path)
     program = (
         "import sys\n"
         "import numpy as np\n"
-        "from semsig_gis.matching.metrics.edit import BitPlanes\n"
+        "from semsig_gis.localization.distance.metrics.edit import BitPlanes\n"
         "values = np.array([1, 2], np.uint8)\n"
         "print(BitPlanes.build(values, np.array([0, 2])).edit_distances([values]))\n"
-        "from semsig_gis.matching.kernels import scan\n"
+        "from semsig_gis.localization.distance.kernels import scan\n"
         "print(sum(scan.stats.cache_hits.values()), sum(scan.stats.cache_misses.values()))\n"
         "print('numba.core.inline_closurecall' in sys.modules)\n"
     )

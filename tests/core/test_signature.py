@@ -12,7 +12,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.signature import BEARING_UNITS, Signature, SignatureSpec, quantize
-from semsig_gis.database.views import Sightings, clockwise_order
+from semsig_gis.database.sightings import Sightings, clockwise_order
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:

@@ -28,7 +28,7 @@ from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database import build
 from semsig_gis.database.build import build_database, visible_objects
-from semsig_gis.database.views import Sightings, ViewpointSpec, bearings
+from semsig_gis.database.sightings import Sightings, ViewpointSpec, bearings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,7 +18,7 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.database.database import SequenceTable, checked_sequence, join_databases
 from semsig_gis.database.file import open_database
-from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.database.sightings import ViewpointSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -18,9 +18,9 @@ from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.merge import merge_databases
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.table import Licence, save_objects
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
-    from semsig_gis.database.views import Mode
+    from semsig_gis.database.sightings import Mode
     from semsig_gis.objects.table import StreetObjects
 
 EAST = float(CORNER[0])

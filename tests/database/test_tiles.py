@@ -31,6 +31,7 @@ from semsig_gis.database import tiles
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tiles import (
     TileSpec,
     begin,
@@ -41,7 +42,6 @@ from semsig_gis.database.tiles import (
     publish,
     touched_tiles,
 )
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
 
@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from semsig_gis.core.errors import SemsigError
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import Part
+    from semsig_gis.database.sightings import Mode
     from semsig_gis.database.tiles import TilePlan
-    from semsig_gis.database.views import Mode
 
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:

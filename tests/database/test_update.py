@@ -22,6 +22,7 @@ from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, In
 from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
 from semsig_gis.database.build import build_cells, build_database
 from semsig_gis.database.file import open_database
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
 from semsig_gis.database.tiles import TileSpec, build_tiles
 from semsig_gis.database.update import (
@@ -31,7 +32,6 @@ from semsig_gis.database.update import (
     update_tile,
     update_tiles,
 )
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.objects.table import Licence, save_objects
 from semsig_gis.sources.catalog import load_catalog
@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from worlds import World
 
     from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.sightings import Mode
     from semsig_gis.database.update import UpdateReport
-    from semsig_gis.database.views import Mode
     from semsig_gis.objects.load import Loaded
     from semsig_gis.objects.table import StreetObjects
 

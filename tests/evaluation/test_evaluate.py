@@ -16,16 +16,16 @@ from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.compare import changed_successes, common_cases, compare_evaluations
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.methods import make_locator, parse_method
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.matching.method import Method
-from semsig_gis.matching.scores import score_cells
-from semsig_gis.matching.ties import NEAR_PLACES, THRESHOLDS
-from semsig_gis.queries.distortions import DISTORTIONS, Detector, Distortion
-from semsig_gis.queries.draw import QuerySpec, draw_queries
+from semsig_gis.evaluation.queries.distortions import DISTORTIONS, Detector, Distortion
+from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.distance.scores import score_cells
+from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.likelihood.method import LikelihoodMethod
+from semsig_gis.localization.locator import make_locator, parse_method
+from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise
 from semsig_gis.reports.evaluation import evaluation_tables
 
 if TYPE_CHECKING:

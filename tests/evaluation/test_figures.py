@@ -27,7 +27,7 @@ from semsig_gis.evaluation.figures import (
     query_figures,
     range_labels,
 )
-from semsig_gis.matching.ties import THRESHOLDS
+from semsig_gis.localization.distance.ties import THRESHOLDS
 
 NAN = math.nan
 

@@ -22,14 +22,14 @@ from semsig_gis.evaluation.file import (
     settings_to_dict,
     used_noises,
 )
+from semsig_gis.evaluation.queries.distortion_text import NAMED_DISTORTIONS, parse_chain
+from semsig_gis.evaluation.queries.distortions import Detector
+from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.result import machine
-from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.noise.model import NoiseSpec
-from semsig_gis.matching.method import Method
-from semsig_gis.matching.metrics.edit import EditWeights
-from semsig_gis.queries.chain import NAMED_DISTORTIONS, parse_chain
-from semsig_gis.queries.distortions import Detector
-from semsig_gis.queries.draw import QuerySpec
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.distance.metrics.edit import EditWeights
+from semsig_gis.localization.likelihood.method import LikelihoodMethod
+from semsig_gis.localization.noise.model import NoiseSpec
 from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:

@@ -15,25 +15,25 @@ from noisy_cells import mixtures, noise_specs, parts_of, random_database
 from scipy.special import ndtr
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.core.view import Photo, View
-from semsig_gis.evaluation.identify import lookalikes
-from semsig_gis.evaluation.identify.columns import symbol_columns
-from semsig_gis.evaluation.identify.lookalikes import find_lookalikes
-from semsig_gis.evaluation.identify.trials import (
+from semsig_gis.evaluation.identifiability import lookalikes
+from semsig_gis.evaluation.identifiability.lookalikes import find_lookalikes
+from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
+from semsig_gis.evaluation.identifiability.trials import (
     draw_trials,
     leave_class_out,
     trial_cells,
     try_cells,
     try_without_classes,
 )
-from semsig_gis.likelihood.association import rerank
-from semsig_gis.likelihood.index import CellScores, build_index
-from semsig_gis.likelihood.noise.model import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.likelihood.posterior import posterior
+from semsig_gis.localization.likelihood.association import rerank
+from semsig_gis.localization.likelihood.index import CellScores, build_index
+from semsig_gis.localization.likelihood.posterior import posterior
+from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.observation.view import Photo, View
 
 if TYPE_CHECKING:
-    from semsig_gis.evaluation.identify.columns import SymbolColumns
-    from semsig_gis.likelihood.noise.model import Noise
+    from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
+    from semsig_gis.localization.noise.model import Noise
 
 COLUMNS = symbol_columns(build_index(random_database(5, cells=300), named_noise("medium")))
 

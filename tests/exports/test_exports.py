@@ -23,14 +23,14 @@ from small_city import (
 
 from semsig_gis.core.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
 from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database
-from semsig_gis.exports.regions import search_regions
+from semsig_gis.localization.regions import search_regions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.likelihood.locate import Location
-    from semsig_gis.matching.search import Localization
+    from semsig_gis.localization.distance.search import Localization
+    from semsig_gis.localization.likelihood.locate import Location
 
 CITY, OBJECTS = small_city()
 CHANCES = chances_of(CITY)

@@ -36,16 +36,16 @@ from worlds import CORNER, World, assert_same
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec, quantize
-from semsig_gis.core.signs import OUTCOMES, class_signs
+from semsig_gis.core.symbology import OUTCOMES, class_signs
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.views import ViewpointSpec
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.identify.result import Identifiability
+from semsig_gis.evaluation.identifiability.result import Identifiability
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.geopackage import read_geopackage
 from semsig_gis.exports.styles import CLASS_MARKERS, by_class
-from semsig_gis.matching.method import Method
+from semsig_gis.localization.distance.method import Method
 from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy
 

@@ -23,7 +23,7 @@ from small_city import chances_of, small_city, small_evaluation, small_localizat
 
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.areas import hexagons_layer
+from semsig_gis.exports.hexagons import hexagons_layer
 from semsig_gis.exports.layers import (
     answer_layers,
     cells_layer,
@@ -32,12 +32,12 @@ from semsig_gis.exports.layers import (
     objects_layer,
 )
 from semsig_gis.exports.project import layer_fields, project_archive, shown_layers
-from semsig_gis.exports.regions import search_regions
+from semsig_gis.localization.regions import search_regions
 from semsig_gis.objects.table import Licence
 
 if TYPE_CHECKING:
-    from semsig_gis.likelihood.locate import Location
-    from semsig_gis.matching.search import Localization
+    from semsig_gis.localization.distance.search import Localization
+    from semsig_gis.localization.likelihood.locate import Location
 
 PROGRAM = Path(__file__).parents[1] / "qgis_project.py"
 SVG = "{http://www.w3.org/2000/svg}"

@@ -16,13 +16,13 @@ from selenium.webdriver.support.wait import WebDriverWait
 from small_city import chances_of
 from worlds import CODES, TAXONOMY, random_town
 
-from semsig_gis.core.signs import OBJECT_COLOURS, SAME_LEVELS, SAME_TYPES
+from semsig_gis.core.symbology import OBJECT_COLOURS, SAME_LEVELS, SAME_TYPES
 from semsig_gis.database.build import build_database
 from semsig_gis.database.update import compare_cells
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.parts import layers_of, to_latlon
+from semsig_gis.maps.page_elements import layers_of, to_latlon
 from semsig_gis.objects.changes import compare_objects
 
 if TYPE_CHECKING:

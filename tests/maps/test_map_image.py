@@ -19,7 +19,7 @@ from pyproj import CRS, Transformer
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.maps import image as map_image
 from semsig_gis.maps.image import city_image, level_image, mercator, place_lattices, script_json
-from semsig_gis.maps.parts import corners_of
+from semsig_gis.maps.page_elements import corners_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,22 +13,22 @@ from selenium.webdriver.common.by import By
 from worlds import random_town
 
 from semsig_gis.core.signature import Signature
-from semsig_gis.core.signs import ANSWERS, CANDIDATE_RAMP, VERDICTS
-from semsig_gis.core.terminal import percent
-from semsig_gis.core.view import Photo, View
+from semsig_gis.core.symbology import ANSWERS, CANDIDATE_RAMP, VERDICTS
+from semsig_gis.core.text import percent
 from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.methods import localize
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.locate import locate
-from semsig_gis.likelihood.noise.model import cell_noise, named_noise
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.locator import localize
+from semsig_gis.localization.noise.model import cell_noise, named_noise
 from semsig_gis.maps.location import SECTOR, localization_map, location_map
-from semsig_gis.maps.parts import OUTLINES
-from semsig_gis.matching.method import Method
+from semsig_gis.maps.page_elements import OUTLINES
+from semsig_gis.observation.view import Photo, View
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.likelihood.locate import Location
+    from semsig_gis.localization.likelihood.locate import Location
 
 WORLD = random_town()
 CITY = WORLD.database

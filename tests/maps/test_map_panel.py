@@ -18,7 +18,7 @@ from worlds import random_town
 from semsig_gis.maps.cells import ambiguity_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.parts import to_latlon
+from semsig_gis.maps.page_elements import to_latlon
 
 if TYPE_CHECKING:
     from map_pages import MapPage

@@ -8,7 +8,7 @@ import pytest
 from map_pages import HOSTILE
 from small_city import small_city, small_location
 
-from semsig_gis.core.signs import GROUP_COLOURS
+from semsig_gis.core.symbology import GROUP_COLOURS
 from semsig_gis.maps.cells import ambiguity_map
 from semsig_gis.maps.location import location_map
 from semsig_gis.maps.page import save_map

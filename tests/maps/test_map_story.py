@@ -13,7 +13,7 @@ from semsig_gis.maps.drift import drift_map
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.location import location_map
 from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.parts import layers_of
+from semsig_gis.maps.page_elements import layers_of
 
 if TYPE_CHECKING:
     import folium

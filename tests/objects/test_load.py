@@ -26,14 +26,14 @@ from semsig_gis.objects.load import (
     choose_layers,
     read_files,
 )
+from semsig_gis.objects.skipped_layers import passed_by, read_small
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.objects.unread import passed_by, read_small
 from semsig_gis.reports.quality import quality_report, quality_tables
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.raw_layer import RowRules, Rows
+from semsig_gis.sources.rows import RowRules, Rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -134,7 +134,7 @@ def test_layers_of_small_files_are_counted(tmp_path: Path, monkeypatch: pytest.M
     ]
     specs[0] = replace(specs[0], where=(("n", (">=3",)),))
     catalog = catalog_of(layers=(BENCH, *specs))
-    monkeypatch.setattr("semsig_gis.objects.unread.SMALL_BYTES", 1000)
+    monkeypatch.setattr("semsig_gis.objects.skipped_layers.SMALL_BYTES", 1000)
     (bins,) = read_small(catalog, [BENCH], [tmp_path, tmp_path / "bins.csv"])
     assert (bins.spec.name, bins.counts.kept) == ("bins", 2)
     assert read_small(catalog, specs, [tmp_path]) == ()

@@ -17,7 +17,7 @@ from worlds import random_town
 
 from semsig_gis import Method, build_index, evaluate, identify, localize, locate, named_noise
 from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
-from semsig_gis.core.signs import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
+from semsig_gis.core.symbology import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
 from semsig_gis.maps.page import MapFrame
 from semsig_gis.reports import axes as drawing
 

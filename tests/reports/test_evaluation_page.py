@@ -16,10 +16,10 @@ from worlds import random_town
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.matching.method import Method
-from semsig_gis.queries.chain import parse_chain
+from semsig_gis.evaluation.queries.distortion_text import parse_chain
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.reports.evaluation import evaluation_headline, paris_points
 from semsig_gis.reports.evaluation_page import evaluation_page
 from semsig_gis.reports.page import write_page
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
     from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.reports.parts import Section
+    from semsig_gis.reports.report_model import Section
 
 CITY = random_town().database
 

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from matplotlib.lines import Line2D
 from reports import HARM, LONG, plot, texts
 
-from semsig_gis.reports.parts import Curve, Plot
 from semsig_gis.reports.plots import (
     COLOURS,
     DARK,
@@ -29,6 +28,7 @@ from semsig_gis.reports.plots import (
     label,
     saved,
 )
+from semsig_gis.reports.report_model import Curve, Plot
 
 if TYPE_CHECKING:
     from semsig_gis.reports.plots import Picture

@@ -16,25 +16,25 @@ from worlds import random_town
 
 from semsig_gis.core.geometry import Distortion
 from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.update import UpdateReport
-from semsig_gis.database.views import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.identify.check import (
+from semsig_gis.evaluation.identifiability.check import (
     ChanceBin,
     IdentifiabilityCheck,
     check_identifiability,
 )
-from semsig_gis.evaluation.identify.identify import identify
+from semsig_gis.evaluation.identifiability.identify import identify
+from semsig_gis.evaluation.queries.distortion_text import parse_chain
+from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.spec import ExperimentSpec
-from semsig_gis.likelihood.index import build_index
-from semsig_gis.likelihood.method import LikelihoodMethod
-from semsig_gis.likelihood.noise.model import named_noise
-from semsig_gis.matching.method import Method
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.method import LikelihoodMethod
+from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.objects.changes import ClassChange
 from semsig_gis.objects.conflate import ConflatedPair
 from semsig_gis.objects.load import LayerReport, UnreadLayer
-from semsig_gis.queries.chain import parse_chain
-from semsig_gis.queries.draw import QuerySpec
 from semsig_gis.reports.database import database_tables
 from semsig_gis.reports.evaluation import (
     comparison_sentence,
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.reports.tables import Table
 
 SIX = six_cells()

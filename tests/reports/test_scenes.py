@@ -15,9 +15,9 @@ from sentences import refused
 from worlds import random_town
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.signs import class_signs
+from semsig_gis.core.symbology import class_signs
 from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.reports.parts import SceneObject
+from semsig_gis.reports.report_model import SceneObject
 from semsig_gis.reports.scenes import (
     _round_length,
     cell_scene,

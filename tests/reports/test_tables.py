@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.terminal import percent
-from semsig_gis.reports.parts import Number
+from semsig_gis.core.text import percent
+from semsig_gis.reports.report_model import Number
 from semsig_gis.reports.tables import (
     WIDEST,
     Table,

@@ -18,11 +18,11 @@ from sentences import refused
 from workbench import bomb
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.view import View
-from semsig_gis.database.views import views_at
-from semsig_gis.queries.detections.camera import Camera
-from semsig_gis.serve.ground import city_ground
+from semsig_gis.database.sightings import views_at
+from semsig_gis.observation.detectors.camera import Camera
+from semsig_gis.observation.view import View
 from semsig_gis.serve.question import Question
+from semsig_gis.serve.streets import city_ground
 from semsig_gis.serve.workbench import Workbench
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from semsig_gis.core.errors import CatalogError, InputError, SourceError
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.area import Area, parse_area
 from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.conditions import ANY_VALUE
+from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm import file as osm_file

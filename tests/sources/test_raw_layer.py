@@ -18,7 +18,7 @@ from semsig_gis.core.errors import CatalogError
 from semsig_gis.core.geometry import crs_label
 from semsig_gis.sources import reader
 from semsig_gis.sources.layers import ClassBy, LayerSpec, WidthBy
-from semsig_gis.sources.raw_layer import (
+from semsig_gis.sources.rows import (
     RowRules,
     Rows,
     off_the_globe,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from semsig_gis.sources.raw_layer import Sifted
+    from semsig_gis.sources.rows import Sifted
 
 
 DATA = Path(__file__).with_name("data")

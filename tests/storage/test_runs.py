@@ -8,7 +8,7 @@ import pytest
 from sentences import refused
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.scratch import MACHINE
+from semsig_gis.core.temporary import MACHINE
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
 
 if TYPE_CHECKING:

@@ -25,6 +25,7 @@ import urllib3.exceptions
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.sources.compression import bomb, swells
 from semsig_gis.sources.http.cache import Edition, Fetched
 from semsig_gis.sources.http.deadline import (
     Deadline,
@@ -33,7 +34,6 @@ from semsig_gis.sources.http.deadline import (
     SlowError,
 )
 from semsig_gis.sources.http.errors import error_text
-from semsig_gis.sources.packed import bomb, swells
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import shapely
 
 from semsig_gis.core.errors import CatalogError
-from semsig_gis.sources.conditions import ANY_VALUE
-from semsig_gis.sources.raw_layer import (
+from semsig_gis.sources.filters import ANY_VALUE
+from semsig_gis.sources.rows import (
     WGS84,
     BadFeatureError,
     RowRules,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import ElementKind, LayerSpec, Role
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
 
 RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its end
 

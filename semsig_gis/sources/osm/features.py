@@ -22,10 +22,10 @@ import shapely
 from semsig_gis.core.errors import CrsError, InputError
 from semsig_gis.sources import parquet
 from semsig_gis.sources.catalog import data_folder, load_catalog
-from semsig_gis.sources.conditions import as_text
+from semsig_gis.sources.filters import as_text
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, feature_shape
 from semsig_gis.sources.parquet import column_names, read_parquet
-from semsig_gis.sources.raw_layer import WGS84, BadFeatureError, built_geometries, parse_crs
+from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs
 from semsig_gis.sources.vector import layer_fields, read_tables
 from semsig_gis.sources.vector.member import DRIVERS
 from semsig_gis.storage.toml import parse_toml
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import ElementKind, LayerSpec
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
 
 SUFFIXES = frozenset({*DRIVERS, *parquet.SUFFIXES, ".zip"} - {".csv"})
 # Columns of all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.

@@ -18,13 +18,13 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.scratch import own_folder
+from semsig_gis.core.temporary import own_folder
 from semsig_gis.sources import require_file
 from semsig_gis.sources.area import Area, join_areas
+from semsig_gis.sources.compression import require_modest
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
-from semsig_gis.sources.packed import require_modest
-from semsig_gis.sources.raw_layer import BadFeatureError
+from semsig_gis.sources.rows import BadFeatureError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.layers import ElementKind, LayerSpec
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
 
 # What a file is by its name, and what pyosmium calls it.
 FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}

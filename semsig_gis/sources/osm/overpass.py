@@ -15,7 +15,7 @@ import shapely
 
 from semsig_gis.core.errors import InputError, SourceError
 from semsig_gis.sources.area import Area, join_areas, tiles_of
-from semsig_gis.sources.conditions import ANY_VALUE
+from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
     HttpError,
@@ -32,7 +32,7 @@ from semsig_gis.sources.osm.elements import (
     require_tags,
     way_shape,
 )
-from semsig_gis.sources.raw_layer import BadFeatureError
+from semsig_gis.sources.rows import BadFeatureError
 from semsig_gis.storage.text import parse_json
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layers import LayerSpec
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
 
 JSON = ("application/json",)
 QUERY_S = 90  # a server gives up a query after so many seconds

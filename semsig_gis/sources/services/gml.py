@@ -12,7 +12,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError
-from semsig_gis.sources.raw_layer import WGS84, BadFeatureError
+from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

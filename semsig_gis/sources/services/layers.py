@@ -18,8 +18,8 @@ from shapely.errors import ShapelyError
 from semsig_gis.core.errors import SourceError
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.csv_layer import KNOWN_NAMES, SHAPE_NAMES
-from semsig_gis.sources.decimals import decimal
-from semsig_gis.sources.raw_layer import (
+from semsig_gis.sources.numbers import decimal
+from semsig_gis.sources.rows import (
     WGS84,
     BadFeatureError,
     RowRules,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Fetched
     from semsig_gis.sources.layers import LayerSpec
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
     from semsig_gis.sources.services.table import Record, Table
 
 

@@ -21,7 +21,7 @@ from semsig_gis.sources.http.fetch import (
     fetch,
     host_of,
 )
-from semsig_gis.sources.raw_layer import RowRules, require_field
+from semsig_gis.sources.rows import RowRules, require_field
 from semsig_gis.sources.services.gml import parse_xml
 from semsig_gis.sources.services.layers import settle_fields
 from semsig_gis.storage.text import parse_json

@@ -16,7 +16,7 @@ from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.http.errors import error_text
-from semsig_gis.sources.raw_layer import WGS84
+from semsig_gis.sources.rows import WGS84
 from semsig_gis.sources.services.gml import (
     ID,
     features,

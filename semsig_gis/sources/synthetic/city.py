@@ -15,9 +15,9 @@ import numpy as np
 import pandas as pd
 import shapely
 
+from semsig_gis.core.checks import MOST_SEED, require_number
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import CLASS_NAME, SOURCE_ID
-from semsig_gis.core.ranges import MOST_SEED, require_number
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.layers import LayerSpec

@@ -17,7 +17,7 @@ import numpy as np
 from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import crs_label
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
-from semsig_gis.sources.raw_layer import (
+from semsig_gis.sources.rows import (
     WGS84,
     RowRules,
     fits_the_globe,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.csv_layer import CsvTable
     from semsig_gis.sources.layers import LayerSpec
-    from semsig_gis.sources.raw_layer import Rows
+    from semsig_gis.sources.rows import Rows
     from semsig_gis.sources.vector.by_pyogrio import Layer
 
 WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)

@@ -14,13 +14,13 @@ import numpy as np
 import shapely
 import shapely.geometry
 
-from semsig_gis.sources.raw_layer import BadFeatureError, Rows
+from semsig_gis.sources.rows import BadFeatureError, Rows
 from semsig_gis.sources.vector.member import GEOJSON, NOT_UTF8, OUT_OF_REACH, unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
 
 # A reader that fails so often without a good row between does not move on.

@@ -18,7 +18,7 @@ from pyogrio.raw import open_arrow, read
 
 from semsig_gis.core.errors import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.raw_layer import Rows
+from semsig_gis.sources.rows import Rows
 from semsig_gis.sources.vector.member import (
     CONTAINER,
     GEOJSON,
@@ -32,7 +32,7 @@ from semsig_gis.sources.vector.member import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from semsig_gis.sources.raw_layer import Position
+    from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
 
 KINDS = dict(enumerate(("Point", "LineString", "Polygon", "MultiPoint", "MultiLineString",

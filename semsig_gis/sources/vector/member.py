@@ -13,7 +13,7 @@ from typing import IO
 
 from semsig_gis.core.errors import SourceError
 from semsig_gis.sources import require_file
-from semsig_gis.sources.packed import bomb, swells
+from semsig_gis.sources.compression import bomb, swells
 
 CSV = "CSV"
 GEOJSON = "GeoJSON"

@@ -1,0 +1,117 @@
+"""Inputs of tiles: files that every worker can read, a square at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.errors import SourceError
+from semsig_gis.core.geometry import HALF_WIDTH
+from semsig_gis.core.temporary import own_folder
+from semsig_gis.database.file import INPUTS, digest
+from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
+from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.storage.geoparquet import CHECKING_PAGES, NOWHERE
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    import geopandas as gpd
+
+    Input = Literal["objects", "buildings", "streets"]
+
+
+@contextlib.contextmanager
+def in_files(
+    objects: str | Path, out: str | Path, **tables: str | Path | gpd.GeoDataFrame | None
+) -> Iterator[dict[str, Path]]:
+    """Give the files of buildings and streets; tables are written to some beside the result.
+
+    There workers elsewhere find them.
+    """
+    files = {name: Path(path) for name, path in tables.items() if isinstance(path, str | Path)}
+    in_memory: dict[Any, gpd.GeoDataFrame] = {
+        name: table for name, table in tables.items() if table is not None and name not in files
+    }
+    if not in_memory:
+        yield files
+        return
+    crs = open_objects(objects, box=NOWHERE).crs
+    with folder_beside(out) as folder:
+        for name, table in in_memory.items():
+            files[name] = folder / f"{name}.parquet"
+            save_surroundings(read_surroundings(table, role=name, crs=crs), files[name])
+        yield files
+
+
+@contextlib.contextmanager
+def folder_beside(out: str | Path) -> Iterator[Path]:
+    """Give a folder beside a result, for what its workers read; it is removed after the block."""
+    parent = Path(os.path.realpath(out)).parent
+    parent.mkdir(parents=True, exist_ok=True)
+    with own_folder(parent) as folder:
+        yield folder
+
+
+def fingerprint(path: Path) -> str:
+    """Return the digest of a file, with its companions, or of a folder."""
+    if path.is_dir():
+        files = sorted(one for one in path.rglob("*") if one.is_file())
+    elif path.suffix.lower() == ".shp":
+        files = sorted(path.parent.glob(f"{path.stem}.*"))
+    else:
+        files = [path]
+    try:
+        return digest(*files)
+    except OSError as error:
+        msg = f"{path} does not exist or cannot be read; give another file."
+        raise SourceError(msg) from error
+
+
+def copy_by_box(
+    name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
+) -> Path:
+    """Return a copy of an input that can be read by box in a CRS."""
+    copy = folder / INPUTS / f"{name}.parquet"
+    if copy.exists():
+        return copy
+    if _covered(path, crs):
+        with whole_file(copy) as whole, path.open("rb") as own, whole.open("wb") as copied:
+            shutil.copyfileobj(own, copied)
+    elif name == "objects":  # those of before have no bounds
+        save_objects(open_objects(path), copy)
+    else:
+        save_surroundings(read_surroundings(path, role=name, crs=crs, tell=tell), copy)
+    return copy
+
+
+def _covered(path: Path, crs: CRS) -> bool:
+    """Tell whether a file is GeoParquet in this CRS with a column of bounds."""
+    try:
+        schema = pq.read_schema(path)
+        geo = json.loads(schema.metadata[b"geo"])
+        column = geo["columns"][geo["primary_column"]]
+        bounds = column["covering"]["bbox"]["xmin"][0]
+        return bounds in schema.names and CRS.from_user_input(column["crs"]) == crs
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, CRSError):
+        return False
+
+
+def widest_street(streets: Path) -> float:
+    """Return the largest half-width of any street in metres, 0 where the file tells none."""
+    if HALF_WIDTH not in pq.read_schema(streets).names:
+        return 0.0
+    widths = pq.read_table(streets, columns=[HALF_WIDTH], **CHECKING_PAGES)[HALF_WIDTH].to_numpy()
+    finite = widths[np.isfinite(widths.astype(np.float64))]
+    return float(finite.max(initial=0.0))

@@ -1,0 +1,1 @@
+"""Experiments: many queries, methods and distortions, run in parts."""

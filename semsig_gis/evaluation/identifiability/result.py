@@ -1,0 +1,349 @@
+"""What is known of every cell before any query: how well one from it will be placed.
+
+`evaluation.identify.identify` finds it out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+import semsig_gis
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
+from semsig_gis.core.text import percent
+from semsig_gis.database.city import City
+from semsig_gis.localization.likelihood.index import index_fingerprint
+from semsig_gis.localization.noise.model import noise_from_dict
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.display import Axes, MapFrame
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.localization.noise.model import Noise
+
+
+NAME = "identifiability"
+FORMAT = 2  # raised whenever the same cells and noise give other numbers, or are written otherwise
+
+BANDS = (0.0, 0.1, 0.5, 0.9)  # lower ends of the chances to be found by which cells are counted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassGain:
+    """What the mean cell gains if a city publishes a class of objects.
+
+    `near` is the gain in chance of the place within the radius, `bits` that in knowledge.
+    """
+
+    code: int
+    near: float
+    bits: float
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Identifiability(Displayed):
+    """How well a query from each of the n cells of a database will be placed.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    noise : NoiseSpec or NoiseMixture
+        How the detector fails.
+    radius : float
+        Metres that count as near.
+    view : float
+        Degrees that a query sees at once: 360, or those of a photo in any direction.
+    itself, near : ndarray of float64, shape (n,)
+        Expected chances that the answer to a query from the cell gives to the cell itself, and to
+        the cells within the radius.
+    found : ndarray of float64, shape (n,)
+        Chance that the best place of the answer is within the radius.
+    bits : ndarray of float64, shape (n,)
+        Expected entropy of the chances of all cells: what is left to be known.
+    lookalikes : ndarray of int64, shape (n, k)
+        Row numbers of the cells in whose surroundings, farther away than the radius, the answer
+        puts most of the rest; -1 where there are no more.
+    lookalike_chances : ndarray of float64, shape (n, k)
+        Expected chance that it gives to the surroundings of each.
+    gains : ndarray of float64, shape (n, c)
+        What `near` gains by each class that occurs, in the order of `classes`.
+    classes : tuple of ClassGain
+        The same for the city as a whole.
+    trials, seed : int
+        Number of simulated queries, and the seed of all chances.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, identify, named_noise
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> cells = identify(index, trials=20, class_trials=5)
+    >>> cells.lookalikes.shape == (len(demo_database), 3), bool((cells.itself <= cells.near).all())
+    (True, True)
+    """
+
+    database: SignatureDatabase
+    noise: Noise
+    radius: float
+    view: float
+    itself: NDArray[np.float64]
+    near: NDArray[np.float64]
+    found: NDArray[np.float64]
+    bits: NDArray[np.float64]
+    lookalikes: NDArray[np.int64]
+    lookalike_chances: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    classes: tuple[ClassGain, ...]
+    trials: int
+    seed: int
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self.database),
+            "noise": self.noise.name,
+            f"found within {self.radius:g} m": f"{percent(self.found.mean())} for the mean cell",
+            "bits left": f"{self.bits.mean():.1f} of {np.log2(len(self.database)):.1f}",
+            "view": f"{self.view:g}°",
+            "trials": self.trials,
+            "seed": self.seed,
+        }
+
+    def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+        """Draw the chance of every cell to be found (see `plot_identifiability`)."""
+        return semsig_gis.plot_identifiability(self, ax=ax, legend=legend)
+
+    def explore(self) -> MapFrame:
+        """Show the chances and what is taken for what on a map (see `identifiability_map`)."""
+        return semsig_gis.show_map(semsig_gis.identifiability_map(self))
+
+    def require_cells_of(self, database: SignatureDatabase) -> None:
+        """Raise InputError where another database has other cells."""
+        if not np.array_equal(self.database.cell_ids, database.cell_ids):
+            msg = "the identifiability belongs to other cells; give that of this database."
+            raise InputError(msg)
+
+    def table(self, rows: slice = slice(None)) -> pa.Table:
+        """Return what is known of some of the cells, all by default, as columns.
+
+        They are ``chance_itself``, ``chance_near``, ``chance_found``, ``bits_left``,
+        ``lookalike_1`` (cell id or null), ``lookalike_1_chance``, ..., and ``gain_NAME`` by class.
+        """
+        names = {item.code: item.name for item in self.database.taxonomy.classes}
+        columns = {
+            "chance_itself": pa.array(self.itself[rows]),
+            "chance_near": pa.array(self.near[rows]),
+            "chance_found": pa.array(self.found[rows]),
+            "bits_left": pa.array(self.bits[rows]),
+        }
+        ids = self.database.cell_ids
+        for place in range(self.lookalikes.shape[1]):
+            cells = self.lookalikes[rows, place]
+            name = f"lookalike_{place + 1}"
+            columns[name] = pa.array(ids[cells], mask=cells < 0)
+            columns[f"{name}_chance"] = pa.array(self.lookalike_chances[rows, place])
+        for number, item in enumerate(self.classes):
+            columns[f"gain_{names[item.code]}"] = pa.array(self.gains[rows, number])
+        return pa.table(columns)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What is needed beside `table` to read it again, as values for JSON."""
+        return {
+            "format": FORMAT,
+            "belongs_to": index_fingerprint(self.database, self.noise),
+            "noise": self.noise.to_dict(),
+            "radius": self.radius,
+            "view": self.view,
+            "trials": self.trials,
+            "seed": self.seed,
+            "classes": [asdict(gain) for gain in self.classes],
+        }
+
+    def summary(self, *, object_counts: Mapping[int, int] | None = None) -> dict[str, Any]:
+        """Return what there is to say of the city as plain values for JSON.
+
+        Chances and bits are those of the mean cell; ``bands`` count cells by the chance to be
+        found; ``classes``, the most useful first, have ``objects`` and ``chance_near_per_1000``
+        only if `object_counts` tells how many objects of each class code there are.
+        """
+        kinds = {item.code: item for item in self.database.taxonomy.classes}
+        cells = len(self.database)
+        counts = np.bincount(np.digitize(self.found, BANDS) - 1, minlength=len(BANDS)).tolist()
+        classes = []
+        for gain in sorted(self.classes, key=lambda one: -one.near):
+            kind = kinds[gain.code]
+            objects = None if object_counts is None else int(object_counts.get(gain.code, 0))
+            classes.append(
+                {
+                    **{key: getattr(kind, key) for key in ("code", "symbol", "name", "title")},
+                    "chance_near": gain.near,
+                    "bits": gain.bits,
+                    "objects": objects,
+                    "chance_near_per_1000": 1000.0 * gain.near / objects if objects else None,
+                }
+            )
+        return {
+            "cells": cells,
+            "noise": self.noise.name,
+            "radius_m": self.radius,
+            "view_degrees": self.view,
+            "trials": self.trials,
+            "seed": self.seed,
+            "chance_itself": float(self.itself.mean()),
+            "chance_near": float(self.near.mean()),
+            "chance_found": float(self.found.mean()),
+            "bits_left": float(self.bits.mean()),
+            "cell_bits": float(np.log2(cells)),
+            "bands": [
+                {"from": low, "to": high, "cells": count, "share": count / cells}
+                for low, high, count in zip(BANDS, (*BANDS[1:], 1.0), counts, strict=True)
+            ],
+            "classes": classes,
+        }
+
+
+def save_identifiability(identifiability: Identifiability, path: str | Path) -> None:
+    """Put what is known of the cells into the files of their database.
+
+    Parameters
+    ----------
+    identifiability : Identifiability
+        What to save.
+    path : str or Path
+        File of the database, or folder of its parts; it is replaced whole.
+
+    Raises
+    ------
+    DatabaseError
+        If it is damaged, or is another database.
+    InputError
+        If it cannot be written; it is unchanged then.
+
+    Notes
+    -----
+    The columns are those of `Identifiability.table`. Whoever builds or updates the database gets
+    one without them.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import build_index, identify, named_noise, save_database
+    >>> index = build_index(demo_database, named_noise("medium"))
+    >>> columns = identify(index, trials=5, class_trials=2)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_database(demo_database, f"{folder}/city.parquet")
+    ...     save_identifiability(columns, f"{folder}/city.parquet")
+    ...     open_identifiability(demo_database, f"{folder}/city.parquet").radius
+    50.0
+    """
+    City(path).put_columns(
+        NAME,
+        identifiability.table(),
+        cell_ids=identifiability.database.cell_ids,
+        facts=identifiability.facts,
+    )
+
+
+def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
+    """Read what `save_identifiability` put into the files of a database.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The database, opened.
+    path : str or Path
+        Its file, or the folder of its parts.
+
+    Returns
+    -------
+    Identifiability or None
+        What is known of the cells; None where nothing was found out yet.
+
+    Raises
+    ------
+    DatabaseError
+        If the files are damaged, or what they tell belongs to other signatures.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import build_index, identify, named_noise, save_database
+    >>> index = build_index(demo_database, named_noise("light"))
+    >>> cells = identify(index, trials=20, class_trials=5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = f"{folder}/city.parquet"
+    ...     save_database(demo_database, path)
+    ...     save_identifiability(cells, path)
+    ...     same = open_identifiability(demo_database, path)
+    >>> bool((same.found == cells.found).all())
+    True
+    """
+    columns = City(path).columns(NAME)
+    return None if columns is None else identifiability_of(database, *columns, path)
+
+
+def identifiability_of(
+    database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
+) -> Identifiability:
+    """Return what `Identifiability.table` and `Identifiability.facts` told, read from `path`.
+
+    DatabaseError if they are damaged, or belong to other signatures or another format.
+    """
+    try:
+        noise = noise_from_dict(facts["noise"])
+        fits = facts["format"] == FORMAT and (
+            facts["belongs_to"] == index_fingerprint(database, noise)
+        )
+        identifiability = _parsed(database, noise, table, facts) if fits else None
+    except (KeyError, TypeError, ValueError, SemsigError) as error:
+        msg = f"the identifiability in {path} is damaged ({error}); run semsig identify again."
+        raise DatabaseError(msg) from error
+    if identifiability is None:
+        msg = (
+            f"the identifiability in {path} belongs to other signatures or to another version of "
+            "semsig; run semsig identify again."
+        )
+        raise DatabaseError(msg)
+    return identifiability
+
+
+def _parsed(
+    database: SignatureDatabase, noise: Noise, table: pa.Table, facts: dict[str, Any]
+) -> Identifiability:
+    classes = tuple(ClassGain(**item) for item in facts["classes"])
+    names = {item.code: item.name for item in database.taxonomy.classes}
+    ids = database.cell_ids
+    places = [name for name in table.column_names if name.endswith("_chance")]
+
+    def stacked(columns: list[str]) -> np.ndarray:
+        return np.stack([table[name].to_numpy() for name in columns], axis=1)
+
+    def rows(name: str) -> np.ndarray:
+        cells = table[name]
+        numbers = np.searchsorted(ids, cells.fill_null(ids[0]).to_numpy())
+        return np.where(cells.is_valid().to_numpy(), numbers, -1)
+
+    return Identifiability(
+        database=database,
+        noise=noise,
+        radius=float(facts["radius"]),
+        view=float(facts["view"]),
+        itself=table["chance_itself"].to_numpy(),
+        near=table["chance_near"].to_numpy(),
+        found=table["chance_found"].to_numpy(),
+        bits=table["bits_left"].to_numpy(),
+        lookalikes=np.stack([rows(name.removesuffix("_chance")) for name in places], axis=1),
+        lookalike_chances=stacked(places),
+        gains=stacked([f"gain_{names[item.code]}" for item in classes]),
+        classes=classes,
+        trials=int(facts["trials"]),
+        seed=int(facts["seed"]),
+    )

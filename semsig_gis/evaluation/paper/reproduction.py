@@ -1,0 +1,422 @@
+"""Run all experiments of the source paper on a city, and gather what they find.
+
+What is finished stays in the folder of the results, so that an interrupted run goes on there.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core.parallel import check_workers
+from semsig_gis.database.build import build_database
+from semsig_gis.database.city import City
+from semsig_gis.database.file import open_database, save_database
+from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.database.summary import database_summary
+from semsig_gis.evaluation.evaluate import versions
+from semsig_gis.evaluation.experiments.run import run_experiments
+from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.queries.distortion_text import parse_chain
+from semsig_gis.evaluation.queries.draw import QuerySpec, check_count
+from semsig_gis.evaluation.spec import ExperimentSpec
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.distance.scores import score_cells
+from semsig_gis.localization.locator import parse_method
+from semsig_gis.objects.load import build_objects
+from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.synthetic.city import (
+    PARIS_LIKE,
+    CitySpec,
+    synthetic_city,
+    synthetic_streets,
+)
+from semsig_gis.storage.runs import RunKind, read_json, write_json
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
+
+    Progress = Callable[[str], Callable[[int, int], None] | None]
+
+
+MEASURES = ("jaccard", "histogram", "edit")
+LEVELS = ("light", "medium", "strong")  # of distortion
+RANGES = (20.0, 30.0, 40.0)  # of sight, in metres
+SCALES = (8, 16, 24, 32)  # numbers of angle levels
+QUERIES = 10_000
+MANY = 100  # so many candidates count where the paper does not look at the first alone
+READ = 1_000  # queries of each reading of what the paper leaves open, unless fewer are asked
+FEWER = 500  # queries of the likelihood method, unless fewer are asked
+
+# Names of methods in the experiments: measures of one part, fusions of the edit distance of types
+# with a measure of angles, fusions of edit distances by the share of the types, and the same in two
+# stages by the percentage that the first one keeps.
+SINGLES: Mapping[str, str] = {
+    f"{part}-{measure}": f"{part}:{measure}" for measure in MEASURES for part in ("types", "angles")
+}
+FUSIONS: Mapping[str, str] = {f"fusion-{measure}": f"edit+{measure}" for measure in MEASURES}
+WEIGHTS: Mapping[float, str] = {
+    **{share: f"weights-{round(100 * share)}" for share in (0.1, 0.3, 0.5, 0.7, 0.9)},
+    0.5: "fusion-edit",
+}
+PERCENTS: Mapping[int, str] = {
+    **{percent: f"stages-{percent}" for percent in (1, 5, 10, 20, 50)},
+    100: "fusion-edit",
+}
+BEST = "stages-5"  # the one that the paper recommends
+FIRST_STAGE = "types-edit"  # its first stage alone
+OURS = "likelihood"
+
+# What the paper leaves open of the distortion.
+READINGS: Mapping[str, str] = {
+    "kept-uniform": "order kept, false objects of any class",
+    "kept-frequency": "order kept, false objects as frequent as true ones",
+    "sorted-uniform": "sorted again, false objects of any class",
+    "sorted-frequency": "sorted again, false objects as frequent as true ones",
+}
+
+
+def paper_experiments(
+    database: str,
+    *,
+    ranges: Mapping[float, str],
+    scales: Mapping[int, str],
+    queries: int = QUERIES,
+    seed: int = 0,
+) -> dict[str, ExperimentSpec]:
+    """Return all experiments of the paper by name: ``"none"``, ``"medium"``, ``"levels"``, ...
+
+    ``ranges`` and ``scales`` are files of databases of the same city, by their range in metres and
+    by their number of angle levels; each adds an experiment: ``"range-20"``, ``"levels-8"``, ...
+    """
+    stages = {name: f"edit+edit:{k}%" for k, name in PERCENTS.items() if name not in FUSIONS}
+    weights = {name: f"edit+edit:alpha={w}" for w, name in WEIGHTS.items() if name not in FUSIONS}
+    best = {BEST: stages[BEST]}
+    stage_one = {FIRST_STAGE: SINGLES[FIRST_STAGE], **best}
+
+    def spec(
+        distortions: Mapping[str, str],
+        methods: Mapping[str, str],
+        *,
+        file: str = database,
+        number: int = queries,
+        top: tuple[int, ...] = (1,),
+    ) -> ExperimentSpec:
+        return ExperimentSpec(
+            database=file,
+            queries=number,
+            seeds=(seed,),
+            top=top,
+            methods={name: parse_method(text) for name, text in methods.items()},
+            distortions={name: parse_chain(text) for name, text in distortions.items()},
+        )
+
+    kept = {level: f"{level}:resort=false" for level in LEVELS}
+    medium = {"medium": kept["medium"]}
+    both = (1, MANY)
+    orders = {"kept": "medium:resort=false", "sorted": "medium"}
+    readings = {
+        f"{order}-{classes}": text + (":false_class=frequency" if classes == "frequency" else "")
+        for order, text in orders.items()
+        for classes in ("uniform", "frequency")
+    }
+    return {
+        "none": spec({"none": ""}, {**SINGLES, **FUSIONS, **stages}, top=both),
+        "medium": spec(medium, {**SINGLES, **FUSIONS, **weights, **stages}, top=both),
+        "levels": spec({level: kept[level] for level in ("light", "strong")}, best),
+        "readings": spec(readings, {**best, "raw": "edit+edit:5%:raw"}, number=min(queries, READ)),
+        "ours": spec(kept, {OURS: "likelihood:generic:on_grid"}, number=min(queries, FEWER)),
+        **{f"range-{r:g}": spec(medium, stage_one, file=file) for r, file in ranges.items()},
+        **{f"levels-{q}": spec(medium, best, file=file) for q, file in scales.items()},
+    }
+
+
+Size = Literal["full", "small"]
+
+SMALL_QUERIES = 300
+CITIES = {"full": PARIS_LIKE, "small": CitySpec(size=2000.0)}
+SETTINGS = "settings.json"
+TIMES = "times.json"
+CITY = "city/city.parquet"
+VARIANTS = "variants"
+EXPERIMENTS = "experiments"
+NO_RANGES = (
+    "Other visibility ranges need the street objects of the database, which `semsig build` puts "
+    "beside it; they are not there."
+)
+
+
+def _read_settings(folder: Path) -> dict[str, Any]:
+    settings = read_json(folder / SETTINGS)
+    if settings.keys() != {"size", "database", "queries", "seed", "versions"}:
+        msg = f"{SETTINGS} was written by another program"
+        raise ValueError(msg)
+    return settings
+
+
+RUN = RunKind(
+    content="results of `semsig reproduce`",
+    another=(
+        "{folder} contains results of other settings, which differ in {difference}; choose "
+        "another folder, or delete that one."
+    ),
+    read=_read_settings,
+    write=lambda folder, settings: write_json(folder / SETTINGS, settings),
+    names={SETTINGS, "city", VARIANTS},
+    results=EXPERIMENTS,
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Reproduction(Displayed):
+    """What the experiments of the paper find on a city.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The city.
+    summary : mapping
+        Its properties (see `database.properties.database_summary`).
+    variants : mapping of float to mapping
+        The same of databases of other visibility ranges, by the range in metres.
+    experiments : mapping of str to mapping
+        By the names of `experiments.paper.reproduce.paper_experiments`, their evaluations by the
+        names of their cases.
+    seconds : mapping of str to float
+        Mean seconds of one query by the texts of methods.
+    settings : mapping
+        What was run, as plain values: ``size``, ``database`` (a name), ``queries``, ``seed``.
+    missing : tuple of str
+        What could not be run, and why: whole sentences.
+
+    Examples
+    --------
+    >>> from semsig_gis import database_summary
+    >>> facts = database_summary(demo_database)
+    >>> rest = {"variants": {}, "experiments": {}, "seconds": {}, "settings": {"queries": 300}}
+    >>> Reproduction(database=demo_database, summary=facts, **rest).missing
+    ()
+    """
+
+    database: SignatureDatabase
+    summary: Mapping[str, Any]
+    variants: Mapping[float, Mapping[str, Any]]
+    experiments: Mapping[str, Mapping[str, Evaluation]]
+    seconds: Mapping[str, float]
+    settings: Mapping[str, Any]
+    missing: tuple[str, ...] = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "cells": len(self.database),
+            "queries": self.settings["queries"],
+            "experiments": ", ".join(self.experiments) or "none",
+            "missing": len(self.missing),
+        }
+
+
+def reproduce(
+    out: str | Path,
+    *,
+    database: str | Path | None = None,
+    size: Size = "full",
+    queries: int | None = None,
+    seed: int = 0,
+    workers: int = 0,
+    note: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
+) -> Reproduction:
+    """Run all experiments of the paper, or what is left of them.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder for the results; made if it is not there.
+    database : str or Path, optional
+        File of a signature database; a city like the paper's Paris is made up by default. Without
+        street objects beside it, there are no other visibility ranges.
+    size : {"full", "small"}, default "full"
+        As many queries as the paper asks, and a city of its size; or few of a small one.
+    queries : int, optional
+        How many queries; by default 10,000 or, if small, 300, but not more than there are cells.
+    seed : int, default 0
+        Seed of all chances.
+    workers : int, default 0
+        How many processes answer; 0 answers here.
+    note : callable, optional
+        Called with a sentence about what is being done.
+    progress : callable, optional
+        Called with a label, it gives what is to be called with how much is done and in all.
+
+    Returns
+    -------
+    Reproduction
+        What was found.
+
+    Raises
+    ------
+    InputError
+        If a setting cannot be used, or the folder holds results of other settings.
+    DatabaseError
+        If the database cannot be read.
+
+    Examples
+    --------
+    >>> reproduce("results", size="tiny")
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.InputError: the size is 'tiny'; give full or small.
+    """
+    if size not in get_args(Size):
+        msg = f"the size is {size!r}; give full or small."
+        raise InputError(msg)
+    if database is not None and not Path(database).is_file():
+        msg = f"{database} is not a file; give a signature database in one file."
+        raise DatabaseError(msg)
+    folder, show = Path(out), progress or (lambda _: None)
+    city = City(folder / CITY if database is None else database)
+    settings = {
+        "size": size,
+        "database": None if database is None else city.digest,
+        "queries": queries,
+        "seed": seed,
+        "versions": versions(),
+    }
+    QuerySpec(seeds=(seed,))  # looks at the seed
+    check_workers(workers, None)
+    if database is not None:
+        _check_queries(queries, city)
+    RUN.begin(folder, settings)
+    if database is None:
+        if not city.path.is_file():
+            _make_city(CITIES[size], city.path, note, show)
+        _check_queries(queries, city)
+    count = queries or min(QUERIES if size == "full" else SMALL_QUERIES, len(city.database))
+    ranges, scales = _variants(city, folder / VARIANTS, show)
+    specs = paper_experiments(
+        os.path.relpath(city.path, folder / VARIANTS),
+        ranges={radius: path.name for radius, path in ranges.items()},
+        scales={levels: path.name for levels, path in scales.items()},
+        queries=count,
+        seed=seed,
+    )
+    results = run_experiments(
+        {folder / EXPERIMENTS / name: spec for name, spec in specs.items()},
+        folder=folder / VARIANTS,
+        workers=workers,
+        progress=show("answering queries"),
+    )
+    if not (folder / TIMES).is_file():
+        methods = {text: Method.parse(text) for text in paris.QUERY_MS}
+        times = time_queries(city.database, methods, progress=show("measuring times"))
+        write_json(folder / TIMES, times)
+    counts = city.store.objects.class_counts if city.has_store else None
+    return Reproduction(
+        database=city.database,
+        summary=database_summary(city.database, file_bytes=city.bytes, object_counts=counts),
+        variants={r: database_summary(open_database(path)) for r, path in ranges.items()},
+        experiments={place.name: evaluations for place, evaluations in results.items()},
+        seconds=read_json(folder / TIMES),
+        settings={
+            "size": size,
+            "database": "a made-up city" if database is None else city.path.name,
+            "queries": count,
+            "seed": seed,
+        },
+        missing=() if ranges else (NO_RANGES,),
+    )
+
+
+def _check_queries(queries: int | None, city: City) -> None:
+    if queries is not None:
+        check_count("queries", queries, len(city.database))
+
+
+def _make_city(
+    spec: CitySpec, file: Path, note: Callable[[str], None] | None, show: Progress
+) -> None:
+    layers = synthetic_city(spec)
+    objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
+    streets = synthetic_streets(spec)
+    if note is not None:
+        note(f"made up a city of {len(objects):,} street objects")
+    database = build_database(
+        objects,
+        viewpoints=ViewpointSpec(mode="streets"),
+        streets=streets.table,
+        progress=show("building the database"),
+    )
+    save_with_store(database, ObjectStore.of(objects, streets=streets.table), file)
+
+
+def _variants(
+    city: City, folder: Path, show: Progress
+) -> tuple[dict[float, Path], dict[int, Path]]:
+    """Return databases of other ranges (with street objects) and levels, built where missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    database = city.database
+    ranges = {one: folder / f"range-{one:g}.parquet" for one in RANGES if city.has_store}
+    scales = {one: folder / f"levels-{one}.parquet" for one in SCALES}
+    ranges.pop(database.spec.radius, None)
+    scales.pop(database.spec.levels, None)
+    for radius, path in ranges.items():
+        if not path.is_file():
+            variant = build_database(
+                city.store.objects,
+                grid=database.grid,
+                spec=replace(database.spec, radius=radius),
+                viewpoints=database.viewpoints,
+                footprints=city.store.footprints,
+                streets=city.store.streets,
+                progress=show(f"building for a visibility range of {radius:g} m"),
+            )
+            save_database(variant, path)
+    for levels, path in scales.items():
+        if not path.is_file():
+            save_database(replace(database, spec=replace(database.spec, levels=levels)), path)
+    return ranges, scales
+
+
+def time_queries(
+    database: SignatureDatabase,
+    methods: Mapping[str, Method],
+    *,
+    length: int = 14,
+    repetitions: int = 100,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, float]:
+    """Return the mean seconds that each method takes to compare one query with all cells.
+
+    As in the paper's table: queries of mean length (cells with `length` objects, or the nearest),
+    one at a time, on one thread; what is worked out once for a database does not count.
+    """
+    if repetitions < 1:
+        msg = f"{repetitions} repetitions were asked for; give a whole number from 1."
+        raise InputError(msg)
+    away = np.abs(database.lengths - length)
+    cells = np.random.default_rng(0).choice(np.flatnonzero(away == away.min()), repetitions)
+    queries = [database.signature(int(cell)) for cell in cells]
+    times = {}
+    for done, (name, method) in enumerate(methods.items(), start=1):
+        for _ in range(2):  # the second time, kernels for many queries are loaded
+            next(iter(score_cells(database, queries[:1], method)))
+        seconds = []
+        for query in queries:
+            start = time.perf_counter()
+            next(iter(score_cells(database, [query], method)))
+            seconds.append(time.perf_counter() - start)
+        times[name] = float(np.mean(seconds))
+        if progress is not None:
+            progress(done, len(methods))
+    return times

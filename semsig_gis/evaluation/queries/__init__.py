@@ -1,0 +1,1 @@
+"""Simulated queries: true views and their distortions."""

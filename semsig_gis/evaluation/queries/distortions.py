@@ -1,0 +1,601 @@
+"""What happens to a query: the paper's errors, weak eyes, a narrow view, things in the way.
+
+Or what more than types and bearings a detector tells: rough distances, scores of several classes.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar, get_args
+
+import numpy as np
+
+from semsig_gis.core.checks import require_number
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core.geometry import FULL_TURN, angular_distance, wrap_degrees
+from semsig_gis.core.signature import Signature, distance_units_of
+from semsig_gis.core.taxonomy import MAX_RANGE_M
+from semsig_gis.database.sightings import bearings
+from semsig_gis.evaluation.queries.true_view import NEAREST_M
+from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.observation.view import CLASSES, Photo
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.evaluation.queries.true_view import CitySights, Sight, Spoiling
+    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization.noise.table import NoiseTable
+
+
+MOST_WIDTH_M = 1000
+MOST_FALSE = 1000  # objects
+MOST_PERCENT = 300
+LEAST_RIGHT, MOST_RIGHT = 0.51, 0.999
+
+
+class _AnyCity(ABC):
+    """A distortion that does the same whatever there is to see in a city."""
+
+    __slots__ = ()
+
+    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - other distortions need it
+        """Return what it does to a query."""
+        return self._spoil
+
+    @abstractmethod
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompassBias(_AnyCity):
+    """A compass that is off by the same angle for all objects of a query.
+
+    The angle is normal, with a standard deviation of `sigma` degrees, 0 to 360.
+    """
+
+    stream: ClassVar[int] = 3_628_719_812
+
+    sigma: float = 10.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("deviation of the compass", self.sigma, least=0, most=FULL_TURN)
+
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        return sight.turned(float(rng.normal(0.0, abs(self.sigma))))  # -0.0 is 0, too
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissingClasses:
+    """A detector that does not know some classes of the city.
+
+    With `others`, the named classes are the ones it knows, and all others are missing.
+    """
+
+    stream: ClassVar[int] = 2_848_656_676
+
+    classes: tuple[str, ...] = ()
+    others: bool = False
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query.
+
+        Raises UnknownNameError if the taxonomy of the city has no class of a name.
+        """
+        named = [city.taxonomy.by_name(name).code for name in self.classes]
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG001
+            return sight.only(np.isin(sight.codes, named, invert=not self.others))
+
+        return spoil
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldOfView(_AnyCity):
+    """A camera that looks in one direction, drawn at random, and sees part of the turn.
+
+    It sees `degrees`, above 0 and at most 360. Bearings are still counted from north. Which part of
+    the turn was looked at is `told`, or not: then what is out of view counts as missed.
+    """
+
+    stream: ClassVar[int] = 20_362_731
+
+    degrees: float = 90.0
+    told: bool = True
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not 0 < self.degrees <= FULL_TURN:
+            msg = (
+                f"a view of {self.degrees!r} degrees was given; give degrees above 0, at most 360."
+            )
+            raise InputError(msg)
+
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        middle = rng.uniform(0.0, FULL_TURN)
+        seen = sight.only(angular_distance(sight.bearings, middle) <= self.degrees / 2.0)
+        if not self.told:
+            return seen
+        return replace(seen, photo=_common(sight.photo, middle, self.degrees))
+
+
+def _common(photo: Photo, heading: float, fov: float) -> Photo:
+    """Return the part of a photo that a narrower one shows, too; that one where there is none."""
+    other = Photo.looking(heading=heading, fov=fov)
+    if not (photo.sectors and other.sectors):
+        return Photo(sectors=photo.sectors or other.sectors)
+    both = [
+        (max(low, start + turn), min(high, end + turn))
+        for low, high in photo.sectors
+        for start, end in other.sectors
+        for turn in (-FULL_TURN, 0.0, FULL_TURN)
+    ]
+    return Photo(sectors=tuple(one for one in both if one[0] < one[1]) or other.sectors)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HiddenBehind(_AnyCity):
+    """Objects that nearer objects hide.
+
+    An object is hidden when a nearer one covers its bearing: one of `width` w metres (0 to 1,000)
+    at distance d covers ``atan(w / 2 d)`` to either side.
+    """
+
+    stream: ClassVar[int] = 3_881_164_136
+
+    width: float = 0.5
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("width of the objects", self.width, least=0, most=MOST_WIDTH_M)
+
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG002
+        return sight.only(~_behind(sight, sight.bearings, sight.distances, self.width))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Obstacles:
+    """Things at the kerb, on no map, that hide what is behind them.
+
+    Their number around a place is a Poisson one with mean `count`; each is `width` metres wide and
+    stands anywhere within the range of the city. Both are from 0 to 1,000.
+    """
+
+    stream: ClassVar[int] = 626_356_719
+
+    count: float = 2.0
+    width: float = 4.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("number of obstacles", self.count, least=0, most=MOST_FALSE)
+        require_number("width of the obstacles", self.width, least=0, most=MOST_WIDTH_M)
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query."""
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            count = int(rng.poisson(self.count))
+            bearings = rng.uniform(0.0, FULL_TURN, count)
+            distances = city.false_distances(count, rng)
+            return sight.only(~_behind(sight, bearings, distances, self.width))
+
+        return spoil
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockedSectors(_AnyCity):
+    """Sectors of the view in which nothing is seen, near or far.
+
+    There are `count` of them (0 or more), each of `degrees` (0 to 360) anywhere in the turn; they
+    may overlap.
+    """
+
+    stream: ClassVar[int] = 4_207_042_345
+
+    count: int = 1
+    degrees: float = 30.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if self.count < 0 or not 0 <= self.degrees <= FULL_TURN:
+            msg = (
+                f"{self.count} sectors of {self.degrees!r} degrees were given; give a whole number "
+                "from 0 up and degrees from 0 to 360."
+            )
+            raise InputError(msg)
+
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        middles = rng.uniform(0.0, FULL_TURN, self.count)
+        aside = angular_distance(sight.bearings[:, None], middles)
+        return sight.only((aside > self.degrees / 2.0).all(axis=1))
+
+
+def _behind(
+    sight: Sight, bearings: NDArray[np.float64], distances: NDArray[np.float64], width: float
+) -> NDArray[np.bool_]:
+    """Tell which objects are behind one of some things, all of one width."""
+    half = np.degrees(np.arctan2(width / 2.0, np.maximum(distances, NEAREST_M)))
+    farther = sight.distances[:, None] > distances
+    return np.asarray(
+        (farther & (angular_distance(sight.bearings[:, None], bearings) < half)).any(axis=1)
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detector:
+    """A detector that fails as a noise model says.
+
+    An object at distance d metres is detected with chance ``p * 2 ** -((d / half) ** 2)``, where p
+    is that of the model: at `half` metres (above 0) only half of the objects are left. An uncertain
+    place of the model (``position_sigma``) is a step aside of the observer. Of a mixture, one model
+    is drawn for each query. As in `likelihood.noise.table`, no chance is quite 0 or 1.
+    """
+
+    stream: ClassVar[int] = 4_129_241_295
+
+    noise: Noise
+    half: float = math.inf
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not self.half >= NEAREST_M:
+            msg = (
+                f"the setting half is {self.half!r} m; give the metres at which a detector sees "
+                f"half of the objects, from {NEAREST_M}, or infinity if distance does not matter."
+            )
+            raise InputError(msg)
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query.
+
+        Raises InputError if the noise model names a class that the city does not have.
+        """
+        tables, weights = noise_tables(
+            self.noise,
+            taxonomy=city.taxonomy,
+            codes=city.codes,
+            longest=LONGEST_TABLE,
+            radius=city.reach,
+        )
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            table = tables[int(rng.choice(len(tables), p=weights))]
+            seen = self._detected(_from_aside(sight, table.position_sigma, rng), table, rng)
+            codes = np.repeat(table.codes, rng.poisson(table.clutter))
+            false = rng.uniform(0.0, FULL_TURN, len(codes))
+            distances = city.false_distances(len(codes), rng)
+            return seen.with_false(codes, false, distances).clockwise()
+
+        return spoil
+
+    def _detected(self, sight: Sight, table: NoiseTable, rng: np.random.Generator) -> Sight:
+        """Return the objects that are detected, under the names and bearings they are given."""
+        length = min(len(sight), len(table.missed) - 1)
+        chances = 1.0 - table.missed[length, table.row_of[sight.codes]]
+        kinds = table.row_of[sight.codes]
+        chances *= table.fading[kinds, distance_units_of(sight.distances, table.reach)]
+        chances *= np.exp2(-((sight.distances / self.half) ** 2))
+        seen = sight.only(rng.random(len(sight)) < chances)
+        kinds = table.row_of[seen.codes]
+        names = np.cumsum(table.named[length, kinds], axis=1)
+        labels = (rng.random(len(seen))[:, None] * names[:, -1:] >= names).sum(axis=1)
+        off = rng.normal(0.0, table.sigma[kinds])
+        return replace(
+            seen.renamed(table.codes[labels]), bearings=wrap_degrees(seen.bearings + off)
+        )
+
+
+def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
+    """Return what is seen a step aside."""
+    if not sigma:
+        return sight
+    turned = np.radians(sight.bearings)
+    dx, dy = rng.normal(0.0, sigma, 2)
+    x = sight.distances * np.sin(turned) - dx
+    y = sight.distances * np.cos(turned) - dy
+    return replace(sight, bearings=bearings(x, y), distances=np.hypot(x, y))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoughRanges(_AnyCity):
+    """A depth network, or a person's guess: how far away each object seems to be.
+
+    The logarithm of a distance is off by a normal error of `percent` hundredths (0.1 to 300), which
+    the query states. A false object is anywhere within the range of the city, all places alike.
+    """
+
+    stream: ClassVar[int] = 2_716_057_031
+
+    percent: float = 25.0
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("error of the ranges", self.percent, least=0.1, most=MOST_PERCENT, unit="%")
+
+    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+        error = self.percent / 100.0
+        off = np.exp(rng.normal(0.0, error, len(sight)))
+        if sight.false is not None:
+            off[sight.false] = 1.0
+        ranges = np.clip(sight.distances * off, NEAREST_M, MAX_RANGE_M)
+        return replace(sight, ranges=ranges, range_error=error)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassScores:
+    """A detector that gives each object scores of all classes of the city, instead of one name.
+
+    The scores can be trusted: the chance that an object gets certain scores is proportional to the
+    score of its class in them. That of its own class is `right` in the mean (0.51 to 0.999).
+    Methods that use only names take the one with the best score.
+    """
+
+    stream: ClassVar[int] = 1_530_938_417
+
+    right: float = 0.8
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("mean score", self.right, least=LEAST_RIGHT, most=MOST_RIGHT)
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query."""
+        count = len(city.codes)
+        # Scores that come from a symmetric Dirichlet distribution, and a class that comes from the
+        # scores, are the same as a class, and scores from this distribution with one more for it.
+        spread = (1.0 - self.right) / (self.right * count - 1.0) if count > 1 else 1.0
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            own = np.searchsorted(city.codes, sight.codes)
+            parts = rng.standard_gamma(spread + np.eye(count)[own])
+            scores = np.zeros((len(sight), CLASSES))
+            scores[:, city.codes] = parts / parts.sum(axis=1, keepdims=True)
+            return replace(sight, codes=scores.argmax(axis=1).astype(np.uint8), scores=scores)
+
+        return spoil
+
+
+FalseClass = Literal["uniform", "frequency"]
+D = TypeVar("D")
+
+_OPERATIONS = 3
+_MISS, _FALSE_DETECTION = 0, 1  # and 2, a false classification
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distortion:
+    """What happens to a signature between the street and the query.
+
+    Parameters
+    ----------
+    occurrences : int, default 7
+        How many times an object is missed, invented or misnamed; 0 or more.
+    bearing_sigma : float, default 5.0
+        Standard deviation of the noise on each bearing, in degrees; 0 or more.
+    bearing_clip : float, default 30.0
+        Largest absolute value of that noise, in degrees; 0 or more.
+    resort : bool, default True
+        Whether the objects are put in clockwise order again after the noise, as a sweep would see
+        them (left open in the source, section 4.2, as the next).
+    false_class : {"uniform", "frequency"}, default "uniform"
+        Whether the class of a false object is drawn with equal chances or by how often each
+        class is seen in the database.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    UnknownNameError
+        If `false_class` is not one of the two.
+
+    Examples
+    --------
+    >>> Distortion(occurrences=2).bearing_clip
+    30.0
+    """
+
+    stream: ClassVar[int] = 795_306_091
+
+    occurrences: int = 7
+    bearing_sigma: float = 5.0
+    bearing_clip: float = 30.0
+    resort: bool = True
+    false_class: FalseClass = "uniform"
+
+    def __post_init__(self) -> None:  # noqa: D105
+        require_number("occurrences of distortion", self.occurrences, least=0, most=MOST_FALSE)
+        for label, value in (("sigma", self.bearing_sigma), ("clip", self.bearing_clip)):
+            require_number(f"bearing {label}", value, least=0, most=FULL_TURN, unit="degrees")
+        if self.false_class not in get_args(FalseClass):
+            hint = nearest_name(str(self.false_class), get_args(FalseClass))
+            msg = (
+                f"{self.false_class!r} is not a way to choose a false class{hint}; give "
+                f"{' or '.join(get_args(FalseClass))}."
+            )
+            raise UnknownNameError(msg)
+
+    def ready(self, city: CitySights) -> Spoiling:
+        """Return what it does to a query of a city, whose classes false objects have."""
+        chances = _class_chances(self, city.codes, city.frequencies)
+
+        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+            codes, bearings, rows = _spoiled(sight.signature, self, (city.codes, chances), rng)
+            real = rows >= 0
+            seen = sight.only(rows[real]).renamed(codes[real])
+            seen = replace(seen, bearings=bearings[real])
+            distances = city.false_distances(int((~real).sum()), rng)
+            seen = seen.with_false(codes[~real], bearings[~real], distances)
+            return seen.only(np.argsort(np.argsort(~real, kind="stable")))  # in their order again
+
+        return spoil
+
+
+DISTORTIONS: Mapping[str, Distortion] = MappingProxyType(
+    {
+        "none": Distortion(occurrences=0, bearing_sigma=0.0),
+        "light": Distortion(occurrences=1),
+        "medium": Distortion(occurrences=7),
+        "strong": Distortion(occurrences=13),
+    }
+)
+
+
+def named_distortion(name: str) -> Distortion:
+    """Return one of the paper's levels of distortion.
+
+    Parameters
+    ----------
+    name : {"none", "light", "medium", "strong"}
+        Its name.
+
+    Returns
+    -------
+    Distortion
+        0, 1, 7 or 13 occurrences; all but ``"none"`` with bearing noise.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such level.
+
+    Examples
+    --------
+    >>> named_distortion("strong").occurrences
+    13
+    """
+    return distortion_of(name, DISTORTIONS)
+
+
+def distortion_of(name: str, distortions: Mapping[str, D]) -> D:
+    """Return a distortion by name; raises UnknownNameError if there is none."""
+    if name not in distortions:
+        *most, last = distortions
+        hint = nearest_name(name, distortions)
+        msg = f"{name!r} is not a distortion{hint}; give {', '.join(most)} or {last}."
+        raise UnknownNameError(msg)
+    return distortions[name]
+
+
+def distort(
+    signature: Signature,
+    distortion: Distortion,
+    *,
+    classes: ArrayLike,
+    weights: ArrayLike | None = None,
+    rng: np.random.Generator,
+) -> Signature:
+    """Return a signature as a faulty detector would have given it.
+
+    Parameters
+    ----------
+    signature : Signature
+        Types and bearings, in clockwise order.
+    distortion : Distortion
+        What to do to it.
+    classes : array_like of int, shape (k,)
+        Distinct class codes that a false object may have; at least one.
+    weights : array_like of float, shape (k,), optional
+        How often each class is seen, not all zero; for the false class ``"frequency"`` only.
+    rng : numpy.random.Generator
+        Source of the chances.
+
+    Returns
+    -------
+    Signature
+        The distorted signature, possibly empty, with bearings in [0, 360).
+
+    Raises
+    ------
+    InputError
+        If the signature lacks its types or its bearings, or the classes or weights do not serve.
+
+    Notes
+    -----
+    Paper, section 4.2. A false object is placed where its bearing belongs before the noise. A
+    miss or a false classification that finds no object, and a false classification that finds
+    no other class, change nothing but count as an occurrence.
+
+    Examples
+    --------
+    >>> seen = Signature(codes=np.array([1, 3], np.uint8), bearings=np.array([10.0, 200.0]))
+    >>> rng = np.random.default_rng(0)
+    >>> same = distort(seen, named_distortion("none"), classes=[1, 3], rng=rng)
+    >>> same.codes.tolist(), same.bearings.tolist()
+    ([1, 3], [10.0, 200.0])
+    """
+    false = np.asarray(classes, dtype=np.uint8)
+    chances = _class_chances(distortion, false, weights)
+    codes, bearings, _ = _spoiled(signature, distortion, (false, chances), rng)
+    return Signature(codes=codes, bearings=bearings)
+
+
+def _spoiled(
+    signature: Signature,
+    distortion: Distortion,
+    false_classes: tuple[NDArray[np.uint8], NDArray[np.float64]],
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.int64]]:
+    """Return codes, bearings, and which object each was; -1 for a false one."""
+    if signature.codes is None or signature.bearings is None:
+        msg = "a signature without types or without bearings was given; give one with both."
+        raise InputError(msg)
+    codes: list[int] = signature.codes.tolist()
+    bearings: list[float] = signature.bearings.tolist()
+    rows = list(range(len(codes)))
+    for _ in range(distortion.occurrences):
+        operation = int(rng.integers(_OPERATIONS))
+        if operation == _FALSE_DETECTION:
+            bearing = float(rng.uniform(0.0, 360.0))
+            place = bisect_right(bearings, bearing)
+            bearings.insert(place, bearing)
+            codes.insert(place, int(rng.choice(false_classes[0], p=false_classes[1])))
+            rows.insert(place, -1)
+        elif codes:
+            place = int(rng.integers(len(codes)))
+            if operation == _MISS:
+                del codes[place], bearings[place], rows[place]
+            else:
+                codes[place] = _other_class(codes[place], *false_classes, rng)
+    noise = rng.normal(0.0, distortion.bearing_sigma, len(bearings))
+    limit = distortion.bearing_clip
+    seen = wrap_degrees(np.asarray(bearings, dtype=np.float64) + np.clip(noise, -limit, limit))
+    # A stable sort, so that objects on one bearing stay in the order they were in.
+    order = np.argsort(seen, kind="stable") if distortion.resort else np.arange(len(seen))
+    return np.array(codes, np.uint8)[order], seen[order], np.array(rows, np.int64)[order]
+
+
+def _class_chances(
+    distortion: Distortion, classes: NDArray[np.uint8], weights: ArrayLike | None
+) -> NDArray[np.float64]:
+    """Return the chance of each class for a false object."""
+    if classes.ndim != 1 or classes.size == 0 or len(np.unique(classes)) != classes.size:
+        msg = "the classes of false objects are not a list of distinct codes; give at least one."
+        raise InputError(msg)
+    if distortion.false_class == "uniform":
+        return np.full(classes.size, 1.0 / classes.size)
+    if weights is None:
+        msg = "false classes by frequency need weights; give one for each class."
+        raise InputError(msg)
+    values = np.asarray(weights, dtype=np.float64)
+    if values.shape != classes.shape or not np.isfinite(values).all() or (values < 0).any():
+        msg = (
+            f"{values.size} weights for {classes.size} classes were given; "
+            "give one for each class, 0 or more."
+        )
+        raise InputError(msg)
+    if not values.any():
+        msg = "class weights that are all zero were given; give at least one above zero."
+        raise InputError(msg)
+    return np.asarray(values / values.sum())
+
+
+def _other_class(
+    code: int,
+    classes: NDArray[np.uint8],
+    chances: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> int:
+    """Return another class than `code`, or `code` itself when there is no other."""
+    others = np.where(classes == code, 0.0, chances)
+    total = others.sum()
+    return int(rng.choice(classes, p=others / total)) if total > 0 else code

@@ -1,0 +1,281 @@
+"""Queries of known places: seen from the cells or from anywhere, in this city or a later one.
+
+What is seen from a place is spoiled by distortions; what is left is asked. All chances come from a
+seed and the number of a query, so that query 17 is the same whatever else is asked, and however
+many.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from semsig_gis.core.checks import MOST_SEED, require_number
+from semsig_gis.core.errors import CrsError, InputError, UnknownNameError, nearest_name
+from semsig_gis.database.sightings import views_at
+from semsig_gis.evaluation.queries.distortion_text import ready_chain
+from semsig_gis.evaluation.queries.distortions import DISTORTIONS
+from semsig_gis.evaluation.queries.true_view import CitySights, Sight
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
+
+SeenFrom = Literal["cells", "anywhere"]
+
+TRIES = 20
+"""How many places in a cell are tried for one outside the buildings."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuerySpec:
+    """Which queries are asked.
+
+    Parameters
+    ----------
+    number : int, default 500
+        How many of each seed; at least 1.
+    seeds : tuple of int, default (0,)
+        Seeds of all chances; different ones, each from 0 to 10**18.
+    seen_from : {"cells", "anywhere"}, default "cells"
+        The viewpoints of cells, as in the paper, or places anywhere in cells, outside of
+        buildings.
+    distortions : tuple, default the paper's medium level
+        What happens to a query, in this order (see `queries.chain`).
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    UnknownNameError
+        If there is no such place to see from.
+
+    Examples
+    --------
+    >>> QuerySpec(number=100, seeds=(1, 2)).seen_from
+    'cells'
+    """
+
+    number: int = 500
+    seeds: tuple[int, ...] = (0,)
+    seen_from: SeenFrom = "cells"
+    distortions: tuple[QueryDistortion, ...] = (DISTORTIONS["medium"],)
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if self.number < 1:
+            msg = f"{self.number} queries were asked for; give a whole number from 1."
+            raise InputError(msg)
+        if not self.seeds or len(set(self.seeds)) < len(self.seeds):
+            msg = f"the seeds are {list(self.seeds)}; give at least one, and none twice."
+            raise InputError(msg)
+        for seed in self.seeds:
+            require_number("a seed", seed, least=0, most=MOST_SEED)
+        if self.seen_from not in get_args(SeenFrom):
+            hint = nearest_name(self.seen_from, get_args(SeenFrom))
+            msg = f"queries are seen from {self.seen_from!r}{hint}; give cells or anywhere."
+            raise UnknownNameError(msg)
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Query:
+    """A query and the truth about it.
+
+    It was seen from `xy`, metres in the CRS of the database, in the cell of row number `cell` there
+    (-1 where the database has no such cell), where `length` objects are seen. `number` counts from
+    0 for each seed. `asked` is what is asked after all distortions, and by how much its north is
+    off; `pick`, in [0, 1), chooses one of equally good answers.
+    """
+
+    seed: int
+    number: int
+    xy: tuple[float, float]
+    cell: int
+    length: int
+    asked: Sight
+    pick: float
+
+
+def draw_queries(
+    database: SignatureDatabase,
+    spec: QuerySpec,
+    *,
+    store: ObjectStore | None = None,
+    city: SignatureDatabase | None = None,
+    part: slice = slice(None),
+) -> list[Query]:
+    """Draw queries of known places.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        What is to be searched.
+    spec : QuerySpec
+        Which queries.
+    store : ObjectStore, optional
+        The street objects, and buildings if any, of the city that is looked at; needed for places
+        anywhere.
+    city : SignatureDatabase, optional
+        The city that is looked at, if it is not the one that the database tells of: the same city
+        at another date, say, in the same coordinate reference system. Places are in its cells.
+    part : slice, optional
+        Which of the queries to draw, those of the first seed first; all by default.
+
+    Returns
+    -------
+    list of Query
+        For each seed so many queries. A detector knows the classes that the database has
+        somewhere; objects of others are not asked.
+
+    Raises
+    ------
+    InputError
+        If there are more queries than cells or places, or the street objects are missing.
+    CrsError
+        If the two cities have different coordinate reference systems.
+
+    Examples
+    --------
+    >>> from semsig_gis import ObjectStore
+    >>> spec = QuerySpec(number=3, seen_from="anywhere", distortions=())
+    >>> queries = draw_queries(demo_database, spec, store=ObjectStore.of(demo_objects))
+    >>> [query.length == len(query.asked) for query in queries]
+    [True, True, True]
+    """
+    city = database if city is None else city
+    if city.crs != database.crs:
+        msg = (
+            f"queries are seen in {city.crs.to_string()} and searched for in "
+            f"{database.crs.to_string()}; build both databases in one reference system."
+        )
+        raise CrsError(msg)
+    check_count("queries", spec.number, len(city))
+    if spec.seen_from == "anywhere" and store is None:
+        msg = (
+            "queries from anywhere need the street objects of the city; build its database with "
+            "them, or let queries be seen from cells."
+        )
+        raise InputError(msg)
+    spoil = ready_chain(spec.distortions, CitySights.of(database))
+    codes_there = _codes_there(city, database)
+    queries = []
+    for seed, numbers in _numbers(spec, part):
+        places, sights = _seen(city, spec, seed, numbers, store)
+        cells = database.cells_at(places)
+        for number, place, cell, sight in zip(numbers, places, cells, sights, strict=True):
+            codes = codes_there[sight.codes]
+            true = replace(sight, codes=codes).only(codes > 0)
+            queries.append(
+                Query(
+                    seed=seed,
+                    number=number,
+                    xy=(float(place[0]), float(place[1])),
+                    cell=int(cell),
+                    length=len(sight),
+                    asked=spoil(true, seed, number),
+                    pick=float(_random(seed, "pick", number).random()),
+                )
+            )
+    return queries
+
+
+def check_count(what: str, count: int, cells: int) -> None:
+    """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
+    if not 1 <= count <= cells:
+        msg = (
+            f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
+        )
+        raise InputError(msg)
+
+
+def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
+    """Yield the numbers of the queries of each seed that are in a part."""
+    start, stop, _ = part.indices(spec.number * len(spec.seeds))
+    for place, seed in enumerate(spec.seeds):
+        first = place * spec.number
+        low, high = max(start - first, 0), min(stop - first, spec.number)
+        if low < high:
+            yield seed, range(low, high)
+
+
+def _seen(
+    city: SignatureDatabase,
+    spec: QuerySpec,
+    seed: int,
+    numbers: range,
+    store: ObjectStore | None,
+) -> tuple[NDArray[np.float64], Iterator[Sight]]:
+    """Return places, and what is seen from each."""
+    # The first cells of one permutation: more queries keep the first ones.
+    cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(len(city))
+    if spec.seen_from == "cells" or store is None:
+        cells = cells[numbers.start : numbers.stop]
+        return city.xy[cells], (Sight.of_cell(city, cell) for cell in cells.tolist())
+    places = _places(city, cells, spec.number, seed, store)[numbers.start : numbers.stop]
+    views = views_at(
+        store.objects,
+        places,
+        index=store.index,
+        radius=city.spec.radius,
+        footprints=store.buildings_around(places, distance=city.reach),
+    )
+    parts = (slice(low, high) for low, high in pairwise(views.offsets.tolist()))
+    return places, (
+        Sight(
+            codes=views.codes[part], bearings=views.bearings[part], distances=views.distances[part]
+        )
+        for part in parts
+    )
+
+
+def _places(
+    city: SignatureDatabase, cells: NDArray[np.int64], number: int, seed: int, store: ObjectStore
+) -> NDArray[np.float64]:
+    """Return a place outside the buildings in each of the first cells that have one."""
+    step = city.grid.step
+    places: list[NDArray[np.float64]] = []
+    for start in range(0, len(cells), number):
+        block = cells[start : start + number]
+        aside = np.stack(
+            [
+                _random(seed, "place", start + row).uniform(-0.5, 0.5, (TRIES, 2))
+                for row in range(len(block))
+            ]
+        )
+        tried = city.xy[block][:, None] + step * aside
+        buildings = store.buildings_around(city.xy[block], distance=step)
+        free = np.ones(tried.shape[:2], np.bool_)
+        if buildings is not None:
+            free = ~buildings.cover(tried.reshape(-1, 2)).reshape(free.shape)
+        stands = free.any(axis=1)
+        places.append(tried[stands, free.argmax(axis=1)[stands]])
+        if sum(map(len, places)) >= number:
+            return np.concatenate(places)[:number]
+    msg = (
+        f"{number} queries were asked for, but only {sum(map(len, places))} of the {len(cells)} "
+        "cells have a place outside the buildings; give a smaller number."
+    )
+    raise InputError(msg)
+
+
+def _codes_there(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:
+    """Return the code that each class of a city has in a database, 0 where it is not seen there."""
+    present = set(database.present_codes.tolist())
+    codes = {item.name: item.code for item in database.taxonomy.classes if item.code in present}
+    there = np.zeros(256, np.uint8)
+    for item in city.taxonomy.classes:
+        there[item.code] = codes.get(item.name, 0)
+    return there
+
+
+def _random(seed: int, stream: str, number: int) -> np.random.Generator:
+    key = (number, zlib.crc32(stream.encode()))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

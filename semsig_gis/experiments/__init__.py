@@ -1,1 +1,0 @@
-"""Resumable runs of many evaluations."""

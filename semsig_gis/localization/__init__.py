@@ -1,0 +1,1 @@
+"""Locate a view in a signature database."""

@@ -1,0 +1,267 @@
+"""Rank the cells of a signature database for a query.
+
+Scores are distances: lower is better. Cells that tie are told as such, never ranked by accident.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import semsig_gis
+from semsig_gis.core.errors import EmptyResultError
+from semsig_gis.core.geometry import crs_label
+from semsig_gis.database.database import join_databases, rows_of_result
+from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.localization.answers import (
+    Answer,
+    Ranking,
+    candidate_columns,
+    check_top,
+    query_notes,
+)
+from semsig_gis.localization.distance.method import FUSION
+from semsig_gis.localization.distance.scores import score_cells, score_parts
+from semsig_gis.localization.distance.ties import top_candidates
+from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation.view import View
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.display import MapFrame
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.localization.answers import DistanceMemo, Requirement
+    from semsig_gis.localization.distance.method import Method
+    from semsig_gis.observation.north import North
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Localization(Answer):
+    """The best cells for a query, by distance.
+
+    Parameters
+    ----------
+    query, cells, crs, taxonomy, licenses
+        What was searched for, how many cells were searched, and what their database says.
+    method : Method
+        How the cells were ranked.
+    used : str
+        Which parts of the query were compared: ``"types"``, ``"angles"`` or ``"types+angles"``.
+    columns : mapping of str to ndarray
+        Of the best cells, which are the rows of `candidates`, best first, equal distances in the
+        order of the database: ``rank_low`` and ``rank_high`` (the first and last rank, from 1, that
+        the cell can have when ties are broken either way), ``tied`` (how many cells share its
+        distance), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of
+        the database), ``types`` (symbols), ``length`` (objects), ``distance``.
+    tied_beyond : int
+        How many cells are as good as the last candidate but are not listed.
+
+    Examples
+    --------
+    >>> from semsig_gis import Method, localize
+    >>> query = demo_database.signature(0)
+    >>> localization = localize(demo_database, query, method=Method.parse("edit+edit"), top=3)
+    >>> len(localization.candidates)
+    3
+    """
+
+    method: Method
+    used: str
+
+    def _facts(self) -> dict[str, object]:
+        columns = self.columns
+        best: dict[str, object] = {}
+        if len(columns["cell"]):
+            best = {
+                "best cell": columns["cell_id"][0],
+                "place": f"{columns['x'][0]:.1f}, {columns['y'][0]:.1f}",
+                "distance": f"{columns['distance'][0]:.3f}",
+                "as good": columns["tied"][0],
+            }
+        return {
+            **best,
+            "candidates": len(columns["cell"]),
+            "cells": self.cells,
+            "method": self.method,
+            "CRS": crs_label(self.crs),
+        }
+
+    def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:  # noqa: ARG002
+        """Return the rows of the candidates in the database that was searched."""
+        ids, types = self.columns["cell_id"], self.columns["types"]
+        return rows_of_result(database, ids, types, what="localization")
+
+    def explore(self, database: SignatureDatabase) -> MapFrame:
+        """Show the candidates on a map in a notebook (see `localization_map`)."""
+        return semsig_gis.show_map(semsig_gis.localization_map(self, database))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values that JSON can hold, candidates as a list of records.
+
+        They have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84).
+        """
+        return {
+            "query": self.query.to_dict(self.taxonomy),
+            "north": self.north.to_dict(),
+            "method": str(self.method),
+            "used": self.used,
+            "cells": self.cells,
+            "tied_beyond": self.tied_beyond,
+            "notes": list(self.notes),
+            "crs": self.crs.to_string(),
+            "licenses": list(self.licenses),
+            "candidates": self._candidate_records(),
+        }
+
+
+@dataclass(eq=False, kw_only=True)
+class DistanceLocator:
+    """Measures of distance, and the cells that they rank."""
+
+    database: SignatureDatabase | PartitionedDatabase
+    method: Method = FUSION
+    requirement: Requirement | None = None
+    top: int = 100
+    north: North = GRID_NORTH
+    _compared: set[str] = field(default_factory=set)  # parts of queries
+
+    def __post_init__(self) -> None:  # noqa: D105
+        check_top(self.top)
+
+    def locate(self, query: Signature, *, top: int | None = None) -> Localization:
+        """List the cells whose signature is most like a query, of all parts of a database."""
+        count = top or self.top
+        grid_query = self.north.to_grid(query)
+        shortlist, part = self._search(grid_query, count)
+        present = sorted(shortlist.present)
+        known = grid_query.among(present)
+        if not known.all():  # the last part might have had the class
+            shortlist, part = self._search(grid_query.select(known), count)
+        columns, tied_beyond = shortlist.ranked()
+        if isinstance(self.database, PartitionedDatabase):
+            columns["cell"] = self.database.row_numbers(columns["cell_id"])
+        elif self.requirement is not None:
+            met = self.requirement.met(self.database.type_sequences)
+            columns["cell"] = np.flatnonzero(met)[columns["cell"]]
+        return Localization(
+            query=query,
+            method=self.method,
+            used=self.method.used(query),
+            columns=columns,
+            cells=shortlist.cells,
+            tied_beyond=tied_beyond,
+            crs=part.crs,
+            taxonomy=part.taxonomy,
+            licenses=part.licenses,
+            notes=(
+                *query_notes(query, present, part.taxonomy),
+                *_unused_notes(query, self.method),
+                *self.north.notes,
+            ),
+            north=self.north,
+        )
+
+    def _search(self, query: Signature, top: int) -> tuple[Shortlist, SignatureDatabase]:
+        """Return the best cells of all parts, and a database of no cells that stands for them."""
+        shortlist = Shortlist(top)
+        for part, scores in score_parts(self.database, query, self.method):
+            shortlist.present.update(part.present_codes.tolist())
+            if self.requirement is None:
+                shortlist.add(part, scores)
+                continue
+            met = self.requirement.met(part.type_sequences)
+            if met.any():
+                shortlist.add(part.select(met), scores[met])
+        if shortlist.cells == 0:
+            cells = len(self.database)
+            msg = f"none of the {cells:,} cells meets the requirement; require less."
+            raise EmptyResultError(msg)
+        return shortlist, part.select(slice(0))
+
+    def rankings(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query; see `Locator`."""
+        if not queries:
+            return
+        database = self.database
+        if isinstance(database, PartitionedDatabase):
+            database = join_databases(list(database.parts()))
+        # What the database works out once and keeps is no part of the time of a query.
+        parts = self.method.used(queries[0])
+        if parts not in self._compared:
+            next(iter(score_cells(database, queries[:1], self.method)))
+            self._compared.add(parts)
+        rows = iter(score_cells(database, queries, self.method, memo=memo))
+        for _ in queries:
+            start, spared = time.perf_counter(), memo.spared if memo else 0.0
+            scores = next(rows)
+            seconds = time.perf_counter() - start + (memo.spared - spared if memo else 0.0)
+            yield Ranking(scores=scores, best_score=float(scores.min()), seconds=seconds)
+
+
+def _unused_notes(query: Signature, method: Method) -> tuple[str, ...]:
+    """Return what to say of what is known of a view but means nothing to a measure of distance."""
+    if not isinstance(query, View):
+        return ()
+    known = {
+        "ranges": query.ranges is not None,
+        "scores": query.scores is not None,
+        "sectors": any(photo.sectors for photo in query.photos),
+        "errors of north": any(photo.north_sigma for photo in query.photos),
+    }
+    unused = [name for name, there in known.items() if there]
+    if not unused:
+        return ()
+    return (f"{method} does not use {' and '.join(unused)}; the method likelihood does.",)
+
+
+class Shortlist:
+    """The best `top` cells of a search, gathered from one part of a database after the other.
+
+    `listed` has their columns, best first, equal distances in the order of columns and rows of the
+    grid; `present` the class codes that some cell sees; `cells` how many cells were looked at.
+    """
+
+    def __init__(self, top: int) -> None:
+        self.listed: dict[str, NDArray[Any]] = {}
+        self.present: set[int] = set()
+        self.cells = 0
+        self._top = top
+        # How many cells have each distance, up to that of the last listed one at least.
+        self._sizes: Counter[float] = Counter()
+
+    def add(self, database: SignatureDatabase, scores: NDArray[np.float32]) -> None:
+        """Take the best cells of a part, given the distances of all its cells."""
+        better, level = top_candidates(scores, min(self._top, len(scores)))
+        better = better[np.argsort(scores[better], kind="stable")]
+        cells = np.concatenate([better, level])
+        values, sizes = np.unique(scores[cells], return_counts=True)
+        self._sizes.update(dict(zip(values.tolist(), sizes.tolist(), strict=True)))
+        cells = cells[: self._top]
+        part = candidate_columns(database, cells)
+        part["distance"] = scores[cells].astype(np.float64)
+        if self.cells:
+            both = {name: np.append(self.listed[name], part[name]) for name in part}
+            best = np.lexsort((both["cell_id"], both["distance"]))[: self._top]
+            part = {name: column[best] for name, column in both.items()}
+        self.listed = part
+        self.present.update(database.present_codes.tolist())
+        self.cells += len(database)
+
+    def ranked(self) -> tuple[dict[str, NDArray[Any]], int]:
+        """Return the columns and the number of ties beyond them, as in `Localization`."""
+        values = np.array(sorted(self._sizes))
+        sizes = np.array([self._sizes[value] for value in values.tolist()])
+        place = np.searchsorted(values, self.listed["distance"])
+        high, tied = np.cumsum(sizes)[place], sizes[place]
+        ranks = {"rank_low": high - tied + 1, "rank_high": high, "tied": tied}
+        return {**ranks, **self.listed}, int(high[-1]) - len(high)

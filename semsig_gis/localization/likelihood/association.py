@@ -1,0 +1,520 @@
+"""Which detection is which object: chances and sums over all one-to-one associations.
+
+A detection is one of the objects or clutter, an object is detected once or missed. Each pair has a
+weight, how much likelier the two are one thing than a miss and clutter. The likelihood sums over
+all associations, as `likelihood.photo` has it. The index adds up over the detections one by one, so
+that one lamp may explain three; its best cells are ranked again by this sum. An alignment that
+keeps the order would lose one query in twenty, as bearing noise swaps neighbours.
+
+The sum is the Bethe approximation that belief propagation settles on (Williams and Lau,
+"Approximate evaluation of marginal association probabilities with belief propagation", 2014): exact
+if the pairs form no loop, otherwise a little too small.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
+from semsig_gis.core.signature import distance_units_of
+from semsig_gis.database.database import views_in
+from semsig_gis.localization.likelihood.index import CellScores, own_sigma
+from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
+from semsig_gis.localization.noise.table import database_tables
+from semsig_gis.observation.view import View
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.sightings import Views
+    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization.noise.table import NoiseTable
+
+    _Ranks = tuple[NDArray[np.float64], list[NDArray[np.float64]]]
+
+
+WIDE = 45.0  # degrees of deviation from which on the tails meet behind the observer
+LAPS = 360.0 * np.arange(-3, 4)
+FARTHEST = 8.0  # deviations, beyond which a normal distribution is over
+LEAST_MASS = 1e-12
+ROOT = math.sqrt(2.0 * math.pi)
+
+
+def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
+    """Return the logarithm of the chance of each turn, one step wide, all in degrees."""
+    if math.isinf(north_sigma):
+        return np.full(turns.shape, math.log(step / 360.0))
+    scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
+    return np.asarray(scale - 0.5 * (signed_degrees(turns) / north_sigma) ** 2)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Pairs:
+    """The pairs of an object and a detection that may be one thing, for several problems.
+
+    The pairs of problem i are ``starts[i]:starts[i + 1]``. `objects` and `detections` are row
+    numbers that run on over all problems. `away` is the bearing of the detection less that of the
+    object, in degrees in [-180, 180).
+    """
+
+    starts: NDArray[np.int64]
+    objects: NDArray[np.int64]
+    detections: NDArray[np.int64]
+    away: NDArray[np.float64]
+
+
+def near_pairs(
+    object_starts: NDArray[np.int64],
+    object_bearings: NDArray[np.float64],
+    detection_starts: NDArray[np.int64],
+    detection_bearings: NDArray[np.float64],
+    *,
+    reach: float = 180.0,
+) -> Pairs:
+    """Return the pairs of each problem whose bearings differ by at most `reach` degrees.
+
+    Problem i has the objects ``object_starts[i]:object_starts[i + 1]``, and detections likewise.
+    Pairs are ordered by problem and object.
+    """
+    here, there = np.diff(object_starts), np.diff(detection_starts)
+    problem = np.repeat(np.arange(len(here)), here * there)
+    inside = np.arange(len(problem)) - (np.cumsum(here * there) - here * there)[problem]
+    row, column = np.divmod(inside, there[problem])
+    objects = object_starts[problem] + row
+    detections = detection_starts[problem] + column
+    away = signed_degrees(detection_bearings[detections] - object_bearings[objects])
+    near = np.abs(away) <= reach
+    starts = np.concatenate([[0], np.cumsum(np.bincount(problem[near], minlength=len(here)))])
+    return Pairs(starts=starts, objects=objects[near], detections=detections[near], away=away[near])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Detections:
+    """What some photos show, one photo after the other.
+
+    The detections of photo i are ``starts[i]:starts[i + 1]``; the arrays are those of all photos
+    joined, by detection last.
+    """
+
+    photos: tuple[PhotoTable, ...]
+    starts: NDArray[np.int64]
+    bearings: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    range_errors: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    disc: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, views: Sequence[Signature], table: NoiseTable) -> Detections:
+        """Return the photos of views with bearings, beside the classes of a table."""
+        parts = [part for view in views for part in View.of(view).split()]
+        photos = tuple(PhotoTable.of(part, table) for part in parts)
+        names = ("bearings", "ranges", "range_errors", "scores", "disc")
+        joined = {
+            name: np.concatenate([getattr(photo, name) for photo in photos], axis=-1)
+            for name in names
+        }
+        return cls(photos=photos, starts=np.cumsum([0, *map(len, parts)]), **joined)
+
+    @cached_property
+    def givers(self) -> NDArray[np.int64]:
+        """The photo of each detection."""
+        return np.repeat(np.arange(len(self.photos)), np.diff(self.starts))
+
+    @cached_property
+    def turns(self) -> NDArray[np.float64]:
+        """How much of a full turn each photo sees."""
+        return np.array([photo.width for photo in self.photos])
+
+    def inside(
+        self,
+        owners: NDArray[np.int64],
+        bearings: NDArray[np.float64],
+        spreads: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return how much of the wrapped normal of some objects lies in the sectors of their photo.
+
+        Object i, of photo ``owners[i]``, has its bearing and spread in degrees. The second array is
+        the mean square of the deviations inside, in squares of the spread.
+        """
+        sectors = np.concatenate([photo.sectors for photo in self.photos])
+        counts = np.array([len(photo.sectors) for photo in self.photos])
+        many = counts[owners]
+        row = np.repeat(np.arange(len(owners)), many)
+        within = np.arange(len(row)) - np.repeat(np.cumsum(many) - many, many)
+        own = sectors[(np.cumsum(counts) - counts)[owners[row]] + within]
+        low = signed_degrees(own[:, 0] - bearings[row])[:, None] + LAPS
+        high = low + (own[:, 1] - own[:, 0])[:, None]
+        below, bent = _normal(np.stack([low, high]) / spreads[row, None])
+        sums, bend = (
+            np.bincount(row, (part[1] - part[0]).sum(axis=1), len(owners)) for part in (below, bent)
+        )
+        mass = np.where(many == 0, 1.0, np.clip(sums, 0.0, 1.0))
+        squares = np.maximum(1.0 - bend / np.maximum(mass, LEAST_MASS), 0.0)
+        return np.asarray(mass, np.float64), np.asarray(squares, np.float64)
+
+
+def _normal(
+    deviations: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the normal distribution up to some deviations, and there its density times them."""
+    mass = (deviations > 0).astype(np.float64)
+    near = np.abs(deviations) < FARTHEST
+    mass[near] = [0.5 * math.erfc(-one * math.sqrt(0.5)) for one in deviations[near].tolist()]
+    bent = np.zeros(deviations.shape)
+    bent[near] = deviations[near] * np.exp(-0.5 * deviations[near] ** 2) / ROOT
+    return mass, bent
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Association:
+    """Which detection is which object, by chances.
+
+    By pair, `chances` that it is one thing. By object, its chance of detection `detection` at its
+    distance, and `inside` and `squares` as in `Detections.inside`. By detection, `clutter` is the
+    share of clutter in what is none of the objects; the rest came into range with the observer.
+    `loglik` is the log-likelihood of each photo.
+    """
+
+    chances: NDArray[np.float64]
+    detection: NDArray[np.float64]
+    inside: NDArray[np.float64]
+    squares: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    loglik: NDArray[np.float64]
+
+
+def associate(
+    table: NoiseTable,
+    views: Views,
+    seen: Detections,
+    pairs: Pairs,
+    *,
+    lengths: NDArray[np.int64],
+) -> Association:
+    """Return the chance that each pair is one thing, and the log-likelihood of each photo.
+
+    `views` is what there is to see in each photo, of classes that the table has; `lengths`, by
+    photo, is how many objects, by which the table is looked up.
+    """
+    rows, kinds = table.length_rows(lengths), table.row_of[views.codes]
+    owners = np.repeat(np.arange(len(views)), views.lengths)
+    distances = at_distances(table, views)
+    units = distance_units_of(distances, table.reach)
+    spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
+    spreads = np.minimum(spreads, HALF_TURN)
+    inside, squares = seen.inside(owners, views.bearings, spreads)
+    near = table.detected[rows[owners], kinds]
+    detection = near * table.seen[kinds, units]
+    unseen = 1.0 - detection * inside
+    used, row = np.unique(rows, return_inverse=True)
+    named = table.named[used] @ seen.scores
+    # As many objects come into range as leave it, in any direction.
+    leaving = near * table.left[kinds, units]
+    gone = np.zeros((len(views), len(table.codes)))
+    np.add.at(gone, (owners, kinds), leaving)
+    names = named[row[seen.givers], :, np.arange(len(seen.givers))]
+    come = (gone[seen.givers] * names).sum(axis=1)
+    clutter = table.clutter @ seen.scores
+    floor = (clutter + come) * seen.disc / FULL_TURN
+    one, other = pairs.objects, pairs.detections
+    weights = (detection / unseen)[one] * _bearing_densities(pairs.away, spreads[one])
+    weights *= named[row[owners[one]], kinds[one], other] / floor[other]
+    ranged = np.flatnonzero(~np.isnan(seen.ranges[other]))
+    if len(ranged):
+        weights[ranged] *= _range_densities(
+            table, seen, kinds[one[ranged]], distances[one[ranged]], other[ranged]
+        )
+    chances, log_sums = associate_pairs(pairs, weights)
+    return Association(
+        chances=chances,
+        detection=detection,
+        inside=inside,
+        squares=squares,
+        clutter=clutter / (clutter + come),
+        loglik=log_sums
+        + np.bincount(owners, np.log(unseen), len(views))
+        + np.bincount(seen.givers, np.log(floor), len(views))
+        - seen.turns * (table.clutter.sum() + gone.sum(axis=1)),
+    )
+
+
+def at_distances(table: NoiseTable, views: Views) -> NDArray[np.float64]:
+    """Return the distances of objects in metres; the nearest is above 0."""
+    return np.asarray(np.maximum(views.distances, table.distances[0]))
+
+
+def _bearing_densities(
+    away: NDArray[np.float64], spread: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the density of the wrapped normal, a degree."""
+    density = np.exp(-0.5 * (away / spread) ** 2)
+    wide = spread > WIDE
+    laps = (away[wide, None] + LAPS) / spread[wide, None]
+    density[wide] = np.exp(-0.5 * laps**2).sum(axis=1)
+    return np.asarray(density / (spread * ROOT))
+
+
+def range_spreads(
+    table: NoiseTable,
+    seen: Detections,
+    kinds: NDArray[np.int64],
+    distances: NDArray[np.float64],
+    detections: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Return the deviation of the logarithm of the range of pairs, by class and distance."""
+    own = seen.range_errors[detections]
+    errors = np.where(np.isnan(own), table.range_sigma[kinds], own)
+    return np.hypot(errors, table.position_sigma / distances)
+
+
+def _range_densities(
+    table: NoiseTable,
+    seen: Detections,
+    kinds: NDArray[np.int64],
+    distances: NDArray[np.float64],
+    detections: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """Return the density of the logarithms of the ranges of pairs."""
+    spread = range_spreads(table, seen, kinds, distances, detections)
+    away = np.log(seen.ranges[detections] / distances) / spread
+    return np.asarray(np.exp(-0.5 * away**2) / (spread * ROOT))
+
+
+def associate_pairs(
+    pairs: Pairs, weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sum over the one-to-one associations of each problem, given weights of 0 or more.
+
+    Returns the chance that each pair is one thing, and the logarithm of the sum of each problem.
+    """
+    from semsig_gis.localization.likelihood.association_kernels import associate  # noqa: PLC0415 - numba loads slowly
+
+    chances = np.empty(len(weights))
+    log_sums = np.empty(len(pairs.starts) - 1)
+    associate(
+        pairs.starts,
+        pairs.objects,
+        pairs.detections,
+        np.ascontiguousarray(weights, dtype=np.float64),
+        np.ones(pairs.objects.max(initial=-1) + 1),
+        np.ones(pairs.detections.max(initial=-1) + 1),
+        chances,
+        log_sums,
+    )
+    return chances, log_sums
+
+
+RERANKED = 500
+"""How many cells are re-ranked unless said otherwise."""
+FIRST = 100  # cells that are re-ranked whatever comes out; then as many again, twice as many, ...
+# Places in the others, of which a sample is looked at, and where time is short.
+SAMPLE, QUICK_SAMPLE = 2304, 768
+# Cells that are looked at from aside before, the first of them whatever comes out.
+ASIDE, FIRST_ASIDE, SAMPLE_ASIDE = 8192, 2048, 1024
+HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from which the rest are not
+NEGLIGIBLE = 30.0  # nats below the best that was re-ranked, at which cells hold nothing together
+POOL, WINDOWS = 16, 8  # times a sample, that it is taken from; parts of it, by likelihood
+# Turns around the likeliest one of the scan, which knows it to less than six degrees.
+TURNS = np.arange(-7.5, 7.6, 3.0)
+
+
+def align_cells(
+    database: SignatureDatabase,
+    photo: Signature,
+    noise: Noise,
+    cells: NDArray[np.int64],
+    *,
+    turns: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Return the log-likelihood of a photo in some cells, summed over one-to-one associations.
+
+    As `photo_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the photo by for
+    each cell, are given.
+    """
+    tables, weights = database_tables(database, noise)
+    ways = np.zeros((len(cells), 1)) if turns is None else turns
+    asked = PhotoTable.of(View.of(photo), tables[0])
+    loglik = photo_loglik(asked, views_in(database, cells), tables, weights, turns=ways)
+    return loglik[:, 0] if turns is None else loglik
+
+
+def rerank(
+    index: LikelihoodIndex,
+    query: Signature,
+    scores: CellScores,
+    *,
+    north_sigma: float = 0.0,
+    log_prior: NDArray[np.float64] | None = None,
+    count: int = RERANKED,
+    aside: bool = True,
+    sample: int = SAMPLE,
+) -> CellScores:
+    """Replace the scores of the best cells by their one-to-one likelihoods.
+
+    Up to `count` cells are re-ranked, until some hundred hold next to nothing of the chance.
+    Of the others, a `sample` is looked at, too, and each is moved by as much as those of the sample
+    with scores like its own, so that all masses fit each other. `log_prior` helps to choose the
+    cells and is not part of the result. Without bearings the scores are returned as they are.
+    Where queries are from anywhere, places `aside` of the middles are looked at, too: four in each
+    of some thousand cells by the plain sum, to choose the cells, and then nine in each.
+    """
+    if count < 1:
+        msg = f"the number of cells to re-rank is {count}; give a whole number from 1."
+        raise InputError(msg)
+    view = View.of(query)
+    if view.bearings is None:
+        return scores
+    loglik = scores.loglik.astype(np.float64)
+    if aside and len(index.stands[1]) > 1:
+        scorer = index.scorer_aside(view, north_sigma=north_sigma)
+        loglik, _, _ = _replaced(
+            lambda some: (scorer(some), []),
+            loglik,
+            log_prior,
+            count=ASIDE,
+            first=FIRST_ASIDE,
+            sample=SAMPLE_ASIDE,
+        )
+    loglik, cells, turns = _replaced(
+        partial(_aligned, index, view, scores=scores, north_sigma=north_sigma, aside=aside),
+        loglik,
+        log_prior,
+        count=count,
+        first=FIRST,
+        sample=sample // (len(index.stands[1]) if aside else 1),
+    )
+    headings = []
+    for before, turn in zip(scores.headings, turns, strict=True):
+        heading = before
+        if before is not None:
+            heading = before.copy()
+            heading[cells] = signed_degrees(turn)
+        headings.append(heading)
+    return CellScores(loglik=loglik, headings=tuple(headings))
+
+
+def _replaced(
+    rank: Callable[[NDArray[np.int64]], _Ranks],
+    old: NDArray[np.float64],
+    log_prior: NDArray[np.float64] | None,
+    *,
+    count: int,
+    first: int,
+    sample: int,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], list[NDArray[np.float64]]]:
+    """Return better log-likelihoods of all cells, the best cells, and their turns.
+
+    `rank` gives them for some cells, with the turns: for the `first` ones, then more and more up to
+    `count`. By a `sample` of the others, these are moved.
+    """
+    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
+
+    total = old if log_prior is None else old + log_prior
+    count = min(count, len(old))
+    cells = promising_cells(total.astype(np.float32), count)
+    cells = cells[np.argsort(-total[cells], kind="stable")][:count]
+    cells = cells[total[cells] > -np.inf]
+    parts, done = [rank(cells[:first])], min(first, len(cells))
+    while done < len(cells):
+        logs = np.concatenate([part for part, _ in parts])
+        if log_prior is not None:
+            logs += log_prior[cells[:done]]
+        last = logs[-len(parts[-1][0]) :]
+        if np.logaddexp.reduce(last) < np.logaddexp.reduce(logs) + HOPELESS:
+            break
+        parts.append(rank(cells[done : 2 * done]))
+        done = min(2 * done, len(cells))
+    cells, new = cells[:done], np.concatenate([part for part, _ in parts])
+    turns = [np.concatenate(each) for each in zip(*(turn for _, turn in parts), strict=True)]
+    loglik = old.copy()
+    if len(cells) < len(old):
+        # The best that was re-ranked may be far below what the others seem to be.
+        best = (new if log_prior is None else new + log_prior[cells]).max()
+        rest = total > min(best, total.max()) - NEGLIGIBLE
+        rest[cells] = False
+        _shift(loglik, lambda some: rank(some)[0], total, np.flatnonzero(rest), sample)
+    loglik[cells] = new
+    return loglik, cells, turns
+
+
+def _shift(
+    loglik: NDArray[np.float64],
+    rank: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+    total: NDArray[np.float64],
+    tail: NDArray[np.int64],
+    size: int,
+) -> None:
+    """Move the log-likelihood of all cells as far as it changes for some of the `tail`.
+
+    `rank` gives the new likelihood of some cells, `total` is that of all with the prior; so many
+    are tried.
+    """
+    if not len(tail):
+        return
+    pool = tail
+    if len(tail) > POOL * size:
+        random = np.random.default_rng(0)
+        pool = random.choice(tail, POOL * size, replace=False, shuffle=False)
+    pool = pool[np.argsort(-total[pool], kind="stable")]
+    ranks = np.unique(np.geomspace(1, len(pool), size).astype(np.int64)) - 1
+    sample = pool[ranks]
+    new, before, window = rank(sample), loglik[sample], size // WINDOWS
+    moves, levels = [], []
+    for low in range(0, len(sample), window):
+        part = slice(low, low + window)
+        moves.append(np.logaddexp.reduce(new[part]) - np.logaddexp.reduce(before[part]))
+        levels.append(total[sample[part]].mean())
+    move = np.full(len(loglik), moves[-1])  # the others are worse than any level
+    move[tail] = np.interp(total[tail], levels[::-1], moves[::-1])
+    loglik += move
+
+
+def _aligned(
+    index: LikelihoodIndex,
+    view: View,
+    cells: NDArray[np.int64],
+    *,
+    scores: CellScores,
+    north_sigma: float,
+    aside: bool,
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
+    from semsig_gis.localization.likelihood.off_centre import views_aside  # noqa: PLC0415 - numba loads slowly
+
+    models, places = index.stands if aside else (index.models, np.zeros((1, 2)))
+    seen = views_aside(index.database, cells, places) if aside else views_in(index.database, cells)
+    total, likeliest = np.zeros((len(cells), len(places))), []
+    for photo, heading in zip(view.split(), scores.headings, strict=True):
+        turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
+        asked = PhotoTable.of(photo, index.table)
+        everywhere = np.repeat(turns, len(places), axis=0)
+        chances = np.zeros(everywhere.shape)
+        if heading is not None:
+            step, sigma = TURNS[1] - TURNS[0], own_sigma(photo, north_sigma)
+            chances = turn_logs(everywhere, step, sigma)
+        logliks = chances + photo_loglik(
+            asked,
+            seen,
+            *models,
+            turns=everywhere,
+            log_prior=chances,
+            # A place that does not fit one photo may fit the others.
+            group=len(places) if len(scores.headings) == 1 else 1,
+        )
+        logliks = logliks.reshape(len(cells), len(places), -1)
+        best = np.logaddexp.reduce(logliks, axis=1).argmax(axis=1)
+        likeliest.append(turns[np.arange(len(cells)), best])
+        total += np.logaddexp.reduce(logliks, axis=2)
+    return np.logaddexp.reduce(total, axis=1) - math.log(len(places)), likeliest

@@ -1,0 +1,623 @@
+"""Where a query was seen from: chances, a place with its region, or "cannot tell".
+
+The steps of the likelihood method in one call: score every cell by the index, re-rank the best
+by one-to-one associations, turn the scores into chances, decide whether to answer, and, where the
+street objects are known, look for the place between the viewpoints and explain it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+
+import numpy as np
+
+import semsig_gis
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import cell_ids, crs_label, to_degrees
+from semsig_gis.core.text import percent
+from semsig_gis.localization.answers import (
+    REGION_SHARE,
+    Answer,
+    Ranking,
+    candidate_columns,
+    check_top,
+    query_notes,
+)
+from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
+from semsig_gis.localization.likelihood.association import QUICK_SAMPLE, SAMPLE, rerank
+from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_estimate
+from semsig_gis.localization.likelihood.explain import explain, explain_cell
+from semsig_gis.localization.likelihood.index import CellScores
+from semsig_gis.localization.likelihood.posterior import (
+    KEPT,
+    Posterior,
+    posterior,
+    prior_ratio,
+    refine,
+)
+from semsig_gis.localization.noise.model import cell_noise, place_noise
+from semsig_gis.localization.route import route_posteriors
+from semsig_gis.observation.north import GRID_NORTH
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.display import MapFrame
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.localization.answers import DistanceMemo
+    from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
+    from semsig_gis.localization.likelihood.estimate import PlaceEstimate
+    from semsig_gis.localization.likelihood.explain import Explanation
+    from semsig_gis.localization.likelihood.incremental import TurnMemo
+    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.likelihood.posterior import Refinement
+    from semsig_gis.localization.route import Leg
+    from semsig_gis.observation.north import North
+
+DISAGREEMENT = 0.01
+"""Ratio of a prior (see `posterior.prior_ratio`) at or below which an answer warns of it."""
+LARGE_POWER = 4  # of ten, from which on a number is written as a power
+TINY = np.finfo(np.float64).tiny
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Location(Answer):
+    """The answer of the likelihood method to a query.
+
+    Parameters
+    ----------
+    query, cells, crs, taxonomy, licenses
+        What was searched for, how many cells were searched, and what their database says of its
+        CRS, classes and sources.
+    noise : str
+        Name of the noise model.
+    columns : mapping of str to ndarray
+        Of the likeliest cells, which are the rows of `candidates`, likeliest first: ``rank`` (from
+        1), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the
+        database), ``types`` (symbols), ``length`` (objects), ``loglik`` (natural logarithm of the
+        likelihood), ``chance`` and, if north was not known exactly, ``heading`` (degrees to
+        add to the bearings of the query).
+    answer : Decision
+        The cell around which the chance is largest, that chance, and whether it is enough.
+    estimate : PlaceEstimate
+        The place around that cell and the heading, each with its uncertainty.
+    rule : AnswerRule
+        What the decision rests on.
+    region : ndarray of int64
+        Row numbers of the fewest cells that contain 90 % of the chance, likeliest first.
+    posterior : Posterior
+        The chance of every cell.
+    loglik : ndarray of float, shape (n,)
+        Natural logarithm of the likelihood of every cell.
+    explanations : tuple of Explanation
+        Of the first candidates, in their order: which detections are which street objects.
+    known : mapping of str
+        What was known of the place before, in plain values.
+    prior_ratio : float or None
+        How much likelier the query is with what was known than with all cells alike; None if
+        nothing was known.
+
+    Examples
+    --------
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> index = build_index(demo_database, named_noise("generic"))
+    >>> location = locate(index, demo_database.signature(0), top=3)
+    >>> len(location.candidates)
+    3
+    """
+
+    noise: str
+    answer: Decision
+    estimate: PlaceEstimate
+    rule: AnswerRule
+    region: NDArray[np.int64]
+    posterior: Posterior
+    loglik: NDArray[np.floating]
+    explanations: tuple[Explanation, ...] = ()
+    known: Mapping[str, Any] = field(default_factory=dict)
+    prior_ratio: float | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "answer": "yes" if self.answer.given else "cannot tell",
+            "place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
+            "give or take": f"{self.estimate.sigma:.1f} m",
+            f"within {self.rule.radius:g} m": percent(self.answer.mass),
+            "region": f"{len(self.region):,} of {self.cells:,} cells",
+            "candidates": len(self.columns["cell"]),
+            "noise": self.noise,
+            "CRS": crs_label(self.crs),
+        }
+
+    @property
+    def region_km2(self) -> float:
+        """Area of the cells of the region in square kilometres."""
+        return len(self.region) * self.posterior.database.grid.step**2 / 1e6
+
+    @property
+    def cell_id(self) -> int:
+        """Id of the grid cell in which the estimated place is; a database may lack it."""
+        estimate = np.array([[self.estimate.x, self.estimate.y]])
+        return int(cell_ids(*self.posterior.database.grid.cells_at(estimate))[0])
+
+    @property
+    def chances(self) -> NDArray[np.float64]:
+        """The chance of every cell."""
+        return self.posterior.chances
+
+    def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:
+        """Return the rows of the fewest cells that hold a share of the chance, likeliest first."""
+        cells = self.posterior.credible_cells(share)
+        if not np.array_equal(self.posterior.database.cell_ids, database.cell_ids):
+            msg = "the answer was found in another database; give the database that was searched."
+            raise InputError(msg)
+        return cells
+
+    def explore(self) -> MapFrame:
+        """Show where it may have been seen on a map in a notebook (see `location_map`)."""
+        return semsig_gis.show_map(semsig_gis.location_map(self))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but the chances of all cells as plain values that JSON can hold.
+
+        ``place`` is what `PlaceEstimate.to_dict` gives with its ``cell_id``, ``lon``, ``lat``,
+        ``chance`` and ``within_m``. ``threshold`` is None where nothing is answered. ``candidates``
+        has the names of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
+        ones, ``explanation``. Its bearings count from ``north``, as those of the query do;
+        ``prior`` holds `known` and ``ratio``; None if nothing was known.
+        """
+        lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
+        candidates = self._candidate_records()
+        for candidate, why in zip(candidates, self.explanations, strict=False):
+            candidate["explanation"] = why.to_dict(self.north)
+        threshold = self.rule.threshold
+        return {
+            "query": self.query.to_dict(self.taxonomy),
+            "north": self.north.to_dict(),
+            "noise": self.noise,
+            "cells": self.cells,
+            "answered": self.answer.given,
+            "place": {
+                "cell_id": self.cell_id,
+                **self.estimate.to_dict(),
+                "lon": round(lon, 7),
+                "lat": round(lat, 7),
+                "chance": self.answer.mass,
+                "within_m": self.rule.radius,
+            },
+            "threshold": threshold if math.isfinite(threshold) else None,
+            "region": {"share": REGION_SHARE, "cells": len(self.region), "km2": self.region_km2},
+            "entropy_bits": self.posterior.entropy,
+            "prior": None
+            if self.prior_ratio is None
+            else {**self.known, "ratio": self.prior_ratio},
+            "notes": list(self.notes),
+            "crs": self.crs.to_string(),
+            "licenses": list(self.licenses),
+            "candidates": candidates,
+        }
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class LikelihoodLocator:
+    """An index, and how queries to it are answered; `locate` describes the fields.
+
+    A place is also refined if `refined` is None and there are a store and bearings. A `quick`
+    answer looks at cells only from their centres, looks closely at fewer of them, and gives no
+    heading of the place. A `memo` is for a view that grows from query to query.
+    """
+
+    index: LikelihoodIndex
+    north_sigma: float = 0.0
+    log_prior: NDArray[np.float64] | None = None
+    rule: AnswerRule = DEFAULT_RULE
+    top: int = 10
+    store: ObjectStore | None = None
+    refined: bool | None = False
+    explained: int = 0
+    known: Mapping[str, Any] = field(default_factory=dict)
+    north: North = GRID_NORTH
+    quick: bool = False
+    memo: TurnMemo | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        check_top(self.top)
+        if self.refined and self.store is None:
+            msg = (
+                "searching between the viewpoints needs the object store of the database; give it."
+            )
+            raise InputError(msg)
+
+    def locate(
+        self,
+        query: Signature,
+        *,
+        top: int | None = None,
+        scores: CellScores | None = None,
+        scanned: CellScores | None = None,
+    ) -> Location:
+        """Find where a query was seen from, by its `scores` or `scanned` if known already."""
+        scores = scores or self.scores(query, self.log_prior, scanned=scanned)
+        chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
+        store, ratio = self._store_for([query]), None
+        if self.log_prior is not None:
+            alone = self.scores(query, scanned=scanned)
+            ratio = prior_ratio(alone.loglik, self.log_prior)
+        top = top or self.top
+        return self._location(query, scores, chances, top=top, store=store, ratio=ratio)
+
+    def locate_route(
+        self,
+        queries: Sequence[Signature],
+        legs: Sequence[Leg],
+        *,
+        scores: Sequence[CellScores] | None = None,
+        scanned: CellScores | None = None,
+    ) -> tuple[Location, ...]:
+        """Find where the views of a route were seen from; any of them may have no objects.
+
+        Their `scores`, and of the first what was `scanned`, are worked out unless they are known.
+        """
+        if scores is None:
+            first = [self.scores(query, self.log_prior) for query in queries[:1]]
+            scores = first + [self.scores(query) for query in queries[1:]]
+        logliks = [view.loglik for view in scores]
+        database, log_prior = self.index.database, self.log_prior
+        chances = route_posteriors(database, logliks, legs, log_prior=log_prior)
+        store, ratio = self._store_for(queries), None
+        if log_prior is not None:
+            logliks[0] = self.scores(queries[0], scanned=scanned).loglik
+            start = route_posteriors(database, logliks, legs)[0].chances
+            ratio = prior_ratio(np.log(np.maximum(start, TINY)), log_prior)
+        return tuple(
+            self._location(*view, top=self.top, store=store, ratio=ratio)
+            for view in zip(queries, scores, chances, strict=True)
+        )
+
+    def rankings(
+        self,
+        queries: Sequence[Signature],
+        *,
+        memo: DistanceMemo | None = None,  # noqa: ARG002 - there are no distances
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query; see `Locator`."""
+        for query in queries[:1]:
+            self.locate(query, top=1)  # kernels are loaded once
+        for query in queries:
+            start = time.perf_counter()
+            location = self.locate(query, top=1)
+            seconds = time.perf_counter() - start
+            answer, estimate = location.answer, location.estimate
+            scores = -location.loglik.astype(np.float32)
+            first = [answer.cell] if self.refined else _places_like(location)
+            scores[first] = scores.min() - 1.0
+            yield Ranking(
+                scores=scores,
+                best_score=-float(location.loglik[answer.cell]),
+                place=(estimate.x, estimate.y) if self.refined else None,
+                heading=estimate.heading,
+                chance=answer.mass,
+                chances=location.chances,
+                region=location.region,
+                seconds=seconds,
+            )
+
+    def _known(self, query: Signature) -> Signature:
+        """Return a query in the grid, without what is false wherever it was seen from."""
+        query = self.north.to_grid(query)
+        known = query.among(self.index.database.present_codes)
+        return query if known.all() else query.select(known)
+
+    def scan(self, query: Signature) -> CellScores:
+        """Return the scores of all cells by the sum over detections, one by one."""
+        view = self._known(query)
+        return self.index.scores(view, north_sigma=self.north_sigma, memo=self.memo)
+
+    def scores(
+        self,
+        query: Signature,
+        log_prior: NDArray[np.float64] | None = None,
+        *,
+        scanned: CellScores | None = None,
+    ) -> CellScores:
+        """Return the scores of all cells, of the best by one-to-one associations."""
+        return rerank(
+            self.index,
+            self._known(query),
+            scanned or self.scan(query),
+            north_sigma=self.north_sigma,
+            log_prior=log_prior,
+            aside=not self.quick,
+            sample=QUICK_SAMPLE if self.quick else SAMPLE,
+        )
+
+    def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
+        """Return the street objects to refine places with, if they are to be refined."""
+        blind = any(query.bearings is None and len(query) for query in queries)
+        return self.store if self.refined or (self.refined is None and not blind) else None
+
+    def _location(
+        self,
+        query: Signature,
+        scores: CellScores,
+        posterior: Posterior,
+        *,
+        top: int,
+        store: ObjectStore | None,
+        ratio: float | None,
+    ) -> Location:
+        """Return the answer to a query, from the chances of the cells; a store is to refine it."""
+        parts = None
+        known = self._known(query)
+        if store is not None and len(known):
+            parts = self._parts(known, scores, posterior, store)
+            scores, posterior = _with_parts(parts, scores, posterior)
+        answer = self.rule.decide(posterior)
+        radius, sigma = self.rule.radius, self.north_sigma
+        database, noise = self.index.database, self.index.noise
+        estimate = None
+        if parts is not None:
+            xy = answer.x, answer.y
+            estimate = refined_estimate(parts, xy, radius=radius, turned=scores.heading is not None)
+        if estimate is None:
+            estimate = cell_estimate(
+                known,
+                noise,
+                posterior,
+                answer.cell,
+                radius=radius,
+                north_sigma=sigma,
+                turned=not self.quick,
+            )
+        columns = _columns(scores, posterior, min(top, len(scores.loglik)))
+        first = columns["cell"].tolist()[: self.explained if len(known) else 0]
+        return Location(
+            query=query,
+            noise=noise.name,
+            columns=columns,
+            cells=len(scores.loglik),
+            crs=database.crs,
+            taxonomy=database.taxonomy,
+            licenses=database.licenses,
+            notes=(
+                *query_notes(query, database.present_codes, database.taxonomy),
+                *_prior_notes(ratio),
+                *self.north.notes,
+            ),
+            answer=answer,
+            estimate=estimate,
+            rule=self.rule,
+            region=posterior.credible_cells(REGION_SHARE),
+            posterior=posterior,
+            loglik=scores.loglik,
+            explanations=tuple(self._explanation(query, cell, scores, parts) for cell in first),
+            known=self.known,
+            prior_ratio=ratio,
+            north=self.north,
+        )
+
+    def _parts(
+        self, query: Signature, scores: CellScores, posterior: Posterior, store: ObjectStore
+    ) -> Refinement:
+        """Return the chances of the parts of the likeliest cells."""
+        database, chances = posterior.database, posterior.chances
+        cells = posterior.likeliest(KEPT[0])
+        cells = cells[chances[cells] > 0]
+        return refine(
+            query,
+            database.xy[cells],
+            place_noise(self.index.noise, database.grid.step),
+            objects=store.objects,
+            index=store.index,
+            step=database.grid.step,
+            radius=database.spec.radius,
+            north_sigma=self.north_sigma,
+            headings=[None if one is None else one[cells] for one in scores.headings],
+            # All that is known of the cells but for what this query tells.
+            log_prior=np.log(chances[cells]) - scores.loglik[cells],
+            footprints=store.buildings_around(
+                database.xy[cells], distance=database.reach + database.grid.step
+            ),
+        )
+
+    def _explanation(
+        self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
+    ) -> Explanation:
+        """Return what speaks for a cell: at the likeliest part of it, or at its middle."""
+        query = self.north.to_grid(query)
+        database, noise = self.index.database, self.index.noise
+        headings = [0.0 if one is None else float(one[cell]) for one in scores.headings]
+        if self.store is None:
+            return explain_cell(query, cell, noise, database=database, heading=headings)
+        x, y = database.xy[cell].tolist()
+        if parts is not None and len(inside := np.flatnonzero(_owners(parts, database) == cell)):
+            best = inside[parts.loglik[inside].argmax()]
+            x, y = parts.places[best].tolist()
+            headings[0] = float(parts.headings[best])
+            noise = cell_noise(place_noise(noise, database.grid.step), float(parts.sizes[best]))
+        return explain(
+            query,
+            (x, y),
+            noise,
+            objects=self.store.objects,
+            index=self.store.index,
+            radius=database.spec.radius,
+            heading=headings,
+            footprints=self.store.buildings_around(np.array([[x, y]]), distance=database.reach),
+        )
+
+
+class LocateOptions(TypedDict, total=False):
+    """How queries are answered; `locate` describes the options."""
+
+    north_sigma: float
+    log_prior: NDArray[np.float64] | None
+    rule: AnswerRule
+    top: int
+    store: ObjectStore | None
+    refined: bool
+    explained: int
+    known: Mapping[str, Any]
+    north: North
+
+
+def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
+    """Find where a query was seen from, by likelihood.
+
+    Parameters
+    ----------
+    index : LikelihoodIndex
+        The cells and the noise model; for queries from anywhere, not from the middles of cells
+        alone, that is ``cell_noise(noise, step)``.
+    query : Signature
+        What was seen, perhaps nothing; types or bearings may be unknown. Objects of a class that
+        no cell sees are false detections, and the answer says so.
+    **options : LocateOptions
+        ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
+        default and infinite if it is not known; ``log_prior``, shape (n,), what else is known of
+        the place (see `likelihood.priors`). The ``rule`` says when to answer, from a chance of 0.9
+        by default, and ``top`` (10) how many cells to list. The ``store`` holds the street objects
+        behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
+        the chances of the cells are those of their parts together. ``explained`` (0) candidates
+        are explained; without a store, street objects have no identifiers. ``known`` is what the
+        answer repeats of the prior, in plain values. The ``north`` is what the bearings count
+        from, grid north by default.
+
+    Returns
+    -------
+    Location
+        The answer.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range, or what is asked for needs bearings, a store, or another
+        index.
+
+    Examples
+    --------
+    >>> from semsig_gis import ObjectStore, build_index, named_noise
+    >>> index = build_index(demo_database, cell_noise(named_noise("generic"), 10.0))
+    >>> longest = int(demo_database.lengths.argmax())
+    >>> query = demo_database.signature(longest)
+    >>> location = locate(index, query, top=3)
+    >>> int(location.candidates["cell"][0]) == longest, len(location.candidates)
+    (True, 3)
+    >>> store = ObjectStore.of(demo_objects)
+    >>> location = locate(index, query, store=store, refined=True, explained=1)
+    >>> x, y = demo_database.xy[longest]
+    >>> bool(np.hypot(location.estimate.x - x, location.estimate.y - y) < 2.0)
+    True
+    >>> location.explanations[0].counts["matched"] == len(query)
+    True
+    """
+    return LikelihoodLocator(index=index, **options).locate(query)
+
+
+def locate_route(
+    index: LikelihoodIndex,
+    queries: Sequence[Signature],
+    legs: Sequence[Leg],
+    **options: Unpack[LocateOptions],
+) -> tuple[Location, ...]:
+    """Find where the views of a route were seen from, each given all of them.
+
+    Parameters
+    ----------
+    index : LikelihoodIndex
+        As of `locate`.
+    queries : sequence of Signature
+        The views. One may have no objects: that nothing was detected tells something, too.
+    legs : sequence of Leg
+        The ways between them, one fewer; InputError if the numbers do not fit.
+    **options : LocateOptions
+        As of `locate`, for each view; ``log_prior`` is of the place of the first view.
+
+    Returns
+    -------
+    tuple of Location
+        One for each view, in their order.
+
+    Examples
+    --------
+    >>> from semsig_gis import Leg, build_index, named_noise
+    >>> index = build_index(demo_database, named_noise("light"))
+    >>> way = demo_database.xy[200] - demo_database.xy[0]
+    >>> views = [demo_database.signature(0), demo_database.signature(200)]
+    >>> first, last = locate_route(index, views, [Leg(dx=way[0], dy=way[1])])
+    >>> int(first.candidates["cell"][0]), int(last.candidates["cell"][0])
+    (0, 200)
+    """
+    return LikelihoodLocator(index=index, **options).locate_route(queries, legs)
+
+
+def _prior_notes(ratio: float | None) -> tuple[str, ...]:
+    """Return what to say of a prior that the view speaks against."""
+    if ratio is None or ratio > DISAGREEMENT:
+        return ()
+    power = -math.log10(ratio)
+    odds = f"{1.0 / ratio:,.0f}" if power < LARGE_POWER else f"10^{power:.0f}"
+    note = (
+        f"the prior and the view disagree: the view is {odds} times likelier from anywhere in the "
+        "city than from where the prior says."
+    )
+    return (note,)
+
+
+def _columns(scores: CellScores, posterior: Posterior, count: int) -> dict[str, NDArray[Any]]:
+    """Return the likeliest cells, by column."""
+    database, chances = posterior.database, posterior.chances
+    listed = posterior.likeliest(count)
+    columns = {
+        "rank": np.arange(1, count + 1),
+        **candidate_columns(database, listed),
+        "loglik": scores.loglik[listed].astype(np.float64),
+        "chance": chances[listed],
+    }
+    if scores.heading is not None:
+        columns["heading"] = scores.heading[listed].astype(np.float64)
+    return columns
+
+
+def _places_like(location: Location) -> NDArray[np.intp]:
+    """Return the cells that might have been the answer as well, and the answer."""
+    chances, answer = location.chances, location.answer
+    alike = np.flatnonzero(chances == chances[answer.cell])
+    masses = location.posterior.mass_within(location.rule.radius, alike)
+    return np.asarray(alike[np.round(masses, 9) == answer.mass])
+
+
+def _with_parts(
+    parts: Refinement, scores: CellScores, before: Posterior
+) -> tuple[CellScores, Posterior]:
+    """Return the scores and chances of the cells, those of the parts in the place of older ones."""
+    database = before.database
+    owners = _owners(parts, database)
+    cells, rows = np.unique(owners, return_inverse=True)
+    shares = np.bincount(rows, parts.chances)
+    chances = before.chances.copy()
+    chances[cells] = shares * before.chances[cells].sum()
+    means = np.full(len(cells), -np.inf)
+    np.logaddexp.at(means, rows, parts.loglik + 2.0 * np.log(parts.sizes / database.grid.step))
+    loglik = scores.loglik.astype(np.float64)
+    loglik[cells] = means
+    heading = scores.heading
+    if heading is not None:
+        heading = heading.copy()
+        order = np.argsort(parts.chances, kind="stable")  # the likeliest part comes last
+        heading[owners[order]] = parts.headings[order]
+    parted = CellScores(loglik=loglik, headings=(heading, *scores.headings[1:]))
+    return parted, Posterior(database=database, chances=chances)
+
+
+def _owners(parts: Refinement, database: SignatureDatabase) -> NDArray[np.int64]:
+    """Return the row of the cell that each part lies in."""
+    ids = cell_ids(*database.grid.cells_at(parts.places))
+    return np.asarray(np.searchsorted(database.cell_ids, ids))

@@ -1,0 +1,388 @@
+"""What is known of the place before a query is looked at: log-priors by cell, shape (n,).
+
+A prior is one number per cell, the logarithm of a chance up to a constant; minus infinity excludes
+a cell. Priors that do not depend on each other are added.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+import geopandas as gpd
+import numpy as np
+import shapely
+
+from semsig_gis.core.checks import MOST_METRES, require_number
+from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.geometry import to_degrees
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+    from pyproj import CRS
+
+    from semsig_gis.database.database import SignatureDatabase
+
+LEAST_SIGMA_M = 0.01
+FARTHEST = 3.0  # standard deviations of a position, beyond the range of sight, from every cell
+
+METRES, NORTH_EAST, EAST_NORTH = "X,Y", "LAT,LON", "LON,LAT"
+_COORDINATE = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(m|°?\s*[NSEW])?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownPosition:
+    """A position that is known before a query is looked at, in both systems.
+
+    Parameters
+    ----------
+    x, y : float
+        The position in metres, in the CRS of the database.
+    lat, lon : float
+        The same in degrees (WGS 84).
+    sigma : float
+        Standard deviation each way in metres.
+    read_as : {"X,Y", "LAT,LON", "LON,LAT"}
+        What the numbers were taken for.
+
+    Examples
+    --------
+    >>> x, y = demo_database.xy[7].tolist()
+    >>> position = KnownPosition.parse(f"{x},{y},50", demo_database)
+    >>> same = KnownPosition.parse(f"{position.lon},{position.lat},50", demo_database)
+    >>> position.read_as, same.read_as, round(same.x - x, 3)
+    ('X,Y', 'LON,LAT', 0.0)
+    """
+
+    x: float
+    y: float
+    lat: float
+    lon: float
+    sigma: float
+    read_as: str
+
+    @classmethod
+    def parse(cls, text: str, database: SignatureDatabase) -> Self:
+        """Read a position with its deviation, such as ``60.171,24.947,200``.
+
+        The numbers are x and y in the CRS of the database, or degrees in either order, whichever
+        is in the city; ``60.171N,24.947E,200`` and ``386000m,6672000m,200`` say it. InputError if
+        they cannot be read, or not one of these is in the city.
+        """
+        parts = text.split(",")
+        found = [_COORDINATE.fullmatch(part.strip()) for part in parts[:2]]
+        letters = "".join((one[2] or "?")[-1].upper() for one in found if one)
+        readings, sigma = [], math.nan
+        if len(parts) == 3 and len(letters) == 2:  # noqa: PLR2004 - two coordinates and sigma
+            with contextlib.suppress(ValueError):
+                sigma = float(parts[2].strip().removesuffix("m"))
+                values = [float(one[1]) for one in found if one]
+                readings = _readings(values, letters, database.crs)
+        if not readings:
+            msg = (
+                f"the position was given as {text!r}; give {NORTH_EAST},SIGMA in degrees or "
+                f"{METRES},SIGMA in metres of {database.crs.to_string()}, SIGMA in metres."
+            )
+            raise InputError(msg)
+        _check_sigma(sigma)
+        near = []
+        for form, (x, y, lon, lat) in readings:
+            place = cls(x=x, y=y, lat=lat, lon=lon, sigma=sigma, read_as=form)
+            if math.isfinite(x + y) and _is_near(database, (x, y), sigma):
+                near.append(place)
+        if len(near) != 1:
+            read = " and ".join(place.read_as for place in near)
+            msg = (
+                f"the position {text!r} is in the city as {read}; write which is meant, such as "
+                "60.171N,24.947E,200 or 386000m,6672000m,200."
+                if near
+                else f"the position {text!r} is in the city neither as {METRES} nor as "
+                f"{NORTH_EAST} or {EAST_NORTH}: {_extent(database)}; give a place there, or a "
+                "larger deviation."
+            )
+            raise InputError(msg)
+        return near[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON."""
+        return asdict(self)
+
+
+def _readings(
+    values: list[float], letters: str, crs: CRS
+) -> list[tuple[str, tuple[float, float, float, float]]]:
+    """Return the places that two numbers may mean, with x, y, longitude and latitude of each."""
+    first, second = values
+    readings = []
+    if letters in {"??", "MM"}:
+        readings.append((METRES, (first, second, *to_degrees(crs).transform(first, second))))
+    for form, one, other in ((NORTH_EAST, second, first), (EAST_NORTH, first, second)):
+        east, north = list(letters)[:: -1 if form == NORTH_EAST else 1]
+        if east in "?EW" and north in "?NS" and (east == "?") == (north == "?"):
+            lon, lat = (-one if east == "W" else one), (-other if north == "S" else other)
+            if abs(lat) <= 90 and abs(lon) <= 180:  # noqa: PLR2004 - degrees
+                x, y = to_degrees(crs).transform(lon, lat, direction="INVERSE")
+                readings.append((form, (x, y, lon, lat)))
+    return readings
+
+
+def _check_sigma(sigma: float) -> None:
+    require_number(
+        "deviation of the position", sigma, least=LEAST_SIGMA_M, most=MOST_METRES, unit="metres"
+    )
+
+
+def _is_near(database: SignatureDatabase, position: tuple[float, float], sigma: float) -> bool:
+    """Tell whether a position may be that of a cell."""
+    away = np.hypot(*(database.xy - np.asarray(position, dtype=np.float64)).T).min()
+    return bool(away <= FARTHEST * sigma + database.reach)
+
+
+def _extent(database: SignatureDatabase) -> str:
+    """Return where the cells lie, in words, in both systems."""
+    (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
+    bounds = to_degrees(database.crs).transform_bounds(west, south, east, north)
+    low_lon, low_lat, high_lon, high_lat = bounds
+    return (
+        f"the cells lie at x {west:.0f} to {east:.0f}, y {south:.0f} to {north:.0f} "
+        f"({database.crs.to_string()}), which is latitude {low_lat:.4f} to {high_lat:.4f}, "
+        f"longitude {low_lon:.4f} to {high_lon:.4f}"
+    )
+
+
+def area_prior(
+    database: SignatureDatabase,
+    area: shapely.Geometry,
+    *,
+    crs: CRS | str | None = None,
+    outside: float = 0.0,
+) -> NDArray[np.float64]:
+    """Return the prior that the place lies in an area.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    area : shapely.Geometry
+        A polygon or several.
+    crs : pyproj.CRS or str, optional
+        Coordinate reference system of the area; that of the database by default.
+    outside : float, default 0
+        Chance, 0 to below 1, that the place lies outside all the same.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell; every cell inside is as likely as every other, and so outside.
+
+    Raises
+    ------
+    InputError
+        If the area is no polygon, or no cell lies in it.
+    CrsError
+        If the coordinate reference system cannot be read.
+
+    Examples
+    --------
+    >>> prior = area_prior(demo_database, shapely.Point(demo_database.xy[7]).buffer(3.0))
+    >>> np.flatnonzero(np.isfinite(prior)).tolist()
+    [7]
+    """
+    if not 0 <= outside < 1:
+        msg = (
+            f"the chance of a place outside the area is {outside}; give a number from 0 to below 1."
+        )
+        raise InputError(msg)
+    if not isinstance(area, (shapely.Polygon, shapely.MultiPolygon)) or area.is_empty:
+        msg = f"the area is a {type(area).__name__} or empty; give a polygon that is not."
+        raise InputError(msg)
+    shape = area
+    if crs is not None:
+        try:
+            shape = gpd.GeoSeries([area], crs=crs).to_crs(database.crs).iloc[0]
+        except (RuntimeError, ValueError) as error:
+            msg = (
+                f"the coordinate reference system {crs!r} of the area cannot be read; give a code."
+            )
+            raise CrsError(msg) from error
+    shapely.prepare(shape)
+    inside = shapely.intersects_xy(shape, *database.xy.T)
+    if not inside.any():
+        west, south, east, north = shape.bounds
+        msg = (
+            f"no cell lies in the area, which is at x {west:.0f} to {east:.0f}, y {south:.0f} to "
+            f"{north:.0f}: {_extent(database)}; give an area there."
+        )
+        raise InputError(msg)
+    weights = np.where(
+        inside,
+        (1.0 - outside) / int(inside.sum()),
+        outside / max(int((~inside).sum()), 1),
+    )
+    return weight_prior(database, weights)
+
+
+def position_prior(
+    database: SignatureDatabase, position: tuple[float, float], *, sigma: float
+) -> NDArray[np.float64]:
+    """Return the prior that the place is near a position, such as the last one known.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    position : tuple of (float, float)
+        x and y in the CRS of the database.
+    sigma : float
+        Standard deviation each way in metres, from 0.01 to 1,000,000.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, `sigma` is out of its range, or the position is farther from
+        every cell than three deviations and the range of sight.
+
+    Examples
+    --------
+    >>> x, y = demo_database.xy[7].tolist()
+    >>> int(position_prior(demo_database, (x + 2.0, y), sigma=50.0).argmax())
+    7
+    """
+    _check_sigma(sigma)
+    if not all(map(math.isfinite, position)):
+        msg = f"the position is {position}; give x and y in metres."
+        raise InputError(msg)
+    if not _is_near(database, position, sigma):
+        x, y = position
+        msg = (
+            f"the position ({x:.1f}, {y:.1f}) is outside the city: {_extent(database)}; give x and "
+            "y of a place there, or a larger deviation."
+        )
+        raise InputError(msg)
+    away = ((database.xy - np.asarray(position, dtype=np.float64)) ** 2).sum(axis=1)
+    logs = -0.5 * away / sigma**2
+    # From the nearest cell on, so that a position far outside excludes nothing by rounding.
+    return np.asarray(logs - np.logaddexp.reduce(logs))
+
+
+def raster_prior(
+    database: SignatureDatabase, path: str | Path, *, band: int | None = None
+) -> NDArray[np.float64]:
+    """Return the prior of a raster, such as how many people pass or how many photos were taken.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    path : str or Path
+        Any raster that GDAL reads, in any coordinate reference system. Its values, 0 or more, are
+        taken as a density: a cell weighs as much as the mean over it. A value of 0 excludes a
+        cell. Where the raster has no data or ends, nothing is known, and a cell weighs as little
+        as the least of the others that has any weight.
+    band : int, optional
+        Which band to read, from 1; needed only where there are several.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
+    Raises
+    ------
+    SourceError
+        If the file cannot be read as a raster.
+    CrsError
+        If the raster does not say its coordinate reference system.
+    InputError
+        If the raster covers no cell, a value is negative or infinite, all are 0, or the band is
+        not there or not named.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import rasterio
+    >>> x, y = demo_database.xy.min(axis=0) - 5.0
+    >>> options = {"count": 1, "dtype": "uint8", "crs": "EPSG:32631", "width": 2, "height": 1}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = f"{folder}/people.tif"
+    ...     place = rasterio.Affine(150, 0, x, 0, -400, y + 400)
+    ...     with rasterio.open(path, "w", transform=place, **options) as file:
+    ...         file.write(np.array([[1, 3]], np.uint8), 1)
+    ...     chances = np.exp(raster_prior(demo_database, path))
+    >>> round(float(chances.max() / chances.min()), 6)
+    3.0
+    """
+    from semsig_gis.storage.raster import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+
+    weights = raster_at_cells(
+        path,
+        grid=database.grid,
+        columns=database.columns,
+        rows=database.rows,
+        crs=database.crs,
+        band=band,
+    )
+    missing = np.isnan(weights)
+    if missing.all():
+        msg = f"{path} has no data at any cell: {_extent(database)}; give a raster of this area."
+        raise InputError(msg)
+    values = weights[~missing]
+    if np.isinf(values).any() or (values < 0).any():
+        msg = (
+            f"{path} contains values from {values.min():g} to {values.max():g}; give finite "
+            "values, 0 or more."
+        )
+        raise InputError(msg)
+    weights[missing] = values[values > 0].min(initial=values.max())
+    return weight_prior(database, weights)
+
+
+def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.float64]:
+    """Return the prior of a weight for each cell, such as how many people pass it.
+
+    Parameters
+    ----------
+    database : SignatureDatabase
+        The cells.
+    weights : array_like of float, shape (n,)
+        Weights, 0 or more; 0 excludes a cell.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        Log-prior by cell.
+
+    Raises
+    ------
+    InputError
+        If there is not one weight a cell, one is negative or not finite, or all are 0.
+
+    Examples
+    --------
+    >>> prior = weight_prior(demo_database, np.arange(len(demo_database)))
+    >>> float(prior[0]), bool(np.exp(prior).sum().round(9) == 1)
+    (-inf, True)
+    """
+    values = np.asarray(weights, dtype=np.float64)
+    if values.shape != (len(database),):
+        msg = f"{values.size} weights for {len(database)} cells were given; give one for each cell."
+        raise InputError(msg)
+    if not np.isfinite(values).all() or (values < 0).any():
+        msg = "a weight of the cells is negative or not finite; give finite numbers, 0 or more."
+        raise InputError(msg)
+    total = values.sum()
+    if not total > 0:
+        msg = "the prior excludes every cell of the database; widen it."
+        raise InputError(msg)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(values / total))

@@ -1,0 +1,386 @@
+"""Learn a noise model from detections whose true place is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.database import SignatureDatabase, views_in
+from semsig_gis.database.sightings import views_at
+from semsig_gis.localization.noise.fit import (
+    ALL,
+    KNOTS,
+    LEAST,
+    estimated_rates,
+    expected_counts,
+    fades,
+    fading_at_knots,
+    gather_evidence,
+    model_change,
+    next_model,
+)
+from semsig_gis.localization.noise.model import NoiseSpec
+from semsig_gis.observation.sentences import RADIUS_M, SEEN, parse_view
+from semsig_gis.observation.view import View
+from semsig_gis.storage.rows import read_rows, row_value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.database.sightings import Views
+    from semsig_gis.localization.noise.fit import Evidence
+    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.storage.rows import Row
+
+MOST_ROUNDS = 500
+SETTLED = 1e-4  # largest change of a log-odds or logarithm
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sample:
+    """What was detected, perhaps nothing, at a known place.
+
+    The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
+    `core.geometry.cell_ids`). The signature, which may be a `View`, must have types, all known, or
+    scores, and bearings; how far north is off in it counts as bearing noise.
+    """
+
+    signature: Signature
+    xy: tuple[float, float] | None = None
+    cell_id: int | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if (self.xy is None) == (self.cell_id is None):
+            msg = "a sample needs its true place; give either its x and y or its cell_id."
+            raise InputError(msg)
+        if self.xy is not None and not np.isfinite(self.xy).all():
+            msg = f"the place of a sample is {self.xy}; give two finite coordinates in metres."
+            raise InputError(msg)
+        view = View.of(self.signature)
+        if (view.codes is None and view.scores is None) or view.bearings is None:
+            msg = "a sample needs the types and the bearings of its detections; give both."
+            raise InputError(msg)
+        if (view.class_scores()[:, WILDCARD] == 1).any():
+            msg = "a sample has a detection of unknown class; give its class, or leave it out."
+            raise InputError(msg)
+        if any(math.isinf(photo.north_sigma or 0.0) for photo in view.photos):
+            msg = (
+                "a sample has a photo of unknown heading; give the heading, or leave the sample "
+                "out."
+            )
+            raise InputError(msg)
+
+
+def read_samples(path: str | Path, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> list[Sample]:
+    r"""Read detections with their true places.
+
+    Parameters
+    ----------
+    path : str or Path
+        A CSV file with the columns ``types`` (symbols such as ``DDB``), ``bearings`` (degrees,
+        with blanks, commas or semicolons between them) and either ``x`` and ``y`` or
+        ``cell_id``; or JSON lines with the same names (suffix ``.jsonl``, ``.ndjson`` or
+        ``.json``), where bearings may be a list. What was seen may be told in any other way that
+        `parse_view` reads. Other columns are left alone; a row without detections is a sample too.
+    taxonomy : Taxonomy
+        Classes that the symbols belong to.
+    radius : float, default 30
+        Visibility range of the city in metres, of which near, middle and far are thirds.
+
+    Returns
+    -------
+    list of Sample
+        One a row.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no rows, or a row cannot be used; with its number.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from semsig_gis import paper_taxonomy
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "seen.csv")
+    ...     _ = path.write_text("x,y,types,bearings\n500000,5400000,DB,200 -10\n")
+    ...     sample = read_samples(path, taxonomy=paper_taxonomy())[0]
+    >>> sample.xy, sample.signature.bearings.tolist()
+    ((500000.0, 5400000.0), [200.0, 350.0])
+    """
+    rows = read_rows(path, lambda row: _sample(row, taxonomy, radius), what="sample")
+    return [sample for _, sample in rows]
+
+
+def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
+    told = {name for name in SEEN if row.get(name) is not None}
+    for name in ("types", "bearings"):
+        if told <= {"types", "bearings"} - {name}:
+            msg = f"it has no {name}"
+            raise InputError(msg)
+    signature = parse_view(row, taxonomy=taxonomy, radius=radius)
+    x, y, cell = (row_value(row, name) for name in ("x", "y", "cell_id"))
+    if x is not None and y is not None:
+        return Sample(signature=signature, xy=(float(x), float(y)))
+    return Sample(signature=signature, cell_id=None if cell is None else int(cell))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class NoiseEstimate(Displayed):
+    """A noise model that was learnt, and how well it is known.
+
+    `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
+    a full turn, ``bearing_sigma`` in degrees and, with ranges, ``range_sigma``) and each class, and
+    ``"all"`` together: ``value`` as in the model, ``own``, what the samples of the class alone say,
+    with the intervals ``low_90`` to ``high_95``, and how many ``samples`` it rests on. Where
+    detection falls with distance, it is the chance at ``distance`` metres, with rows ``fading`` for
+    the chances farther away. `confusion` holds the expected number of
+    detected objects by true class (rows) and given class (columns). Nothing is in sight of the
+    places of `skipped` samples. `log_likelihood` is of all detections under the model.
+    """
+
+    spec: NoiseSpec
+    rates: pd.DataFrame
+    confusion: pd.DataFrame
+    samples: int
+    objects: int
+    detections: int
+    skipped: int
+    rounds: int
+    log_likelihood: float
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "samples": self.samples,
+            "objects": self.objects,
+            "detections": self.detections,
+            "skipped": self.skipped,
+            "detection": f"{self.spec.detection:.3g}",
+            "misnamed": f"{self.spec.misnamed:.3g}",
+            "clutter": f"{self.spec.clutter:.3g}",
+            "bearing": f"±{self.spec.bearing_sigma:.3g}°",
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; ``confusion`` is by true class, then given class."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        plain = self.rates.astype(object).where(self.rates.notna(), None)
+        return values | {
+            "spec": self.spec.to_dict(),
+            "rates": plain.to_dict("records"),
+            "confusion": self.confusion.to_dict("index"),
+        }
+
+
+def learn_noise(
+    samples: Sequence[Sample],
+    city: SignatureDatabase | StreetObjects,
+    *,
+    radius: float = 30.0,
+    position_sigma: float = 0.0,
+    footprints: Footprints | None = None,
+    name: str = "learned",
+) -> NoiseEstimate:
+    """Estimate a noise model from detections whose true place is known.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        The detections; some hundred signatures serve well.
+    city : SignatureDatabase or StreetObjects
+        What there is to see. With a database a sample is looked up by its cell, and seen from
+        the middle of it; with street objects it is seen from where it was.
+    radius : float, default 30
+        Visibility range in metres, with street objects; a database has its own.
+    position_sigma : float, default 0
+        Known standard deviation in metres, each way, of the true places given (with a database,
+        of the place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). What it turns
+        the bearings by is not counted as bearing noise.
+    footprints : Footprints, optional
+        Buildings, with street objects; what they hide is not seen.
+    name : str, default "learned"
+        Name of the model.
+
+    Returns
+    -------
+    NoiseEstimate
+        The model with intervals.
+
+    Raises
+    ------
+    InputError
+        If there are no samples, none can be used, or there is nothing to see or no detection.
+
+    Notes
+    -----
+    A class with n samples and the rate r of its own is given
+    ``(n * r + 8 * overall) / (n + 8)``, that is, the overall rate counts for eight samples; the
+    squares of deviations likewise, and a row of the confusion is filled up with eight samples
+    that are misnamed as often as all are, each other class alike. See
+    `likelihood.noise.fit` for the intervals.
+
+    Examples
+    --------
+    >>> from semsig_gis.localization.noise.learn import Sample
+    >>> cells = demo_database.cell_ids[:50].tolist()
+    >>> seen = [
+    ...     Sample(signature=demo_database.signature(row), cell_id=cell)
+    ...     for row, cell in enumerate(cells)
+    ... ]
+    >>> learned = learn_noise(seen, demo_database).spec
+    >>> learned.detection > 0.95, learned.clutter < 0.1
+    (True, True)
+    """
+    if not (math.isfinite(position_sigma) and position_sigma >= 0):
+        msg = f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
+        raise InputError(msg)
+    views, used = _true_views(samples, city, radius, footprints)
+    detected = [samples[row].signature for row in used]
+    reach = city.spec.radius if isinstance(city, SignatureDatabase) else radius
+    evidence = gather_evidence(
+        views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
+    )
+    model, rounds = _fitted(evidence, evidence.start, fading=False)
+    counts = expected_counts(evidence, model)
+    fading = fades(evidence, counts)
+    if fading:
+        model, more = _fitted(evidence, model, fading=True)
+        counts, rounds = expected_counts(evidence, model), rounds + more
+    rates = estimated_rates(evidence, counts, model, fading=fading)
+    return NoiseEstimate(
+        spec=_spec(evidence, rates, model, name, radius=reach, fading=fading),
+        rates=rates,
+        confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
+        samples=len(used),
+        objects=len(views.codes),
+        detections=len(evidence.seen.bearings),
+        skipped=len(samples) - len(used),
+        rounds=rounds,
+        log_likelihood=counts.log_likelihood,
+    )
+
+
+def _fitted(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
+    """Return the model that rounds of the fit settle on, and how many there were."""
+    rounds, change = 0, math.inf
+    while change >= SETTLED and rounds < MOST_ROUNDS:
+        counts = expected_counts(evidence, model)
+        old, model = model, next_model(evidence, counts, model, fading=fading)
+        change = model_change(old, model)
+        rounds += 1
+    return model, rounds
+
+
+def _true_views(
+    samples: Sequence[Sample],
+    city: SignatureDatabase | StreetObjects,
+    radius: float,
+    footprints: Footprints | None,
+) -> tuple[Views, list[int]]:
+    """Return what there was to see in the photos of samples that can be used, and which these are.
+
+    A sample of several photos sees all there is in each of them.
+    """
+    if not samples:
+        msg = "there are no samples to learn from; give detections with their true places."
+        raise InputError(msg)
+    photos = np.array([len(View.of(sample.signature).photos) for sample in samples])
+    if isinstance(city, SignatureDatabase):
+        true_ids = np.array([_cell_id(sample, city) for sample in samples])
+        cells = np.minimum(np.searchsorted(city.cell_ids, true_ids), len(city) - 1)
+        used = np.flatnonzero(city.cell_ids[cells] == true_ids)
+        views = views_in(city, np.repeat(cells[used], photos[used]))
+    else:
+        xy = np.array([sample.xy for sample in samples if sample.xy is not None])
+        if len(xy) < len(samples):
+            msg = "a sample gives only its cell; give x and y, or a database instead of objects."
+            raise InputError(msg)
+        index = ObjectIndex(city.xy)
+        looks = np.repeat(xy, photos, axis=0)
+        views = views_at(city, looks, index=index, radius=radius, footprints=footprints)
+        # Where nothing is seen is left out, as a cell that sees nothing is not in a database.
+        full = np.flatnonzero(views.lengths)
+        used = np.unique(np.repeat(np.arange(len(samples)), photos)[full])
+        views = replace(views, offsets=np.append(0, views.offsets[full + 1]))
+    if len(used) == 0:
+        msg = (
+            f"none of the {len(samples)} samples lies where an object of the city is in sight; "
+            f"give places in its coordinate reference system ({city.crs.to_string()}), or its "
+            "cell ids."
+        )
+        raise InputError(msg)
+    return views, used.tolist()
+
+
+def _cell_id(sample: Sample, database: SignatureDatabase) -> int:
+    if sample.cell_id is not None:
+        return sample.cell_id
+    return int(cell_ids(*database.grid.cells_at(np.array([sample.xy])))[0])
+
+
+def _spec(
+    evidence: Evidence,
+    rates: pd.DataFrame,
+    model: NoiseTable,
+    name: str,
+    *,
+    radius: float,
+    fading: bool,
+) -> NoiseSpec:
+    """Return the model as a specification; `radius` is the range of classes that have none."""
+    pooled = rates[rates["class"] == ALL].drop_duplicates("quantity")
+    overall = pooled.set_index("quantity")["value"].to_dict()
+
+    def by_class(values: NDArray[np.float64]) -> dict[str, float]:
+        return dict(zip(evidence.names, values.tolist(), strict=True))
+
+    clutter = float(model.clutter.sum())
+    trials = rates[(rates["class"] != ALL) & (rates["quantity"] == "detection")]["samples"]
+    weights = np.maximum(trials.to_numpy(), LEAST)
+    near = np.average(1.0 - model.missed[0], weights=weights)
+    spec = NoiseSpec(
+        detection=float(near) if fading else overall["detection"],
+        detection_by_class=by_class(1.0 - model.missed[0]),
+        misnamed=overall["misnamed"],
+        confusion={
+            name: by_class(row / row.sum())
+            for name, row in zip(evidence.names, model.named[0], strict=True)
+        },
+        clutter=clutter,
+        clutter_shares=by_class(model.clutter / clutter),
+        bearing_sigma=overall["bearing_sigma"],
+        bearing_sigma_by_class=by_class(model.sigma),
+        position_sigma=model.position_sigma,
+        name=name,
+    )
+    if "range_sigma" in overall:
+        errors = by_class(model.range_sigma)
+        spec = replace(spec, range_sigma=overall["range_sigma"], range_sigma_by_class=errors)
+    if fading:
+        shares = fading_at_knots(model)
+        mean = np.minimum(np.average(shares, axis=0, weights=weights), 1.0)
+        tables = {ALL: (radius, mean)}
+        tables |= dict(zip(evidence.names, zip(model.ranges, shares, strict=True), strict=True))
+        points = {
+            name: tuple(zip((KNOTS * limit).tolist(), row.tolist(), strict=True))
+            for name, (limit, row) in tables.items()
+        }
+        spec = replace(spec, fading=points)
+    return spec

@@ -1,0 +1,467 @@
+"""Noise models: how a detector fails, as the likelihood method assumes.
+
+A detector misses objects, gives some another class, invents some, and is a few degrees out.
+`NoiseSpec` says how often; `NoiseMixture` says that it is one of several models, unknown which.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core.geometry import HALF_TURN
+from semsig_gis.core.text import percent
+from semsig_gis.storage.toml import read_values, toml_text
+from semsig_gis.storage.whole import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+MOST_ERROR = 3.0
+MOST = 1000  # objects in a signature, and metres of the place
+BY_CLASS = (
+    *("detection_by_class", "misnamed_by_class"),
+    *("bearing_sigma_by_class", "range_sigma_by_class"),
+)
+ALL = "all"
+"""What stands for all classes that have no name of their own."""
+ROUNDING = 1e-6  # of sums of shares, and of squares of metres
+
+
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class NoiseSpec(Displayed):
+    """How a detector fails.
+
+    Parameters
+    ----------
+    detection : float, default 0.9
+        Chance that an object in range is detected, 0 to 1.
+    misnamed : float, default 0.05
+        Share of the detected objects that are given another class, each other class with equal
+        chance; 0 to 1.
+    confusion : mapping of str to mapping of str to float, optional
+        For some or all classes the chance of each class that a detected object is given, the
+        right one among them; each row sums to one. It goes before `misnamed`.
+    clutter : float, default 1.0
+        Expected number of false objects in a signature, 0 or more, all round alike.
+    clutter_shares : mapping of str to float, optional
+        Share of each class in the false objects; sums to one. Equal shares by default.
+    bearing_sigma : float, default 5.0
+        Standard deviation of a bearing in degrees, above 0 and up to 180.
+    detection_by_class, misnamed_by_class, bearing_sigma_by_class : mapping of str to float
+        The same for single classes, by the name of the class; optional.
+    position_sigma : float, default 0.0
+        Standard deviation in metres of where in its cell the observer stands, each way; it turns
+        the bearings of near objects more than those of far ones.
+    missed_each, misnamed_each : float, default 0.0
+        Expected number of further objects that are missed or misnamed in every signature, few or
+        many: an object among L survives m draws with chance ``(1 - 1/L) ** m`` (the source's
+        distortion, section 4.2).
+    range_sigma : float, default 0.25
+        Relative error of a rough distance: the standard deviation of its logarithm, above 0 and up
+        to 3. `range_sigma_by_class` has it for single classes.
+    fading : mapping of str to sequence of (float, float), optional
+        How the chance of detection falls with the distance, for classes by name, or ``all``
+        others: pairs of metres, ascending, and of the share of `detection` that is left there, 0 to
+        1; straight lines between, and the last share beyond.
+    name : str, default "custom"
+        Name to print.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range or a row of shares does not sum to one.
+
+    Examples
+    --------
+    >>> NoiseSpec(detection=0.8, detection_by_class={"bench": 0.6}).bearing_sigma
+    5.0
+    >>> NoiseSpec(detection=1.2)
+    Traceback (most recent call last):
+    ...
+    semsig_gis.core.errors.InputError: detection of the noise is 1.2; give a chance from 0 to 1.
+    """
+
+    detection: float = 0.9
+    detection_by_class: Mapping[str, float] = field(default_factory=dict)
+    misnamed: float = 0.05
+    misnamed_by_class: Mapping[str, float] = field(default_factory=dict)
+    confusion: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    clutter: float = 1.0
+    clutter_shares: Mapping[str, float] = field(default_factory=dict)
+    bearing_sigma: float = 5.0
+    bearing_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
+    position_sigma: float = 0.0
+    missed_each: float = 0.0
+    misnamed_each: float = 0.0
+    range_sigma: float = 0.25
+    range_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
+    fading: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
+    name: str = "custom"
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not isinstance(self.name, str):
+            msg = f"name of the noise model is {self.name!r}; give a text."
+            raise InputError(msg)
+        for label, number in _NUMBERS.items():
+            number.check(label, getattr(self, label))
+        for label in BY_CLASS:
+            number = _NUMBERS[label.removesuffix("_by_class")]
+            for name, value in _table(label, getattr(self, label)).items():
+                number.check(f"{label} {name!r}", value)
+        for name, row in _table("confusion", self.confusion).items():
+            _check_shares(f"confusion row {name!r}", _table(f"confusion row {name!r}", row))
+        for name, points in _table("fading", self.fading).items():
+            _check_fading(name, points)
+        if _table("clutter_shares", self.clutter_shares):
+            _check_shares("clutter_shares", self.clutter_shares)
+
+    def _facts(self) -> dict[str, object]:
+        tables = (*BY_CLASS, "confusion", "clutter_shares", "fading")
+        return {
+            "name": self.name,
+            "detection": f"{self.detection:.3g}",
+            "misnamed": f"{self.misnamed:.3g}",
+            "clutter": f"{self.clutter:.3g}",
+            "bearing": f"±{self.bearing_sigma:.3g}°",
+            "place": f"±{self.position_sigma:.3g} m",
+            "range": f"±{100 * self.range_sigma:.3g} %",
+            "missed each": f"{self.missed_each:.3g}",
+            "misnamed each": f"{self.misnamed_each:.3g}",
+            "by class": ", ".join(name for name in tables if getattr(self, name)) or "nothing",
+        }
+
+    @property
+    def specs(self) -> tuple[NoiseSpec, ...]:
+        """The model itself, the only one, as in a mixture of one."""
+        return (self,)
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """Its chance, which is one."""
+        return (1.0,)
+
+    def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseSpec:
+        """Return the model after a change, which a mixture makes in each of its models."""
+        return change(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON, that `noise_from_dict` reads."""
+        values: dict[str, Any] = _plain(asdict(self))
+        return values
+
+
+@dataclass(frozen=True, repr=False, slots=True, kw_only=True)
+class NoiseMixture(Displayed):
+    """Noise that is known only to follow one of several models.
+
+    The likelihood of a cell is the weighted sum over the models: the level is as unknown as the
+    place.
+
+    Parameters
+    ----------
+    specs, weights : tuple of NoiseSpec, and tuple of float
+        The models, at least one, and the chance of each, above 0; chances sum to one.
+    name : str, default "custom"
+        Name to print.
+
+    Raises
+    ------
+    InputError
+        If there is no model, or the weights do not fit.
+
+    Examples
+    --------
+    >>> [spec.name for spec in named_noise("generic").specs]
+    ['light', 'medium', 'strong']
+    """
+
+    specs: tuple[NoiseSpec, ...]
+    weights: tuple[float, ...]
+    name: str = "custom"
+
+    def __post_init__(self) -> None:  # noqa: D105
+        if not self.specs or len(self.specs) != len(self.weights):
+            msg = (
+                f"{len(self.specs)} noise models and {len(self.weights)} weights were given; "
+                "give at least one model and one weight for each."
+            )
+            raise InputError(msg)
+        named = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
+        _check_shares("weights of the mixture", named)
+        if not all(weight > 0 for weight in self.weights):
+            msg = f"weights of the mixture are {self.weights}; leave out models without weight."
+            raise InputError(msg)
+
+    def _facts(self) -> dict[str, object]:
+        models = zip(self.specs, self.weights, strict=True)
+        return {
+            "name": self.name,
+            "models": ", ".join(f"{spec.name} {percent(weight, 0)}" for spec, weight in models),
+        }
+
+    def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseMixture:
+        """Return the mixture after a change of each of its models."""
+        return replace(self, specs=tuple(map(change, self.specs)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the mixture as plain values, ready for JSON, that `noise_from_dict` reads."""
+        return {
+            "name": self.name,
+            "weights": list(self.weights),
+            "specs": [spec.to_dict() for spec in self.specs],
+        }
+
+
+Noise = NoiseSpec | NoiseMixture
+"""Any noise model."""
+
+
+def noise_from_dict(values: Mapping[str, Any]) -> Noise:
+    """Read a noise model from plain values, the inverse of ``to_dict``.
+
+    Values are the fields of `NoiseSpec`, each optional, or those of a mixture of plain models.
+    """
+    if not isinstance(values, Mapping):
+        msg = f"a noise model is {values!r}; give a table of its fields."
+        raise InputError(msg)
+    kind = NoiseMixture if "specs" in values else NoiseSpec
+    labels = [item.name for item in fields(kind)]
+    for name in values:
+        if name not in labels:
+            hint = nearest_name(str(name), labels)
+            msg = f"a noise model has no field {name!r}{hint}; its fields are {', '.join(labels)}."
+            raise InputError(msg)
+    if kind is NoiseSpec:
+        return NoiseSpec(**values)
+    try:
+        models = list(map(noise_from_dict, values["specs"]))
+        weights = tuple(map(float, values["weights"]))
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"a mixture of noise models cannot be used ({error}); give lists specs and weights."
+        raise InputError(msg) from error
+    specs = tuple(model for model in models if isinstance(model, NoiseSpec))
+    if len(specs) < len(models):
+        msg = "a mixture of noise models contains another mixture; give plain models."
+        raise InputError(msg)
+    return NoiseMixture(**{**values, "specs": specs, "weights": weights})
+
+
+def cell_noise(noise: Noise, step: float) -> Noise:
+    """Return a noise model for queries from anywhere in a cell, not only from its centre.
+
+    Parameters
+    ----------
+    noise : NoiseSpec or NoiseMixture
+        The model for a known place.
+    step : float
+        Side of the cells in metres.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way, in
+        quadrature.
+
+    Examples
+    --------
+    >>> round(cell_noise(NoiseSpec(), 10.0).position_sigma, 2)
+    2.89
+    """
+
+    def widened(spec: NoiseSpec) -> NoiseSpec:
+        sigma = math.hypot(spec.position_sigma, step / math.sqrt(12.0))
+        return replace(spec, position_sigma=sigma)
+
+    return noise.changed(widened)
+
+
+def place_noise(noise: Noise, step: float) -> Noise:
+    """Return the noise model for a known place, the inverse of `cell_noise`.
+
+    Raises `InputError` if the model has too little uncertainty of the place to take away.
+    """
+
+    def narrowed(spec: NoiseSpec) -> NoiseSpec:
+        variance = spec.position_sigma**2 - step**2 / 12.0
+        if variance < -ROUNDING:
+            msg = (
+                f"noise model {spec.name!r} is for queries from the centres of cells; build the "
+                f"index for cell_noise(noise, {step:g}), which is for queries from anywhere in "
+                "them."
+            )
+            raise InputError(msg)
+        return replace(spec, position_sigma=0.0 if variance < ROUNDING else math.sqrt(variance))
+
+    return noise.changed(narrowed)
+
+
+def named_noise(name: str) -> Noise:
+    """Return a noise model by name.
+
+    Parameters
+    ----------
+    name : {"light", "medium", "strong", "generic", "by-hand"}
+        A level of the source's distortion, ``"generic"`` where the level is not known, or
+        ``"by-hand"`` for a person, who marks or names some of the objects in sight: nine, six or
+        three in ten.
+
+    Returns
+    -------
+    NoiseSpec or NoiseMixture
+        The model.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such model.
+
+    Examples
+    --------
+    >>> named_noise("medium").clutter
+    2.3333333333333335
+    """
+    if name not in NOISES:
+        *most, last = NOISES
+        hint = nearest_name(name, NOISES)
+        msg = f"{name!r} is not a noise model; give {', '.join(most)} or {last}{hint}."
+        raise UnknownNameError(msg)
+    return NOISES[name]
+
+
+@dataclass(frozen=True, slots=True)
+class _Number:
+    """A kind of number, in words and as a test, which NaN and infinity fail."""
+
+    words: str
+    fits: Callable[[float], bool]
+
+    def check(self, label: str, value: object) -> None:
+        """Refuse anything else."""
+        number = value if isinstance(value, (int, float)) else math.nan
+        if isinstance(value, bool) or not self.fits(number):
+            msg = f"{label} of the noise is {value!r:.40}; give {self.words}."
+            raise InputError(msg)
+
+
+_CHANCE = _Number("a chance from 0 to 1", lambda value: 0 <= value <= 1)
+_AMOUNT = _Number(f"a number from 0 to {MOST:,}", lambda value: 0 <= value <= MOST)
+_DEGREES = _Number("degrees above 0 and up to 180", lambda value: 0 < value <= HALF_TURN)
+
+
+_NUMBERS = MappingProxyType(
+    {
+        "detection": _CHANCE,
+        "misnamed": _CHANCE,
+        "clutter": _AMOUNT,
+        "bearing_sigma": _DEGREES,
+        "position_sigma": _AMOUNT,
+        "missed_each": _AMOUNT,
+        "misnamed_each": _AMOUNT,
+        "range_sigma": _Number(
+            "a number above 0 and up to 3", lambda value: 0 < value <= MOST_ERROR
+        ),
+    }
+)
+
+
+def _check_fading(name: str, points: object) -> None:
+    """Refuse an invalid table of shares by distance."""
+    try:
+        table = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        table = np.empty(0)
+    fits = table.ndim == 2 and table.shape[1] == 2 and len(table)  # noqa: PLR2004 - pairs
+    if fits:
+        metres, shares = table.T
+        fits = (np.diff(metres, prepend=-1e-9) > 0).all() and ((shares >= 0) & (shares <= 1)).all()
+    if not fits:
+        msg = (
+            f"fading of the noise for {name!r} is {points!r:.60}; give pairs of metres, ascending, "
+            "and a share from 0 to 1."
+        )
+        raise InputError(msg)
+
+
+def _check_shares(label: str, shares: Mapping[str, float]) -> None:
+    """Refuse shares that are not chances or do not sum to one."""
+    for name, value in shares.items():
+        _CHANCE.check(f"{label}, {name!r},", value)
+    total = math.fsum(shares.values())
+    if abs(total - 1.0) > ROUNDING:
+        msg = f"{label} of the noise sums to {total:.6g}; give shares that sum to 1."
+        raise InputError(msg)
+
+
+def _table(label: str, value: object) -> Mapping[str, Any]:
+    """Return a mapping by class, or refuse what is not one."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        msg = f"{label} of the noise is {value!r}; give a table by the names of the classes."
+        raise InputError(msg)
+    return value
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return mappings of any kind as dictionaries."""
+    if isinstance(value, Mapping):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    return value
+
+
+def _level(name: str, occurrences: int) -> NoiseSpec:
+    """Return the model of one of the source's levels: each occurrence is one of three kinds."""
+    each = occurrences / 3
+    sure = NoiseSpec(detection=1.0, misnamed=0.0, name=name)
+    return replace(sure, clutter=each, missed_each=each, misnamed_each=each)
+
+
+def _alike(name: str, specs: tuple[NoiseSpec, ...]) -> NoiseMixture:
+    """Return a mixture of models that are equally likely."""
+    return NoiseMixture(specs=specs, weights=(1 / len(specs),) * len(specs), name=name)
+
+
+_LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
+# A person leaves out much or little, hardly errs about the rest, and makes nothing up.
+_MARKED = tuple(
+    NoiseSpec(
+        detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:g} marked"
+    )
+    for share in (0.9, 0.6, 0.3)
+)
+NOISES: Mapping[str, Noise] = MappingProxyType(
+    {
+        **{spec.name: spec for spec in _LEVELS},
+        "generic": _alike("generic", _LEVELS),
+        "by-hand": _alike("by-hand", _MARKED),
+    }
+)
+"""The noise models that have a name."""
+
+
+def open_noise(path: str | Path) -> Noise:
+    """Read a noise model from a JSON file, or a TOML file with the suffix ``.toml``."""
+    return noise_from_dict(read_values(path, "noise"))
+
+
+def save_noise(noise: Noise, path: str | Path) -> None:
+    """Write a noise model as TOML (suffix ``.toml``) or JSON; the file appears whole, by rename."""
+    values = noise.to_dict()
+    if Path(path).suffix.lower() == ".toml":
+        text = toml_text(values)
+    else:
+        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")

@@ -1,0 +1,312 @@
+"""A noise model as tables of numbers, for the classes and lengths of one database.
+
+By these tables a query is compared with what is seen from some places.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from semsig_gis.core.errors import InputError, nearest_name
+from semsig_gis.core.signature import DISTANCE_UNITS
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.localization.noise.model import ALL
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.localization.noise.model import Noise, NoiseSpec
+
+# No chance is quite nought or one: a model that excludes something is wrong one day, and then
+# excludes the true place.
+LEAST_CHANCE = 1e-3
+MOST_CHANCE = 0.95
+LEAST_CLUTTER = 1e-3
+FULL_TURN = 360.0
+WIDEST_SIGMA = 180.0
+LONGEST_TABLE = 400  # lengths that have chances of their own; longer signatures take the last
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoiseTable:
+    """One noise model for k classes, and signatures of every length up to a longest.
+
+    By length and class, shape (longest + 1, k), `missed` is the chance that an object is missed and
+    `misnamed` that it is given another class, once detected. `others`, shape (k, k), says which:
+    rows sum to one, the diagonal is zero. `clutter` is in false objects per signature by class,
+    `sigma` the standard deviation of a bearing in degrees by class, `range_sigma` that of the
+    logarithm of a rough distance, and `position_sigma` that of the observer's place in metres.
+    `ranges` is from how far a class is seen, in metres, and `fading`, shape (k, 256), what is left
+    of its detection at each distance unit, of which 255 are `reach` metres.
+    """
+
+    codes: NDArray[np.uint8]
+    missed: NDArray[np.float64]
+    misnamed: NDArray[np.float64]
+    others: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    range_sigma: NDArray[np.float64]
+    position_sigma: float
+    ranges: NDArray[np.float64]
+    fading: NDArray[np.float64]
+    reach: float
+
+    @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """Metres of each distance unit, shape (256,); the nearest is above 0."""
+        return np.asarray(np.maximum(np.arange(256), 0.5) * (self.reach / DISTANCE_UNITS))
+
+    @cached_property
+    def inside(self) -> NDArray[np.float64]:
+        """Chance that an object in range of the place is in range of the observer, shape (k, 256).
+
+        Who stands elsewhere in the cell sees other objects at the edge of range than its middle.
+        """
+        if self.position_sigma == 0:
+            return np.ones((len(self.codes), DISTANCE_UNITS + 1))
+        ranges, row_of = np.unique(self.ranges, return_inverse=True)  # most classes have the same
+        beyond = (self.distances - ranges[:, None]) / (self.position_sigma * math.sqrt(2.0))
+        return np.asarray(0.5 * np.vectorize(math.erfc, otypes=[np.float64])(beyond))[row_of]
+
+    @cached_property
+    def seen(self) -> NDArray[np.float64]:
+        """What is left of the detection of an object by class and distance unit, shape (k, 256)."""
+        return np.asarray(self.fading * self.inside)
+
+    @cached_property
+    def left(self) -> NDArray[np.float64]:
+        """What the observer does not see as it is out of range, shape (k, 256)."""
+        return np.asarray(self.fading * (1.0 - self.inside))
+
+    @cached_property
+    def density(self) -> NDArray[np.float64]:
+        """False objects a degree by class, and of any class, shape (k + 1,)."""
+        return np.append(self.clutter, self.clutter.sum()) / FULL_TURN
+
+    @cached_property
+    def detected(self) -> NDArray[np.float64]:
+        """Chance of detection of what is near, shape (longest + 1, k)."""
+        return 1.0 - self.missed
+
+    @cached_property
+    def odds(self) -> NDArray[np.float64]:
+        """Chance of detection over the chance of a miss, shape (longest + 1, k)."""
+        return (1.0 - self.missed) / self.missed
+
+    @cached_property
+    def named(self) -> NDArray[np.float64]:
+        """Chance of each name, by length, class and name, shape (longest + 1, k, k)."""
+        names = self.misnamed[:, :, None] * self.others
+        kinds = np.arange(len(self.codes))
+        names[:, kinds, kinds] = 1.0 - self.misnamed
+        return np.asarray(names)
+
+    @cached_property
+    def naming(self) -> NDArray[np.float64]:
+        """`named`, and one for a class that is not known, over `density`, (..., k, k + 1)."""
+        anything = np.ones((*self.missed.shape, 1))
+        return np.asarray(np.concatenate([self.named, anything], axis=2) / self.density)
+
+    @cached_property
+    def row_of(self) -> NDArray[np.int64]:
+        """Row of each class code, shape (256,); k for `WILDCARD`, -1 for other codes."""
+        rows = np.full(256, -1)
+        rows[self.codes] = np.arange(len(self.codes))
+        rows[WILDCARD] = len(self.codes)
+        return rows
+
+    @cached_property
+    def sigmas(self) -> NDArray[np.float64]:
+        """Deviation of a bearing in degrees, at most 180, by class and distance unit, (k, 256)."""
+        turned = np.degrees(self.position_sigma / self.distances)
+        return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
+
+    def length_rows(self, lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the row of each signature length; lengths beyond the longest take the last."""
+        return np.minimum(lengths, len(self.missed) - 1)
+
+    def query_rows(self, query: Signature) -> NDArray[np.int64]:
+        """Return the class row of each object of a query, k if unknown; InputError without any."""
+        if not len(query):
+            msg = "the query has no objects; give at least one type or bearing."
+            raise InputError(msg)
+        if query.codes is None:
+            return np.full(len(query), len(self.codes))
+        rows = self.row_of[query.codes]
+        if (rows < 0).any():
+            msg = (
+                f"the query has an object of class code {int(query.codes[rows < 0][0])}, which no "
+                "cell of the database sees; leave it out, or give its class as not known "
+                f"(code {WILDCARD})."
+            )
+            raise InputError(msg)
+        return rows
+
+
+def noise_tables(
+    noise: Noise, *, taxonomy: Taxonomy, codes: NDArray[np.uint8], longest: int, radius: float
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return one table for each model of a mixture, or for the only model, and the chance of each.
+
+    Only classes in `codes` count; those without a range of their own are seen from `radius` metres.
+    Raises `InputError` if the model names a class that the taxonomy
+    does not have, or gives a class no chance at all of being named as one that counts.
+    """
+    # What a model says of classes that do not count goes to a row after the last, and is dropped.
+    rows = {item.name: len(codes) for item in taxonomy.classes}
+    rows |= {taxonomy.by_code(code).name: row for row, code in enumerate(codes.tolist())}
+    ranges = taxonomy.ranges(radius)
+    reach = float(ranges.max())
+    tables = tuple(_table(spec, rows, codes, longest, ranges[codes], reach) for spec in noise.specs)
+    return tables, np.asarray(noise.weights, dtype=np.float64)
+
+
+def database_tables(
+    database: SignatureDatabase, noise: Noise
+) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
+    """Return `noise_tables` for the classes and lengths of a database."""
+    return noise_tables(
+        noise,
+        taxonomy=database.taxonomy,
+        codes=database.present_codes,
+        longest=min(int(database.lengths.max()), LONGEST_TABLE),
+        radius=database.spec.radius,
+    )
+
+
+def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> NoiseTable:
+    """Return the weighted mean of models: of chances, and of squares for deviations.
+
+    The models are for the same classes and lengths; weights sum to one.
+    """
+    names = np.stack([table.misnamed.mean(axis=0)[:, None] * table.others for table in tables])
+    named = np.tensordot(weights, names, axes=1)
+    totals = named.sum(axis=1, keepdims=True)
+    plain = np.tensordot(weights, np.stack([table.others for table in tables]), axes=1)
+    position = sum(
+        weight * table.position_sigma**2 for weight, table in zip(weights, tables, strict=True)
+    )
+
+    def mean(name: str, power: int = 1) -> NDArray[np.float64]:
+        stacked = np.stack([getattr(table, name) for table in tables]) ** power
+        return np.asarray(np.tensordot(weights, stacked, axes=1) ** (1 / power))
+
+    return NoiseTable(
+        codes=tables[0].codes,
+        missed=mean("missed"),
+        misnamed=mean("misnamed"),
+        others=np.divide(named, totals, out=plain, where=totals > 0),
+        clutter=mean("clutter"),
+        sigma=mean("sigma", 2),
+        range_sigma=mean("range_sigma", 2),
+        position_sigma=float(position) ** 0.5,
+        ranges=tables[0].ranges,
+        fading=mean("fading"),
+        reach=tables[0].reach,
+    )
+
+
+def query_bearings(query: Signature) -> NDArray[np.float64]:
+    """Return the bearings of a query, or refuse a query without."""
+    if query.bearings is None:
+        msg = "the query has no bearings, which the search between cells needs; give them."
+        raise InputError(msg)
+    return query.bearings
+
+
+def _table(  # noqa: PLR0917 - a private helper of one caller
+    spec: NoiseSpec,
+    rows: Mapping[str, int],
+    codes: NDArray[np.uint8],
+    longest: int,
+    ranges: NDArray[np.float64],
+    reach: float,
+) -> NoiseTable:
+    """Return the table of one model, given the row of each class that the taxonomy has."""
+    count = len(codes)
+
+    def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
+        values = np.full(count + 1, float(overall))
+        for name, value in special.items():
+            values[_row(name, rows)] = value
+        return values[:count]
+
+    misnamed = by_class(spec.misnamed, spec.misnamed_by_class)
+    others = np.full((count, count), 1.0 / max(count - 1, 1))
+    np.fill_diagonal(others, 0.0)
+    for name, by_name in spec.confusion.items():
+        shares = by_class(0.0, by_name)
+        if shares.sum() <= 0:
+            msg = (
+                f"confusion row {name!r} of the noise gives no chance to any class that is seen; "
+                "give some chance to the class itself."
+            )
+            raise InputError(msg)
+        shares /= shares.sum()
+        row = _row(name, rows)
+        if row < count:
+            misnamed[row] = 1.0 - shares[row]
+            shares[row] = 0.0
+            if shares.sum() > 0:
+                others[row] = shares / shares.sum()
+    clutter = np.full(count, spec.clutter / count)
+    if spec.clutter_shares:
+        clutter = spec.clutter * by_class(0.0, spec.clutter_shares)
+    # A draw among L objects leaves each of them alone with chance 1 - 1/L.
+    spared = 1.0 - 1.0 / np.maximum(np.arange(longest + 1), 1)
+    detected = np.outer(spared**spec.missed_each, by_class(spec.detection, spec.detection_by_class))
+    right = np.outer(spared**spec.misnamed_each, 1.0 - misnamed)
+    return NoiseTable(
+        codes=codes,
+        missed=np.clip(1.0 - detected, LEAST_CHANCE, MOST_CHANCE),
+        misnamed=np.clip(1.0 - right, LEAST_CHANCE, MOST_CHANCE) if count > 1 else 0.0 * right,
+        others=others,
+        clutter=np.maximum(clutter, LEAST_CLUTTER / count),
+        sigma=by_class(spec.bearing_sigma, spec.bearing_sigma_by_class),
+        range_sigma=by_class(spec.range_sigma, spec.range_sigma_by_class),
+        position_sigma=spec.position_sigma,
+        ranges=ranges,
+        fading=_fading(spec, rows, count, reach),
+        reach=reach,
+    )
+
+
+def _fading(
+    spec: NoiseSpec, rows: Mapping[str, int], count: int, reach: float
+) -> NDArray[np.float64]:
+    """Return what is left of the detection of each class by distance unit, shape (count, 256)."""
+    metres = np.arange(DISTANCE_UNITS + 1) * (reach / DISTANCE_UNITS)
+
+    def shares(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+        known, left = np.transpose(np.asarray(points, dtype=np.float64))
+        return np.asarray(np.interp(metres, known, left))
+
+    faded = np.ones((count + 1, len(metres)))
+    if ALL in spec.fading:
+        faded[:] = shares(spec.fading[ALL])
+    for name, points in spec.fading.items():
+        if name != ALL:
+            faded[_row(name, rows)] = shares(points)
+    return faded[:count]
+
+
+def _row(name: str, rows: Mapping[str, int]) -> int:
+    """Return the row of a class that a noise model names."""
+    if name not in rows:
+        msg = (
+            f"the noise model names a class {name!r} that the database does not "
+            f"have{nearest_name(name, rows)}; its classes are {', '.join(rows)}."
+        )
+        raise InputError(msg)
+    return rows[name]

@@ -1,0 +1,167 @@
+"""What of a city must be searched after a query: polygons, by rank, for whoever looks closer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import geopandas as gpd
+import numpy as np
+import shapely
+
+from semsig_gis.core.display import Displayed
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.text import percent
+from semsig_gis.localization.answers import REGION_SHARE
+from semsig_gis.localization.likelihood.posterior import Posterior
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.localization.answers import Answer
+
+CHANCES = ["chance", "searched_chance"]  # which the likelihood method alone tells
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SearchRegions(Displayed):
+    """The regions of a city in which a query may have been seen.
+
+    Parameters
+    ----------
+    table : GeoDataFrame
+        One row a region, best first, in the CRS of the database: ``rank`` (from 1), ``chance``
+        (of the place being in it; of the likelihood method only), ``cells``, ``km2``,
+        ``best_cell_id``, ``best_x`` and ``best_y`` (its best cell, and the viewpoint of that);
+        ``searched_chance``, ``searched_km2`` and ``searched_percent`` (of the city) with all
+        regions before it; ``geometry`` (polygon of whole cells that share sides).
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> answer = localize(demo_database, demo_database.signature(0), method="edit+edit", top=5)
+    >>> regions = search_regions(answer, demo_database)
+    >>> regions.table["cells"].tolist(), regions.to_dict()["regions"]
+    ([5], 1)
+    """
+
+    table: gpd.GeoDataFrame
+
+    def _facts(self) -> dict[str, object]:
+        told = self.to_dict()
+        chance = {"chance": percent(told["chance"])} if "chance" in told else {}
+        area = f"{told['km2']:.3f} km² ({told['percent']:.2g} %)"
+        return {"regions": told["regions"], "cells": told["cells"], "area": area, **chance}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is to be searched in all; ``percent`` is of the area of all cells."""
+        last = self.table.iloc[-1]
+        summary = {
+            "regions": len(self.table),
+            "cells": int(self.table["cells"].sum()),
+            "km2": float(last["searched_km2"]),
+            "percent": float(last["searched_percent"]),
+        }
+        if "chance" in self.table.columns:
+            summary["chance"] = float(last["searched_chance"])
+        return summary
+
+
+def search_regions(
+    answer: Answer,
+    database: SignatureDatabase,
+    *,
+    share: float = REGION_SHARE,
+    within: float = 0.0,
+) -> SearchRegions:
+    """Return the regions in which a query may have been seen.
+
+    Parameters
+    ----------
+    answer : Location or Localization
+        The answer to the query. Of the likelihood method, the regions hold the fewest cells that
+        have a share of the chance; of other methods, the candidates.
+    database : SignatureDatabase
+        The database that was searched.
+    share : float, default 0.9
+        Of the chance, above 0 and at most 1.
+    within : float, default 0
+        Cells whose viewpoint is at most so many metres from one of those belong to the regions
+        too, for places between the viewpoints and for what is not known of the city.
+
+    Returns
+    -------
+    SearchRegions
+        Merged polygons, by falling chance or by their best candidate.
+
+    Raises
+    ------
+    InputError
+        If the share or the distance is out of range, or the answer is from another database.
+
+    Examples
+    --------
+    >>> from semsig_gis import localize
+    >>> answer = localize(demo_database, demo_database.signature(0), method="edit+edit", top=5)
+    >>> search_regions(answer, demo_database).to_dict()["cells"]
+    5
+    """
+    if not 0 < share <= 1:
+        msg = f"a share of {share} was given for regions; give a number above 0 and at most 1."
+        raise InputError(msg)
+    if not (math.isfinite(within) and within >= 0):
+        msg = f"a margin of {within} m was given for regions; give metres, 0 or more."
+        raise InputError(msg)
+    chances, cells = answer.chances, answer.region_cells(database, share)
+    if within > 0:
+        cells = np.concatenate([cells, _around(database, cells, within)])
+    shapes = shapely.get_parts(shapely.union_all(_runs(database, np.sort(cells))))
+    points = np.asarray(shapely.points(database.xy[cells]))
+    shape, inside = shapely.STRtree(points).query(shapes, predicate="contains")
+    # In the order of the cells, so that the first of each region is its best.
+    region = shape[np.argsort(inside)]
+    first = np.unique(region, return_index=True)[1]
+    counts = np.bincount(region)
+    held = np.bincount(region, None if chances is None else chances[cells])
+    order = np.argsort(first if chances is None else -held, kind="stable")
+    best = cells[first[order]]
+    km2 = counts[order] * database.grid.step**2 / 1e6
+    table = gpd.GeoDataFrame(
+        {
+            "rank": np.arange(1, len(order) + 1),
+            "chance": held[order],
+            "cells": counts[order],
+            "km2": km2,
+            "best_cell_id": database.cell_ids[best],
+            "best_x": database.xy[best, 0],
+            "best_y": database.xy[best, 1],
+            "searched_chance": np.minimum(np.cumsum(held[order]), 1.0),
+            "searched_km2": np.cumsum(km2),
+            "searched_percent": 100.0 * np.cumsum(counts[order]) / len(database),
+        },
+        geometry=shapes[order],
+        crs=database.crs,
+    )
+    return SearchRegions(table if chances is not None else table.drop(columns=CHANCES))
+
+
+def _runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.object_]:
+    """Return cells as rectangles, one for all that follow each other in a column."""
+    step, (west, south) = database.grid.step, database.grid.origin
+    breaks = np.diff(database.cell_ids[cells]) != 1
+    first, last = cells[np.append(True, breaks)], cells[np.append(breaks, True)]
+    columns, bottom, top = database.columns[first], database.rows[first], database.rows[last]
+    left, right = west + columns * step, west + (columns + 1) * step
+    return np.asarray(shapely.box(left, south + bottom * step, right, south + (top + 1) * step))
+
+
+def _around(
+    database: SignatureDatabase, cells: NDArray[np.int64], within: float
+) -> NDArray[np.int64]:
+    """Return the other cells that are near to some."""
+    marks = np.zeros(len(database))
+    marks[cells] = 1.0
+    near = Posterior(database=database, chances=marks).mass_within(within) > 0
+    return np.flatnonzero(near & (marks == 0))

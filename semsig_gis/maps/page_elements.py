@@ -1,0 +1,596 @@
+"""What all maps are made of: the script of the page, the cells as an image, drawings, a legend."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import itertools
+from html import escape
+from importlib import resources
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import folium
+import numpy as np
+import xyzservices
+from branca.element import Element, MacroElement
+from folium.map import Layer
+from folium.raster_layers import ImageOverlay
+from folium.template import Template
+from folium.utilities import JsCode
+
+from semsig_gis import __version__
+from semsig_gis.core.errors import InputError, nearest_name
+from semsig_gis.core.geometry import FULL_TURN, across_180, to_degrees
+from semsig_gis.core.symbology import SHADES, VERDICTS, class_signs
+from semsig_gis.database.database import SignatureDatabase
+from semsig_gis.maps.image import city_image, script_json
+from semsig_gis.observation.view import View
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from branca.element import Figure
+    from numpy.typing import ArrayLike, NDArray
+    from pyproj import CRS
+
+    from semsig_gis.core.signature import Signature
+    from semsig_gis.core.symbology import ClassSign, Mark
+    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.observation.view import Photo, Sector
+
+
+MAX_ZOOM = 20
+CLOSE_ZOOM = 17  # the closest that a new map shows by itself
+# Files of the folder ``js`` that every page has, in this order.
+PAGE_FILES = (
+    *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "wheels.js", "search.js"),
+    *("controls.js", "picture.js", "arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
+)
+WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
+POWERS = 4  # of x and y, which tell a place within millimetres in a city
+LATTICE = 9
+
+
+@functools.cache
+def page_element(file: str) -> str:
+    """Return a file of the folder ``js`` as an element of a page."""
+    text = resources.files("semsig_gis.maps").joinpath("js", file).read_text(encoding="utf-8")
+    if file.endswith(".css"):
+        return f"<style>{text}</style>"
+    # The name by which the tools of a browser show the script.
+    return f"<script>{text}//# sourceURL=semsig/{file}\n</script>"
+
+
+class PageFile(Element):
+    """A file of the folder ``js`` in a page, as it is: to read it as a template would take long."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self.file = file
+
+    def render(self, **_kwargs: Any) -> str:  # noqa: ANN401 - as branca has it
+        """Return the element."""
+        return page_element(self.file)
+
+
+class Call(MacroElement):
+    """A call of a function of the page's script, with elements of the map or plain values."""
+
+    files: tuple[str, ...] = PAGE_FILES
+    _template = Template(
+        "{% macro script(this, kwargs) %}semsig.{{ this.function }}({{ this.arguments }});"
+        "{% endmacro %}"
+    )
+
+    def __init__(self, function: str, *arguments: object, **layer: Any) -> None:  # noqa: ANN401
+        super().__init__(**layer)  # type: ignore[no-untyped-call]
+        self._name = "Semsig"
+        self.function = function
+        self.arguments = ", ".join(
+            one.get_name() if isinstance(one, Element) else script_json(one) for one in arguments
+        )
+
+    def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
+        """Put the style and the script into the page, then the call."""
+        header = cast("Figure", self.get_root()).header
+        for file in self.files:
+            header.add_child(PageFile(file), name=file)
+        return super().render(**kwargs)  # type: ignore[no-untyped-call]
+
+
+GROUPS = {
+    "cells": "Colour cells by",
+    "queries": "Queries",
+    "answer": "Answer",
+    "objects": "Street objects",
+    "ground": "Ground",
+}
+"""What the layers of a map are about; of the cells, one layer is on at a time."""
+
+
+class Drawing(Call, Layer):
+    """A layer that a function of the page's script makes, in one of the `GROUPS` of layers.
+
+    One without a name is a part of another.
+    """
+
+    _template = Template(
+        "{% macro script(this, kwargs) %}var {{ this.get_name() }} = "
+        "semsig.{{ this.function }}({{ this.arguments }});{% endmacro %}"
+    )
+
+    def __init__(
+        self,
+        name: str | None,
+        function: str,
+        *arguments: object,
+        group: str,
+        show: bool = True,
+    ) -> None:
+        whole = name is not None
+        look = {"name": name, "overlay": True, "control": whole, "show": whole and show}
+        super().__init__(function, *arguments, **look)
+        self.group = group
+
+
+class LayerGroups(Call):
+    """The groups of the layers in the layer control of a map."""
+
+    def __init__(self, map_: folium.Map, layers: folium.LayerControl) -> None:
+        groups = {
+            child.layer_name: child.group
+            for child in layers_of(map_).values()
+            if isinstance(child, Drawing) and child.control
+        }
+        super().__init__("layerGroups", map_, layers, GROUPS, groups)
+
+
+class Surroundings(Call):
+    """What stands around a map, added last: search, light and dark, whom to name for the data."""
+
+    def __init__(
+        self,
+        map_: folium.Map,
+        layers: folium.LayerControl,
+        area: dict[str, Any] | None,
+        names: tuple[str, ...],
+    ) -> None:
+        super().__init__("furnish", map_, layers, area, names)
+        self.area, self.names = area, names
+
+
+def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
+    """Return the map to draw on."""
+    if map_ is not None:
+        if tiles is not None:
+            msg = f"Tiles {tiles!r} were given with a map of your own; add them to that map."
+            raise InputError(msg)
+        return map_
+    provider = None if tiles is None else _tile_provider(tiles)
+    made = folium.Map(tiles=provider, prefer_canvas=True, control_scale=True)
+    if provider is None:
+        # Only tiles tell Leaflet where to stop, and only they look bad between whole zooms.
+        made.options |= {"maxZoom": MAX_ZOOM, "zoomSnap": 0.25}
+    cast("Figure", made.get_root()).title = title
+    return made
+
+
+def _tile_provider(name: str) -> xyzservices.TileProvider:
+    """Return the provider of online tiles that xyzservices knows by a name."""
+    known = xyzservices.providers
+    plain = name.lower() == "openstreetmap"
+    try:
+        provider = known.query_name("OpenStreetMap.Mapnik" if plain else name)
+    except ValueError as error:
+        msg = (
+            f"Tiles {name!r} are not known to xyzservices{nearest_name(name, known.flatten())}; "
+            f"give {WITHOUT_KEY}."
+        )
+        raise InputError(msg) from error
+    if provider.requires_token():
+        msg = f"Tiles {name!r} need a key from their provider; give {WITHOUT_KEY}."
+        raise InputError(msg)
+    return provider
+
+
+def draw(
+    map_: folium.Map,
+    name: str,
+    function: str,
+    *arguments: object,
+    group: str,
+    show: bool = True,
+) -> None:
+    """Add a layer that a function of the page's script makes."""
+    Drawing(free_name(map_, name), function, *arguments, group=group, show=show).add_to(map_)
+
+
+def finished_map(
+    map_: folium.Map,
+    source: SignatureDatabase | StreetObjects | None,
+    *,
+    legend: str = "",
+    view: NDArray[np.float64] | None = None,
+    zoom: int = CLOSE_ZOOM,
+    licenses: tuple[str, ...] = (),
+) -> folium.Map:
+    """Add what every map has, last, where the layer control knows all layers.
+
+    ``view`` holds places to show at first, at most as close as ``zoom``; ``source`` is searched.
+    """
+    if legend:
+        corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
+        Call("legend", map_, legend, corners, zoom).add_to(map_)
+    children = layers_of(map_)
+    area = None if source is None else search_area(source)
+    names = (*(() if source is None else map(str, source.licenses)), *licenses)
+    for name, child in list(children.items()):
+        if isinstance(child, Surroundings):
+            names = child.names + names
+            if area is None or area["grid"] is None:
+                area = child.area or area
+        if isinstance(child, folium.LayerControl | LayerGroups | Surroundings):
+            del children[name]
+    collapsed = cast("bool", JsCode("semsig.small.matches"))
+    # Each layer has its parts in their order, and may share some with others.
+    layers = folium.LayerControl(collapsed=collapsed, autoZIndex=False)
+    layers.add_to(map_)
+    LayerGroups(map_, layers).add_to(map_)
+    Surroundings(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)
+    return map_
+
+
+def search_area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
+    """Return where the places of a source are, for the search of the page."""
+    low, high = source.xy.min(axis=0), source.xy.max(axis=0)
+    grid, edge = None, 0.0
+    if isinstance(source, SignatureDatabase):
+        edge = source.grid.step
+        grid = {
+            "step": source.grid.step,
+            "origin": list(source.grid.origin),
+            "columns": [int(source.columns.min()), int(source.columns.max())],
+            "rows": [int(source.rows.min()), int(source.rows.max())],
+        }
+    authority = source.crs.to_authority()
+    middle, half = (low + high) / 2.0, max(float((high - low).max()) / 2.0, 1.0)
+    # A polynomial is as good as the projection itself in an area of some hundred kilometres.
+    u, v = (part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, LATTICE)]))
+    degrees = to_latlon(middle + half * np.stack([u, v], axis=1), source.crs, digits=9)
+    powers = [(i, j) for i in range(POWERS + 1) for j in range(POWERS + 1 - i)]
+    terms = np.stack([u**i * v**j for i, j in powers], axis=1)
+    weights = np.linalg.lstsq(terms, degrees, rcond=None)[0].tolist()
+    return {
+        "crs": source.crs.name if authority is None else ":".join(authority),
+        "box": [*(low - edge).tolist(), *(high + edge).tolist()],
+        "middle": middle.tolist(),
+        "half": half,
+        "terms": [[*power, *weight] for power, weight in zip(powers, weights, strict=True)],
+        "grid": grid,
+    }
+
+
+def layers_of(map_: folium.Map) -> dict[str, Element]:
+    """Return what was added to a map, by name."""
+    return map_._children  # noqa: SLF001 - branca has no public way to look at them
+
+
+def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[np.float64]:
+    """Return latitudes and longitudes, by default to about 0.1 m, shape (n, 2); NaN stays NaN."""
+    longitude, latitude = to_degrees(crs).transform(xy[:, 0], xy[:, 1])
+    degrees = np.round(np.stack([latitude, across_180(longitude, crs)], axis=1), digits)
+    return np.where(np.isfinite(degrees), degrees, np.nan)
+
+
+def to_metres(place: tuple[float, float], crs: CRS) -> NDArray[np.float64]:
+    """Return where a latitude and longitude is in a coordinate system, shape (1, 2)."""
+    lat, lon = place
+    return np.array([to_degrees(crs).transform(lon, lat, direction="INVERSE")])
+
+
+def exact_latlon(xy: ArrayLike, crs: CRS) -> list[list[float]]:
+    """Return latitudes and longitudes of one place or many, to about a centimetre."""
+    places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    degrees: list[list[float]] = to_latlon(places, crs, digits=7).tolist()
+    return degrees
+
+
+def corners_of(source: SignatureDatabase | StreetObjects) -> NDArray[np.float64]:
+    """Return latitudes and longitudes of the corners of all places."""
+    return to_latlon(np.stack([source.xy.min(axis=0), source.xy.max(axis=0)]), source.crs)
+
+
+def panel_signs(database: SignatureDatabase) -> dict[str, Any]:
+    """Return the looks of the classes by symbol, and of what became of objects, for the script."""
+    classes = class_signs(database.taxonomy).values()
+    return {
+        "classes": {sign.symbol: sign_look(sign) for sign in classes},
+        "verdicts": {
+            verdict: {"outline": OUTLINES[shape], "colour": VERDICTS[verdict]}
+            for verdict, shape in VERDICT_SHAPES.items()
+        },
+    }
+
+
+def sign_look(sign: ClassSign) -> dict[str, Any]:
+    """Return the look of a class, for the script."""
+    return {
+        "title": sign.title,
+        "colour": sign.colour,
+        "ink": sign.ink,
+        "outline": OUTLINES[sign.shape],
+        "drop": sign.drop,
+    }
+
+
+def panel_signature(types: str | None, bearings: ArrayLike | None, **look: Any) -> list[Any]:  # noqa: ANN401
+    """Return a signature for the panel: symbols, whole degrees and, if anything, its look."""
+    if bearings is None:
+        return [types, None]
+    degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
+    return [types, degrees.tolist(), look] if look else [types, degrees.tolist()]
+
+
+def query_signature(
+    query: Signature,
+    taxonomy: Taxonomy,
+    *,
+    radius: float,
+    **look: Any,  # noqa: ANN401
+) -> list[Any]:
+    """Return a query for the panel; `radius` is the visibility range in metres.
+
+    ``place`` is where it is drawn, turned by ``turn`` degrees.
+    """
+    types = None if query.codes is None else taxonomy.decode(query.codes)
+    look |= {"kind": "query", "reach": radius}
+    if isinstance(query, View):
+        if query.ranges is not None:
+            look["metres"] = _whole_metres(query.ranges)
+        if all(photo.sectors for photo in query.photos):
+            look |= {"sectors": _sectors(query.photos), "outside": query.outside().tolist()}
+    return panel_signature(types, query.bearings, **look)
+
+
+def cell_signature(
+    database: SignatureDatabase,
+    cell: int,
+    query: Signature | None = None,
+    turn: float = 0.0,
+    *,
+    place: Sequence[float] | None = None,
+) -> list[Any]:
+    """Return what a cell sees for the panel, in the look of a query that is turned by degrees.
+
+    ``place`` is the latitude and longitude of the cell.
+    """
+    seen = database.select(slice(cell, cell + 1))
+    bearings = seen.bearings
+    look: dict[str, Any] = {
+        "reach": database.spec.radius,
+        "metres": _whole_metres(seen.distances),
+        **({} if place is None else {"place": list(place)}),
+    }
+    if isinstance(query, View):
+        photos = [photo.turned(turn) for photo in query.photos]
+        # Photos that are turned each by itself have no look in common.
+        together = len(photos) == 1 or not any(photo.north_sigma for photo in photos)
+        if together and all(photo.sectors for photo in photos):
+            sees = np.any([photo.sees(bearings) for photo in photos], axis=0)
+            look |= {"sectors": _sectors(photos), "outside": np.flatnonzero(~sees).tolist()}
+    return panel_signature(database.types(cell), bearings, **look)
+
+
+def _whole_metres(ranges: NDArray[np.float64]) -> list[int | None]:
+    return [None if np.isnan(one) else round(one) for one in ranges.tolist()]
+
+
+def _sectors(photos: Iterable[Photo]) -> list[Sector]:
+    return [sector for photo in photos for sector in photo.sectors]
+
+
+def ranks_text(low: int, high: int) -> str:
+    """Return the ranks that ties allow."""
+    return f"{low:,}" if low == high else f"{low:,} to {high:,}"
+
+
+def ties_text(tied: int) -> str:
+    """Return how many are as good, to follow a rank or a distance."""
+    return f", {tied:,} tied" if tied > 1 else ""
+
+
+def free_name(map_: folium.Map, name: str) -> str:
+    """Return the name for a layer, with a number where the map has one of that name."""
+    taken = {child.layer_name for child in layers_of(map_).values() if isinstance(child, Layer)}
+    numbered = (f"{name}, {number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([name], numbered) if one not in taken)
+
+
+def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True) -> ImageOverlay:
+    """Add how many objects cells see, unless the map has it already; return the image.
+
+    It is shown where the cells have no other colours.
+    """
+    picture = city_image(database, SHADES)
+    for child in layers_of(map_).values():
+        if isinstance(child, ImageOverlay) and child.url == data_url(picture[0]):
+            return child
+    image = cell_image(map_, *picture, dark="flip")
+    show = show and not any(one.show for one in cell_colours(map_))
+    colour_cells(map_, "Objects seen from a cell", image, show=show)
+    return image
+
+
+def cell_image(
+    map_: folium.Map,
+    image: bytes,
+    bounds: list[list[float]],
+    *,
+    dark: Literal["flip", "lift"],
+    opacity: float = 1.0,
+) -> ImageOverlay:
+    """Return a PNG that a layer of `colour_cells` shows below everything that is drawn.
+
+    In the dark, shades that begin near the colour of paper flip, and the dark end of ramps lifts.
+    """
+    overlay = ImageOverlay(
+        data_url(image),
+        bounds,
+        pane="tilePane",  # below everything else
+        opacity=opacity,
+        class_name=f"semsig-{dark}",
+        control=False,
+        show=False,
+    )
+    overlay.add_to(map_)
+    return overlay
+
+
+def cell_colours(map_: folium.Map) -> list[Drawing]:
+    """Return the choices of how cells are coloured."""
+    layers = (child for child in layers_of(map_).values() if isinstance(child, Drawing))
+    return [layer for layer in layers if layer.control and layer.group == "cells"]
+
+
+def colour_cells(map_: folium.Map, name: str, *layers: Layer, show: bool = True) -> None:
+    """Add layers together as one choice of how cells are coloured; the last shown is shown."""
+    for other in cell_colours(map_) if show else ():
+        other.show = False
+    draw(map_, name, "together", *layers, group="cells", show=show)
+
+
+def data_url(image: bytes) -> str:
+    """Return the address of a PNG that holds it."""
+    return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
+
+
+# Signs that change in the dark as what they explain does.
+FLIPPING, LIFTING = "square semsig-flip", "square semsig-lift"
+NAMED_CLASSES = 6  # in a legend
+# Path of an SVG for each shape, around (0, 0), of about the area of a circle of radius 1.
+OUTLINES = {
+    "circle": "M-1,0A1,1 0 1 1 1,0A1,1 0 1 1 -1,0Z",
+    "square": "M-.9,-.9H.9V.9H-.9Z",
+    "diamond": "M0,-1.25L1.25,0L0,1.25L-1.25,0Z",
+    "triangle": "M0,-1.2L1.2,1.2H-1.2Z",
+    "hexagon": "M0,-1.15L1,-.575V.575L0,1.15L-1,.575V-.575Z",
+    "triangle_down": "M0,1.2L1.2,-1.2H-1.2Z",
+    "cross": "M-.6,-1.1H.6V-.6H1.1V.6H.6V1.1H-.6V.6H-1.1V-.6H-.6Z",
+}
+
+
+# What stands around the sign of an object, by what became of it.
+VERDICT_SHAPES = {
+    "matched": "circle",
+    "misnamed": "diamond",
+    "missed": "circle",  # in dashes
+    "false": "square",
+}
+
+
+def sign_svg(sign: ClassSign) -> str:
+    """Return a sign as an element of a page."""
+    return (
+        '<svg class="semsig-sign" viewBox="-1.3 -1.3 2.6 2.6" aria-hidden="true">'
+        f'<path d="{OUTLINES[sign.shape]}" fill="{sign.colour}"/>'
+        f'<text y="{sign.drop + 0.42:.2f}" font-size="1.2" font-weight="700" '
+        f'font-family="system-ui,sans-serif" text-anchor="middle" fill="{sign.ink}">'
+        f"{sign.symbol}</text></svg>"
+    )
+
+
+def mark_svg(mark: Mark) -> str:
+    """Return a mark as an element of a page."""
+    return (
+        '<svg class="semsig-sign mark" viewBox="-1.5 -1.5 3 3" aria-hidden="true">'
+        f'<path d="{OUTLINES[mark.shape]}" fill="{mark.colour}"/></svg>'
+    )
+
+
+def isolated(text: str) -> str:
+    """Return text from data, in which signs of direction turn no other text."""
+    return f"<bdi>{escape(text)}</bdi>"
+
+
+def query_text(query: Signature, taxonomy: Taxonomy) -> str:
+    """Return what was asked, a line each."""
+    lines = []
+    if query.codes is not None:
+        lines.append(f"Types: {escape(taxonomy.decode(query.codes))}<br>")
+    if query.bearings is not None:
+        degrees = (round(bearing) % 360 for bearing in query.bearings.tolist())
+        lines.append(f"Bearings: {' '.join(f'{value}°' for value in degrees)}<br>")
+    if isinstance(query, View):
+        if query.ranges is not None:
+            metres = ("?" if one is None else f"{one} m" for one in _whole_metres(query.ranges))
+            lines.append(f"Ranges: {', '.join(metres)}<br>")
+        if all(photo.sectors for photo in query.photos):
+            edges = (f"{low:.0f}-{high % FULL_TURN:.0f}°" for low, high in _sectors(query.photos))
+            lines.append(f"Looked at: {', '.join(edges)}<br>")
+    return "".join(lines)
+
+
+def swatch(colour: str, shape: str = "round") -> str:
+    """Return a small sign of a colour."""
+    return f'<i class="{shape}" style="background:{colour}"></i>'
+
+
+def ramp_bar(colours: Iterable[str], low: str, high: str, *, sign: str = "ramp") -> str:
+    """Return a bar of colours with what its ends mean."""
+    gradient = f"linear-gradient(to right,{','.join(colours)})"
+    return (
+        f'<i class="{sign}" style="background:{gradient}"></i>'
+        f'<span class="ends"><small>{low}</small><small>{high}</small></span>'
+    )
+
+
+def class_bar(colours: Sequence[str], breaks: Sequence[str]) -> str:
+    """Return a bar of colours with what parts each from the next."""
+    share = 100.0 / len(colours)
+    parts = ",".join(
+        f"{colour} {number * share:.1f}% {(number + 1) * share:.1f}%"
+        for number, colour in enumerate(colours)
+    )
+    labels = "".join(f"<small>{text}</small>" for text in breaks)
+    return (
+        f'<i class="ramp" style="background:linear-gradient(to right,{parts})"></i>'
+        f'<span class="breaks">{labels}</span>'
+    )
+
+
+def shades() -> str:
+    """Return what the shades of the cells mean."""
+    labels = [f"{low}-{high - 1}" for low, high in itertools.pairwise(SHADES)]
+    labels.append(f"{max(SHADES)}+")
+    signs = " &ensp;".join(
+        f"{swatch(colour, FLIPPING)}{label}"
+        for colour, label in zip(SHADES.values(), labels, strict=True)
+    )
+    name = "Objects seen from a cell"
+    return part_of(name, f"<p>{name}<br>{signs}</p>")
+
+
+def part_of(layer: str, text: str) -> str:
+    """Return a part of a legend that is shown while a layer of that name is on.
+
+    A name that ends with a space is the beginning of one.
+    """
+    return f'<div data-layer="{escape(layer)}">{text}</div>'
+
+
+def made_by(method: str) -> str:
+    """Return the method of a result, which the title of the map tells as well."""
+    return f'<span class="semsig-method">{method}</span>'
+
+
+def folded(title: str, text: str) -> str:
+    """Return a part of a legend that opens when it is clicked."""
+    return f"<details><summary>{title}</summary>{text}</details>"
+
+
+def sources(licenses: Iterable[str]) -> str:
+    """Return who is to be named for the data, and under which licence, folded."""
+    lines = [f"{isolated(line)}<br>" for line in licenses]
+    made = f"Made with semsig_gis {escape(__version__)}"
+    return folded("About the data", f"<p><small>{''.join(lines)}{made}</small></p>")

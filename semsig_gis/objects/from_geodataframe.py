@@ -1,0 +1,209 @@
+"""From a GeoDataFrame to street objects: by tags of OpenStreetMap, a column, or a catalogue."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import geopandas as gpd
+
+from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, nearest_name
+from semsig_gis.core.geometry import LICENSES, SOURCE_ID
+from semsig_gis.objects.load import assemble, choose_layers
+from semsig_gis.objects.table import Licence
+from semsig_gis.sources import TAGS_READER
+from semsig_gis.sources.catalog import Catalog, built_in_taxonomy, load_catalog
+from semsig_gis.sources.filters import as_text
+from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.osm.features import frame_fields, frame_layers, holds_tags, tells_elements
+from semsig_gis.sources.rows import RowRules, Rows, raw_layer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.sources import RawLayer
+
+WHERE = "the table"
+COLUMNS_TOLD = 12
+
+
+def objects_from_frame(
+    frame: gpd.GeoDataFrame,
+    *,
+    class_column: str | None = None,
+    tags: bool = False,
+    catalog: Catalog | str | Path | None = None,
+    layers: Sequence[str] = (),
+    metric_crs: str | None = None,
+) -> StreetObjects:
+    """Turn a GeoDataFrame into street objects.
+
+    A table of OpenStreetMap's elements, as osmnx and QuackOSM make it, needs no more: its tags are
+    in columns of their own, or in a column ``tags`` (a map, JSON, or text as of hstore).
+
+    Parameters
+    ----------
+    frame : GeoDataFrame
+        A row a thing, in any CRS. What is not a point stands at its centroid.
+    class_column : str, optional
+        Column of the classes, by name; rows without one are left out. The classes are those of
+        `catalog`, or of all built-in catalogues.
+    tags : bool, default False
+        Whether the columns are tags of OpenStreetMap; a table that says which elements it contains
+        (such as ``element`` and ``id``, ``feature_id``, or ``osm_id``) is recognised by that.
+    catalog : Catalog, str or Path, optional
+        Catalogue whose layers are looked for: ``openstreetmap`` by tags, any other by the fields
+        of its layers.
+    layers : sequence of str, optional
+        Layers of the catalogue, as in `choose_layers`.
+    metric_crs : str, optional
+        CRS to work in; the catalogue's by default, or the UTM zone of the data where it has none.
+
+    Returns
+    -------
+    StreetObjects
+        The objects. ``frame.attrs["licenses"]`` says whom to name for classes in a column.
+
+    Raises
+    ------
+    InputError
+        If the table does not say what it contains, or a value of the column is not a class.
+    CrsError
+        If it has no CRS.
+    EmptyResultError
+        If no row is a street object.
+
+    Examples
+    --------
+    >>> import geopandas as gpd
+    >>> from shapely import Point
+    >>> frame = gpd.GeoDataFrame(
+    ...     {"kind": ["bench", "street_light", None]},
+    ...     geometry=[Point(2.35, 48.85), Point(2.351, 48.85), Point(2.352, 48.85)],
+    ...     crs="EPSG:4326",
+    ... )
+    >>> len(objects_from_frame(frame, class_column="kind"))
+    2
+    """
+    _require_frame(frame)
+    if tags and (class_column is not None or catalog is not None):
+        msg = "tags were given together with a column of classes or a catalogue; give one of them."
+        raise InputError(msg)
+    known = load_catalog(catalog) if isinstance(catalog, str | Path) else catalog
+    if class_column is not None:
+        return _by_column(frame, class_column, known, metric_crs=metric_crs)
+    if known is None:
+        _require_tags(frame, sure=not tags)
+        known = load_catalog("openstreetmap")
+    specs = choose_layers(known, layers)
+    by_tags = tuple(spec for spec in specs if spec.reader == TAGS_READER)
+    if by_tags:
+        _require_tags(frame)
+        raw = frame_layers(frame, by_tags)
+    else:
+        raw = (_by_fields(frame, specs, known),)
+    if not any(len(layer.table) for layer in raw):
+        msg = (
+            f"none of the {len(frame):,} rows of the table is a street object of catalogue "
+            f"{known.name!r}; check their tags or fields (`semsig sources` lists what is read)."
+        )
+        raise EmptyResultError(msg)
+    return assemble(raw, known, metric_crs=metric_crs).objects
+
+
+def _require_frame(frame: object) -> None:
+    """Refuse what is no table of places."""
+    if not isinstance(frame, gpd.GeoDataFrame):
+        msg = (
+            f"a {type(frame).__name__} was given; give a GeoDataFrame, or street objects such as "
+            "open_objects returns."
+        )
+        raise InputError(msg)
+    if frame.active_geometry_name is None:
+        msg = "the table has no geometry; state it with set_geometry."
+        raise InputError(msg)
+    if frame.crs is None:
+        msg = "the table has no coordinate reference system; state it with set_crs."
+        raise CrsError(msg)
+
+
+def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
+    """Refuse a table without tags of OpenStreetMap, or, to be sure, without its elements."""
+    fields = frame_fields(frame)
+    tells = tells_elements if sure else holds_tags
+    if tells(fields):
+        return
+    told = ", ".join(fields[:COLUMNS_TOLD]) + (", ..." if len(fields) > COLUMNS_TOLD else "")
+    if sure and holds_tags(fields):
+        msg = (
+            f"the table does not say what its columns ({told}) are; give tags=True if they are "
+            "tags of OpenStreetMap, or else class_column or catalog."
+        )
+    else:
+        msg = (
+            f"the table has no tags of OpenStreetMap among its columns ({told}); give it to "
+            "objects_from_frame with class_column, the column of the classes, or a catalog."
+        )
+    raise InputError(msg)
+
+
+def _by_column(
+    frame: gpd.GeoDataFrame, column: str, catalog: Catalog | None, *, metric_crs: str | None
+) -> StreetObjects:
+    """Return the objects of a table that has their classes in a column."""
+    taxonomy = built_in_taxonomy() if catalog is None else catalog.taxonomy
+    names = [item.name for item in taxonomy.classes]
+    spec = LayerSpec(
+        name="frame",
+        class_name="",
+        class_by=ClassBy(column, tuple((name, name) for name in names)),
+        id_field=SOURCE_ID if SOURCE_ID in frame else None,
+    )
+    layer = _by_rules(frame, spec)
+    unknown = next((str(v) for v in frame[column].dropna().unique() if v not in names), None)
+    if unknown is not None:
+        msg = (
+            f"column {column!r} contains {unknown!r}, which is not a "
+            f"class{nearest_name(unknown, names)}; the classes are {', '.join(names)}, and rows "
+            "without one are left out."
+        )
+        raise InputError(msg)
+    layer = replace(layer, notes=())  # that rows have no class is meant
+    known = catalog or Catalog(name="frame", title="Table", taxonomy=taxonomy, layers=(spec,))
+    objects = assemble([layer], replace(known, layers=(spec,)), metric_crs=metric_crs).objects
+    lines = frame.attrs.get(LICENSES, ())
+    return replace(objects, licenses=tuple(map(Licence, lines))) if lines else objects
+
+
+def _by_fields(frame: gpd.GeoDataFrame, specs: Sequence[LayerSpec], catalog: Catalog) -> RawLayer:
+    """Return the one layer of a catalogue whose fields a table has."""
+    fields = set(frame_fields(frame))
+    fitting = [spec for spec in specs if fields.issuperset(name for _, name in spec.fields)]
+    if len(fitting) != 1:
+        what = "several of them" if fitting else "none of them"
+        named = ", ".join(spec.name for spec in (fitting or specs))
+        msg = (
+            f"the table fits {what} of the layers of catalogue {catalog.name!r} ({named}); give "
+            "the right one as layers, or the column of its classes as class_column."
+        )
+        raise InputError(msg)
+    return _by_rules(frame, fitting[0])
+
+
+def _by_rules(frame: gpd.GeoDataFrame, spec: LayerSpec) -> RawLayer:
+    """Return a layer of a table by the rules of a catalogue."""
+    levels = [name for name in frame.index.names if name is not None and name not in frame]
+    table = frame.reset_index(level=levels) if levels else frame
+    rules = RowRules(spec, [str(name) for name in table.columns], filters=True, where=WHERE)
+    missing = table[list(rules.fields)].isna()
+    values = table[list(rules.fields)].astype(object).mask(missing, None)
+    rows = Rows(
+        read=len(table),
+        numbers=list(range(1, len(table) + 1)),
+        names=[as_text(name) for name in table.index],
+        values=list(values.itertuples(index=False, name=None)),
+        positions=table.geometry.to_list(),
+    )
+    return raw_layer(rows, rules, table.crs, by_file=True)

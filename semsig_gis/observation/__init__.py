@@ -1,0 +1,1 @@
+"""Observations of people and detectors, as views."""

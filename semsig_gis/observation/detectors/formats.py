@@ -1,0 +1,337 @@
+"""Files of detectors: COCO, YOLO, Label Studio, CVAT and Mapillary."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+from xml.etree import ElementTree as ET
+
+import yaml
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.observation.detectors.mapillary import mapillary_images, mapillary_pictures
+from semsig_gis.observation.detectors.pictures import Picture, Shot, bounds, box_of, turned
+from semsig_gis.storage.text import parse_json, read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from semsig_gis.observation.detectors.pictures import Box, Corners
+
+SUFFIXES = frozenset({".json", ".xml", ".txt"})
+NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
+NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
+"""What lists the names of YOLO's classes, beside the labels or in the folder above them."""
+
+BOX = 5  # values on a line of YOLO: class and box; more are a score, or a polygon
+PERCENT = 100.0
+ACCEPTED = (
+    "give JSON (COCO, Label Studio, Mapillary), CVAT XML for images, YOLO .txt, or a folder of them"
+)
+MISSHAPEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
+
+
+def read_pictures(paths: Iterable[str | Path]) -> list[Picture]:
+    """Read the pictures and boxes of files of detectors, told apart by what they hold.
+
+    A folder stands for the .json, .xml and .txt files in it. Of YOLO, a file of class names
+    (.yaml, .names, classes.txt) is among the files, beside them or above them; of COCO's bare
+    results, the file with their images and categories is among the files. InputError if a file
+    cannot be read or is of no such format.
+    """
+    files = [file for path in paths for file in _files(Path(path))]
+    names = next((file for file in files if _lists_names(file)), None)
+    documents = {file: _json(file) for file in files if file.suffix.lower() == ".json"}
+    images = next((one for one in documents.values() if _is_coco(one)), None)
+    results = [file for file, one in documents.items() if _is_results(one)]
+    pictures: list[Picture] = []
+    for file in files:
+        suffix = file.suffix.lower()
+        if _lists_names(file):
+            continue
+        if suffix == ".txt":
+            pictures.append(_yolo(file, names))
+        elif suffix == ".xml":
+            pictures += _cvat(file)
+        elif suffix == ".json" and not (results and documents[file] is images):
+            pictures += _of_json(documents[file], str(file), images)
+        elif suffix != ".json":
+            msg = f"{file} is not in a supported format; {ACCEPTED}."
+            raise InputError(msg)
+    return pictures
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+    if not found:
+        msg = f"the folder {path} contains no file of detections; {ACCEPTED}."
+        raise InputError(msg)
+    return found
+
+
+def _lists_names(file: Path) -> bool:
+    return file.suffix.lower() in NAME_SUFFIXES or file.name in NAME_FILES
+
+
+def _text(file: Path) -> str:
+    try:
+        return read_text(file)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        msg = f"{file} cannot be read ({reason}); {ACCEPTED}."
+        raise InputError(msg) from error
+
+
+def _json(file: Path) -> Any:  # noqa: ANN401 - any JSON
+    try:
+        return parse_json(_text(file))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        msg = f"{file} is not JSON ({error}); {ACCEPTED}."
+        raise InputError(msg) from error
+
+
+def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa: ANN401 - any JSON
+    """Return the pictures of a JSON document, of whichever format it is."""
+    try:
+        if _is_coco(document):
+            return _coco(document, document.get("annotations", []), source)
+        if _is_results(document):
+            if images is None:
+                msg = (
+                    f"{source} contains COCO results without images and categories; give the file "
+                    "of its annotations as well, which has them."
+                )
+                raise InputError(msg)
+            return _coco(images, document, source)
+        if _is_label_studio(document):
+            return [_label_studio(task, source) for task in document]
+        if (shots := mapillary_images(document)) is not None:
+            return mapillary_pictures(shots, source)
+    except MISSHAPEN as error:
+        if isinstance(error, InputError):
+            raise
+        lacks = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+        msg = f"{source} does not follow its format ({lacks}); export it again."
+        raise InputError(msg) from error
+    msg = f"{source} contains no detections in a known format; {ACCEPTED}."
+    raise InputError(msg)
+
+
+def _is_coco(document: Any) -> bool:  # noqa: ANN401 - any JSON
+    return isinstance(document, dict) and {"images", "categories"} <= document.keys()
+
+
+def _is_results(document: Any) -> bool:  # noqa: ANN401 - any JSON
+    return _is_list_with(document, "image_id", "category_id")
+
+
+def _is_label_studio(document: Any) -> bool:  # noqa: ANN401 - any JSON
+    return _is_list_with(document, "data")
+
+
+def _is_list_with(document: Any, *keys: str) -> bool:  # noqa: ANN401 - any JSON
+    return (
+        isinstance(document, list)
+        and bool(document)
+        and all(isinstance(item, dict) and set(keys) <= item.keys() for item in document)
+    )
+
+
+def _size(width: Any, height: Any) -> tuple[int, int] | None:  # noqa: ANN401 - any JSON
+    return (round(float(width)), round(float(height))) if width and height else None
+
+
+def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list[Picture]:
+    names = {item["id"]: item["name"] for item in document["categories"]}
+    boxes: dict[Any, list[Box]] = {item["id"]: [] for item in document["images"]}
+    others = dict.fromkeys(boxes, 0)
+    for number, item in enumerate(annotations, start=1):
+        where = f"{source}, annotation {number}"
+        image, category = item["image_id"], item["category_id"]
+        if image not in boxes or category not in names:
+            what = f"image {image!r}" if image not in boxes else f"category {category!r}"
+            msg = f"{where} is of the {what}, which is not listed; give the file that lists it."
+            raise InputError(msg)
+        # A crowd is a heap of objects, and a mask without a box may be any part of one.
+        if item.get("iscrowd") or not item.get("bbox"):
+            others[image] += 1
+            continue
+        left, top, width, height = item["bbox"]
+        corners = left, top, left + width, top + height
+        boxes[image].append(box_of(names[category], corners, where, score=item.get("score")))
+    return [
+        Picture(
+            name=str(item.get("file_name", item["id"])),
+            boxes=tuple(boxes[item["id"]]),
+            others=others[item["id"]],
+            shot=Shot(size=_size(item.get("width"), item.get("height"))),
+        )
+        for item in document["images"]
+    ]
+
+
+def _yolo(file: Path, names: Path | None) -> Picture:
+    lines = [line.split() for line in _text(file).splitlines()]
+    labels = _yolo_names(file, names) if any(lines) else {}
+    boxes = []
+    for number, values in enumerate(lines, start=1):
+        if not values:
+            continue
+        where = f"{file}, line {number}"
+        if len(values) < BOX or not values[0].isdecimal():
+            msg = (
+                f"{where} is not a line of YOLO labels; write class, x, y, width, height (and "
+                "score)."
+            )
+            raise InputError(msg)
+        if int(values[0]) not in labels:
+            msg = f"{where} is of class {values[0]}, which has no name; list it in data.yaml."
+            raise InputError(msg)
+        corners, score = _yolo_corners(values[1:], where)
+        boxes.append(box_of(labels[int(values[0])], corners, where, score=score))
+    return Picture(name=file.stem, boxes=tuple(boxes), shares=True)
+
+
+def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
+    """Return the corners, in shares of the picture, and the score of a line: a box or a polygon."""
+    try:
+        values = [float(text) for text in texts]
+    except ValueError as error:
+        msg = f"{where} has a value that is not a number; write class, x, y, width, height."
+        raise InputError(msg) from error
+    score = texts[-1] if len(texts) % 2 else None
+    if len(texts) <= BOX:
+        x, y, width, height = values[:4]
+        corners = x - width / 2, y - height / 2, x + width / 2, y + height / 2
+    else:
+        corners = bounds(zip(values[::2], values[1::2], strict=False))
+    if not all(-1 <= value <= 2 for value in corners):  # noqa: PLR2004 - a picture away
+        msg = f"{where} is not in shares of the picture; divide pixels by its width and height."
+        raise InputError(msg)
+    return corners, score
+
+
+def _yolo_names(file: Path, names: Path | None) -> dict[int, str]:
+    """Return the names of classes by number."""
+    beside = [folder / name for folder in (file.parent, file.parent.parent) for name in NAME_FILES]
+    listed = names or next((path for path in beside if path.is_file()), None)
+    if listed is None:
+        msg = f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
+        raise InputError(msg)
+    text = _text(listed)
+    if listed.suffix.lower() not in {".yaml", ".yml"}:
+        return dict(enumerate(text.split("\n")))
+    try:
+        found = yaml.safe_load(text)["names"]
+        pairs = found.items() if isinstance(found, dict) else enumerate(found)
+        return {int(number): str(name) for number, name in pairs}
+    except (yaml.YAMLError, RecursionError, *MISSHAPEN) as error:
+        msg = f"{listed} has no list of class names; give a YAML file with 'names'."
+        raise InputError(msg) from error
+
+
+def _label_studio(task: dict[str, Any], source: str) -> Picture:
+    where = f"{source}, task {task.get('id', '?')}"
+    drawn = [one for one in task.get("annotations") or [] if not one.get("was_cancelled")]
+    last = (drawn or task.get("predictions") or [{"result": []}])[-1]
+    boxes: list[Box] = []
+    size, others = None, 0
+    for item in last["result"]:
+        kind, value = str(item.get("type", "")), item.get("value", {})
+        size = _size(item.get("original_width"), item.get("original_height")) or size
+        if kind not in {"rectanglelabels", "polygonlabels"}:
+            others += kind.endswith("labels")
+            continue
+        label = value[kind][0] if value.get(kind) else "no label"
+        corners = _label_studio_corners(value, size or (1, 1))
+        boxes.append(box_of(label, corners, where, score=item.get("score")))
+    values = [text for text in task["data"].values() if isinstance(text, str)]
+    name = _picture_name(str(task["data"].get("image") or next(iter(values), task.get("id", "?"))))
+    return Picture(name=name, boxes=tuple(boxes), shares=True, others=others, shot=Shot(size=size))
+
+
+def _label_studio_corners(value: dict[str, Any], size: tuple[int, int]) -> Corners:
+    """Return the corners of a rectangle or polygon in percent, in shares of the picture."""
+    if "points" in value:
+        corners = bounds(value["points"])
+    else:
+        left, top = float(value["x"]), float(value["y"])
+        corners = left, top, left + float(value["width"]), top + float(value["height"])
+        if angle := float(value.get("rotation") or 0.0):
+            # About the corner that is left and top before it is turned, in pixels.
+            wide, high = size
+            scaled = corners[0] * wide, corners[1] * high, corners[2] * wide, corners[3] * high
+            round_it = turned(scaled, angle, (left * wide, top * high))
+            corners = (
+                round_it[0] / wide, round_it[1] / high, round_it[2] / wide, round_it[3] / high
+            )  # fmt: skip
+    first, second, third, fourth = (number / PERCENT for number in corners)
+    return first, second, third, fourth
+
+
+def _picture_name(address: str) -> str:
+    """Return the name of the file that an address of Label Studio stands for."""
+    parts = urlsplit(address)
+    path = (parse_qs(parts.query).get("d") or [parts.path])[0]
+    # Uploads get eight letters of their own before their names.
+    return re.sub(r"^[0-9a-f]{8}-", "", PurePosixPath(path).name) or address
+
+
+def _cvat(file: Path) -> list[Picture]:
+    text = _text(file)
+    if "<!DOCTYPE" in text:  # which may define texts that swell
+        msg = f"{file} defines its own document type; export it as CVAT for images 1.1."
+        raise InputError(msg)
+    try:
+        root = ET.fromstring(text)  # noqa: S314 - without a document type
+    except (ET.ParseError, ValueError) as error:
+        msg = f"{file} is not XML that can be read ({error}); export it as CVAT for images 1.1."
+        raise InputError(msg) from error
+    if root.tag != "annotations" or root.find("track") is not None:
+        what = "contains tracks of a video" if root.tag == "annotations" else "is not a CVAT file"
+        msg = f"{file} {what}; export it as CVAT for images 1.1."
+        raise InputError(msg)
+    try:
+        return [_cvat_picture(image, str(file)) for image in root.iter("image")]
+    except MISSHAPEN as error:
+        if isinstance(error, InputError):
+            raise
+        lacks = f"an image or shape lacks {error}" if isinstance(error, KeyError) else str(error)
+        msg = f"{file} does not follow its format ({lacks}); export it as CVAT for images 1.1."
+        raise InputError(msg) from error
+
+
+def _cvat_picture(image: ET.Element, source: str) -> Picture:
+    name = image.attrib["name"]
+    boxes, others = [], 0
+    for number, shape in enumerate(image, start=1):
+        if shape.tag == "box":
+            left, top, right, bottom = (float(shape.attrib[key]) for key in CVAT_CORNERS)
+            corners = left, top, right, bottom
+            if angle := float(shape.get("rotation", 0.0)):
+                corners = turned(corners, angle, ((left + right) / 2, (top + bottom) / 2))
+        elif shape.tag == "polygon":
+            corners = bounds(point.split(",") for point in shape.attrib["points"].split(";"))
+        else:
+            others += shape.tag != "tag"
+            continue
+        said = {one.get("name"): one.text for one in shape.iter("attribute")}
+        box = box_of(
+            shape.attrib["label"],
+            corners,
+            f"{source}, image {name!r}, shape {number}",
+            score=said.get("score", said.get("confidence")),
+            whole=shape.get("occluded", "0") != "1",
+        )
+        boxes.append(box)
+    size = _size(image.get("width"), image.get("height"))
+    return Picture(name=name, boxes=tuple(boxes), others=others, shot=Shot(size=size))
+
+
+CVAT_CORNERS = ("xtl", "ytl", "xbr", "ybr")

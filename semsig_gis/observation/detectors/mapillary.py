@@ -1,0 +1,191 @@
+"""Detections of Mapillary: images with their cameras, and outlines in vector tiles."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.observation.detectors.pictures import Picture, Shot, bounds, box_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from semsig_gis.observation.detectors.camera import Projection
+    from semsig_gis.observation.detectors.pictures import Corners
+
+CAMERAS: dict[str, Projection] = {
+    "perspective": "pinhole",
+    "brown": "pinhole",
+    "fisheye": "fisheye",
+    "equirectangular": "equirectangular",
+    "spherical": "equirectangular",
+}
+# Degrees: a heading that structure from motion has corrected, and that of a phone's compass.
+COMPUTED_ERROR, COMPASS_ERROR = 3.0, 10.0
+
+# Of the wire format: kinds of value, and which fields of a tile, a layer and a feature matter.
+VARINT, WIDE, BYTES, NARROW = 0, 1, 2, 5
+LAYER, FEATURE, GEOMETRY, EXTENT = 3, 2, 4, 5
+MOVE, LINE = 1, 2
+USUAL_EXTENT = 4096
+
+
+def mapillary_images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN401 - any JSON
+    """Return the images of a document with their detections; None if it is not of Mapillary.
+
+    It is an image with its ``detections``, several of them, or detections, perhaps each with its
+    ``image``.
+    """
+    items = document["data"] if isinstance(document, dict) and "data" in document else document
+    items = [items] if isinstance(items, dict) else items
+    if not isinstance(items, list) or not items or not all(isinstance(one, dict) for one in items):
+        return None
+    if all("detections" in item for item in items):
+        return items
+    if not all({"value", "geometry"} <= item.keys() for item in items):
+        return None
+    images: dict[str, dict[str, Any]] = {}
+    for item in items:
+        image = item.get("image") or {}
+        known = images.setdefault(str(image.get("id", "")), {**image, "detections": {"data": []}})
+        known["detections"]["data"].append(item)
+    return list(images.values())
+
+
+def mapillary_pictures(images: list[dict[str, Any]], source: str) -> list[Picture]:
+    """Return the pictures of what `mapillary_images` gives."""
+    return [_picture(image, source) for image in images]
+
+
+def _picture(image: dict[str, Any], source: str) -> Picture:
+    name = str(image.get("id") or "") or source
+    found = image["detections"]
+    detections = found["data"] if isinstance(found, dict) else found
+    size = (int(image["width"]), int(image["height"])) if image.get("width") else None
+    boxes = []
+    for number, item in enumerate(detections, start=1):
+        where = f"{source}, image {name}, detection {number}"
+        corners, shares = _corners(item["geometry"], where)
+        if not shares:
+            if size is None:
+                msg = (
+                    f"{where} is in pixels of a picture of unknown size; request its width as well."
+                )
+                raise InputError(msg)
+            left, top, right, bottom = corners
+            corners = left / size[0], top / size[1], right / size[0], bottom / size[1]
+        boxes.append(box_of(item["value"], corners, where))
+    shot = _shot(image, size)
+    return Picture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
+
+
+def _shot(image: dict[str, Any], size: tuple[int, int] | None) -> Shot:
+    computed, compass = image.get("computed_compass_angle"), image.get("compass_angle")
+    heading = compass if computed is None else computed
+    camera = CAMERAS.get(str(image.get("camera_type", "")).lower())
+    focal = next(iter(image.get("camera_parameters") or []), None)
+    where = (image.get("computed_geometry") or image.get("geometry") or {}).get("coordinates")
+    return Shot(
+        camera=camera,
+        focal=float(focal) if focal and camera in {"pinhole", "fisheye"} else None,
+        heading=None if heading is None else float(heading) % 360.0,
+        heading_error=COMPASS_ERROR if computed is None else COMPUTED_ERROR,
+        north="true",
+        size=size,
+        position=(float(where[1]), float(where[0])) if where else None,
+    )
+
+
+def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401 - any JSON
+    """Return the box of an outline, and whether it is in shares of the picture, not in pixels."""
+    if isinstance(geometry, str):
+        try:
+            return bounds(_tile_points(base64.b64decode(geometry, validate=True))), True
+        except (binascii.Error, ValueError, IndexError, TypeError, ZeroDivisionError) as error:
+            msg = f"{where} has a geometry that is not a vector tile in base64; download it again."
+            raise InputError(msg) from error
+    points = list(_points(geometry.get("coordinates") if isinstance(geometry, dict) else geometry))
+    corners = bounds(points)
+    return corners, max(corners) <= 1.0
+
+
+def _points(values: Any) -> Iterator[list[Any]]:  # noqa: ANN401 - any JSON
+    """Give the points of lists of lists of points."""
+    if isinstance(values[0], list):
+        for value in values:
+            yield from _points(value)
+    else:
+        yield values
+
+
+def _tile_points(tile: bytes) -> list[tuple[float, float]]:
+    """Return the points of all outlines of a vector tile, in shares of its extent.
+
+    See the Mapbox vector tile specification, 2.1; rows count downwards, as in the picture.
+    """
+    points: list[tuple[float, float]] = []
+    for layer in _values(tile, LAYER):
+        extent = next(_values(layer, EXTENT), USUAL_EXTENT)
+        for feature in _values(layer, FEATURE):
+            for geometry in _values(feature, GEOMETRY):
+                points += [(x / extent, y / extent) for x, y in _outline(geometry)]
+    return points
+
+
+def _outline(geometry: bytes) -> Iterator[tuple[int, int]]:
+    """Give the points of a geometry: commands with their counts, and steps from the last point."""
+    numbers = iter(_varints(geometry))
+    x = y = 0
+    for command in numbers:
+        if command & 7 in {MOVE, LINE}:
+            for _ in range(command >> 3):
+                x, y = x + _signed(next(numbers)), y + _signed(next(numbers))
+                yield x, y
+
+
+def _signed(number: int) -> int:
+    return (number >> 1) ^ -(number & 1)
+
+
+def _varints(data: bytes) -> Iterator[int]:
+    place = 0
+    while place < len(data):
+        number, place = _varint(data, place)
+        yield number
+
+
+def _varint(data: bytes, place: int) -> tuple[int, int]:
+    """Return a number of seven bits a byte, least first, and where it ends."""
+    number = shift = 0
+    while True:
+        byte = data[place]
+        number |= (byte & 127) << shift
+        place, shift = place + 1, shift + 7
+        if byte < 128:  # noqa: PLR2004 - the bit that says that more follow
+            return number, place
+
+
+def _values(message: Any, field: int) -> Iterator[Any]:  # noqa: ANN401 - bytes or a number
+    """Give the values of one field of a protocol buffer message."""
+    place = 0
+    while place < len(message):
+        key, place = _varint(message, place)
+        kind = key & 7
+        value: Any
+        if kind == VARINT:
+            value, place = _varint(message, place)
+        elif kind == BYTES:
+            length, place = _varint(message, place)
+            value, place = message[place : place + length], place + length
+            if place > len(message):
+                msg = "it ends early"
+                raise ValueError(msg)
+        elif kind in {WIDE, NARROW}:
+            value, place = None, place + (8 if kind == WIDE else 4)
+        else:
+            msg = f"{kind} is an unknown kind of value"
+            raise ValueError(msg)
+        if key >> 3 == field:
+            yield value

@@ -1,0 +1,440 @@
+"""From pictures with boxes, and what is known of the camera, to views."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from semsig_gis.core.checks import require_number
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
+from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD, Taxonomy
+from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
+from semsig_gis.observation.detectors.exif import read_exif
+from semsig_gis.observation.detectors.pictures import Shot
+from semsig_gis.observation.view import CLASSES, MOST_RANGE_ERROR, Photo, View
+from semsig_gis.sources.catalog import built_in_taxonomy
+from semsig_gis.storage.rows import read_rows, row_value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.observation.detectors.labels import LabelMap, Meaning
+    from semsig_gis.observation.detectors.pictures import Box, Picture
+    from semsig_gis.storage.rows import Row
+
+Places = Literal["each", "gps", "all"]
+"""Which pictures are of one place: none, those within a few metres, or all."""
+
+SAME_PLACE_M = 5.0
+METRES_PER_DEGREE = 111_320.0
+PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".JPG", ".JPEG", ".PNG")
+
+# A box so near to the picture's edge goes on beyond it: pixels, and share of the side.
+EDGE_PIXELS, EDGE_SHARE = 1.0, 0.002
+EDGE_ERROR_PIXELS = 1.0
+"""By how much the height of a box is off, the deviation of both its ends."""
+
+SCORE_DIGITS, DEGREE_DIGITS, METRE_DIGITS, ERROR_DIGITS = 4, 2, 2, 3
+
+
+@dataclass(slots=True)
+class Tally:
+    """What became of the pictures and boxes of some files."""
+
+    photos: int = 0
+    objects: int = 0
+    ranges: int = 0
+    below_min_score: int = 0
+    no_boxes: int = 0
+    no_objects: Counter[str] = field(default_factory=Counter)
+    unknown: Counter[str] = field(default_factory=Counter)
+    not_in_city: Counter[str] = field(default_factory=Counter)
+    unknown_heading: int = 0
+    north: Counter[str] = field(default_factory=Counter)
+    times: dict[str, str] = field(default_factory=dict)
+    """When the first picture of a view was taken, by the name of the view, where that is known."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the counts for JSON."""
+        return {
+            "photos": self.photos,
+            "objects": self.objects,
+            "with_range": self.ranges,
+            "unknown_heading": self.unknown_heading,
+            "headings_from_north": dict(self.north),
+            "left_out": {
+                "below_min_score": self.below_min_score,
+                "no_boxes": self.no_boxes,
+                "no_street_objects": dict(self.no_objects),
+                "unknown_labels": dict(self.unknown),
+                "classes_not_in_city": dict(self.not_in_city),
+            },
+        }
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Sightings:
+    """What stands in a picture, box by box.
+
+    `corners`, shape (n, 4), are in pixels, `bearings` in degrees clockwise from where the camera
+    looks, `ranges` in metres with their relative `range_errors`, NaN where they are not known, and
+    `scores`, shape (n, 256), the chance of each class code.
+    """
+
+    camera: Camera
+    shot: Shot
+    corners: NDArray[np.float64]
+    bearings: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    range_errors: NDArray[np.float64]
+    scores: NDArray[np.float64]
+
+    @property
+    def codes(self) -> NDArray[np.uint8]:
+        """The likeliest class of each, any class where none is named."""
+        named = self.scores[:, 1:]
+        codes = np.where(named.any(axis=1), 1 + named.argmax(axis=1), WILDCARD)
+        return codes.astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detector:
+    """What turns pictures with boxes into views.
+
+    Parameters
+    ----------
+    labels : LabelMap
+        What the labels stand for.
+    taxonomy : Taxonomy
+        Classes that are meant; others are left out and counted.
+    min_score : float, default 0.3
+        Boxes that the detector is less sure of are left out and counted.
+    shot : Shot, optional
+        What is known of all pictures.
+    shots : mapping of str to Shot, optional
+        What is known of single ones, by the name of their file.
+    folders : sequence of Path, optional
+        Where the pictures lie, whose EXIF tells more.
+    """
+
+    labels: LabelMap
+    taxonomy: Taxonomy
+    min_score: float = 0.3
+    shot: Shot = field(default_factory=Shot)
+    shots: Mapping[str, Shot] = field(default_factory=dict)
+    folders: Sequence[Path] = ()
+
+    def views(
+        self, pictures: Iterable[Picture], *, places: Places = "each"
+    ) -> tuple[list[tuple[str, View]], Tally]:
+        """Return the view of each place with the name of its first picture, and what was counted.
+
+        Pictures that are of one place by their table are one view anyway. InputError if the size or
+        the field of view of a picture is not known, a number is out of its range, or what is known
+        of single pictures is of none of these.
+        """
+        pictures = list(pictures)
+        self._require_known(pictures)
+        tally = Tally()
+        groups: dict[str, list[View]] = {}
+        names: dict[str, str] = {}
+        placed: list[tuple[tuple[float, float], str]] = []
+        for number, picture in enumerate(pictures):
+            shot = self._shot(picture)
+            tally.no_boxes += picture.others
+            view = self._view(picture, tally)
+            key = f"{number}"
+            if shot.place is not None:
+                key = f"place {shot.place}"
+            elif places == "all":
+                key = "all"
+            elif places == "gps" and shot.position is not None:
+                near = (one for at, one in placed if _metres(at, shot.position) <= SAME_PLACE_M)
+                key = next(near, key)
+                placed += [(shot.position, key)] if key not in groups else []
+            if key not in names:
+                names[key] = picture.name if shot.place is None else shot.place
+                tally.times |= {} if shot.time is None else {names[key]: shot.time}
+            groups.setdefault(key, []).append(view)
+        views = [
+            (names[key], parts[0] if len(parts) == 1 else View.joined(parts).turned(0.0))
+            for key, parts in groups.items()
+        ]
+        return views, tally
+
+    def _require_known(self, pictures: Sequence[Picture]) -> None:
+        """Refuse a table of other pictures, without which every heading would be unknown."""
+        if (
+            self.shots
+            and pictures
+            and not self.shots.keys() & {name for picture in pictures for name in _names(picture)}
+        ):
+            msg = (
+                f"--photos names {next(iter(self.shots))}, but none of the pictures with boxes; "
+                f"name them as {pictures[0].name}."
+            )
+            raise InputError(msg)
+
+    def _shot(self, picture: Picture) -> Shot:
+        """Return all that is known of how a picture was taken."""
+        own = next((self.shots[name] for name in _names(picture) if name in self.shots), Shot())
+        if own.heading_error is None:
+            own = replace(own, heading_error=self.shot.heading_error)
+        shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
+        if file := _file_of(picture.name, self.folders):
+            shot = shot.filled(read_exif(file))
+        return shot.filled(Shot(size=self.shot.size))
+
+    def _camera(self, picture: Picture, shot: Shot) -> Camera:
+        if shot.size is None:
+            msg = (
+                f"the size of the picture {picture.name} is not known; give the folder of the "
+                "pictures with --images, or --size WIDTHxHEIGHT."
+            )
+            raise InputError(msg)
+        width, height = shot.size
+        fov = field_of_view(shot)
+        if fov is None:
+            msg = (
+                f"the field of view of the picture {picture.name} is not known; give --fov in "
+                "degrees, or with --images the folder of the pictures, whose EXIF may contain it."
+            )
+            raise InputError(msg)
+        return Camera(
+            width=width,
+            height=height,
+            fov=fov,
+            projection=shot.camera or "pinhole",
+            pitch=shot.pitch or 0.0,
+            roll=shot.roll or 0.0,
+        )
+
+    def sightings(self, picture: Picture, tally: Tally) -> Sightings:
+        """Return what stands in a picture, and count it; raises as `views` does."""
+        shot = self._shot(picture)
+        camera = self._camera(picture, shot)
+        kept = [(box, meaning) for box in picture.boxes if (meaning := self._kept(box, tally))]
+        scale = np.array([camera.width, camera.height] * 2, dtype=float)
+        corners = np.array([box.corners for box, _ in kept], dtype=float).reshape(-1, 4)
+        corners = np.clip(corners * (scale if picture.shares else 1.0), 0.0, scale)
+        bearings, ranges, errors = placed(
+            camera,
+            corners,
+            heights=np.array([self._height(meaning) for _, meaning in kept]).reshape(-1, 2),
+            whole=np.array([box.whole for box, _ in kept], dtype=bool),
+        )
+        tally.photos += 1
+        tally.objects += len(kept)
+        tally.ranges += int(np.isfinite(ranges).sum())
+        return Sightings(
+            camera=camera,
+            shot=shot,
+            corners=corners,
+            bearings=bearings,
+            ranges=ranges,
+            range_errors=errors,
+            scores=np.array([self._scores(*one) for one in kept]).reshape(-1, CLASSES),
+        )
+
+    def _view(self, picture: Picture, tally: Tally) -> View:
+        """Return what is in a picture."""
+        seen = self.sightings(picture, tally)
+        ranges, errors, scores = seen.ranges, seen.range_errors, seen.scores
+        heading, error = seen.shot.heading, seen.shot.heading_error
+        if heading is None:
+            tally.unknown_heading += 1
+            heading, error = 0.0, math.inf
+        elif seen.shot.north is not None:
+            tally.north[seen.shot.north] += 1
+        sure = bool((scores.max(axis=1, initial=0.0) == 1.0).all())
+        any_range = bool(np.isfinite(ranges).any())
+        bearings = wrap_degrees(heading + seen.bearings)
+        bearings = np.round(bearings, DEGREE_DIGITS) % FULL_TURN
+        sectors = [
+            (float(wrap_degrees(low + heading)), high - low) for low, high in seen.camera.sectors()
+        ]
+        return View(
+            seen.codes,
+            bearings,
+            ranges=np.round(ranges, METRE_DIGITS) if any_range else None,
+            range_errors=np.round(errors, ERROR_DIGITS) if any_range else None,
+            scores=None if sure else scores,
+            photos=(
+                Photo(
+                    sectors=tuple((low, low + width) for low, width in sectors), north_sigma=error
+                ),
+            ),
+        ).turned(0.0)
+
+    def _kept(self, box: Box, tally: Tally) -> Meaning | None:
+        """Return what a box stands for, or None where it is left out, and count that."""
+        if box.score < self.min_score:
+            tally.below_min_score += 1
+            return None
+        meaning = self.labels.find(box.label)
+        if meaning is None:
+            tally.unknown[box.label] += 1
+        elif not meaning.classes:
+            tally.no_objects[box.label] += 1
+        elif not any(self._code(name) for name, _ in meaning.classes):
+            tally.not_in_city[box.label] += 1
+        else:
+            return meaning
+        return None
+
+    def _code(self, name: str) -> int:
+        """Return the code of a class, that of any class where the city has none of that name."""
+        try:
+            return self.taxonomy.by_name(name).code
+        except UnknownNameError:
+            return WILDCARD
+
+    def _scores(self, box: Box, meaning: Meaning) -> NDArray[np.float64]:
+        """Return the chance of each class code, shape (256,); what is not sure is any class."""
+        scores = np.zeros(CLASSES)
+        for name, share in meaning.classes:
+            scores[self._code(name)] += round(share * box.score, SCORE_DIGITS)
+        scores[WILDCARD] = 0.0
+        scores[WILDCARD] = max(round(1.0 - scores.sum(), SCORE_DIGITS), 0.0)
+        return scores
+
+    def _height(self, meaning: Meaning) -> tuple[float, float]:
+        """Return how tall the boxes of a label are and the deviation of that, or NaN."""
+        known = meaning.height
+        if known is None and not meaning.part and len(meaning.classes) == 1:
+            item = self.taxonomy.by_name(meaning.classes[0][0])
+            if item.height_m is not None and item.height_sigma is not None:
+                known = item.height_m, item.height_sigma
+        return known or (math.nan, math.nan)
+
+
+def field_of_view(shot: Shot) -> float | None:
+    """Return over how many degrees the width of a picture reaches, None where nobody says."""
+    projection = shot.camera or "pinhole"
+    if shot.fov is None and shot.focal and shot.size and projection in {"pinhole", "fisheye"}:
+        half = shot.size[0] / 2.0 / (shot.focal * max(shot.size))
+        fov = math.degrees(2.0 * (math.atan(half) if projection == "pinhole" else half))
+        return min(fov, FULL_TURN)
+    return shot.fov or USUAL_FOV.get(projection)
+
+
+def placed(
+    camera: Camera,
+    corners: NDArray[np.float64],
+    *,
+    heights: NDArray[np.float64],
+    whole: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return where the things in boxes stand: bearings, ranges and their relative errors.
+
+    `corners`, shape (n, 4), are in pixels; `heights`, shape (n, 2), how tall the things are and the
+    deviation of that in metres, NaN where that is not known; `whole` tells which boxes hide
+    nothing. Bearings are degrees clockwise from where the camera looks. Ranges are NaN where the
+    picture does not tell.
+    """
+    standing = camera.standing(corners)
+    scale = np.array([camera.width, camera.height] * 2, dtype=float)
+    margin = np.maximum(EDGE_PIXELS, EDGE_SHARE * scale)
+    whole = whole & ((corners > margin) | (np.arange(4) >= 2)).all(axis=1)  # noqa: PLR2004
+    whole &= ((corners < scale - margin) | (np.arange(4) < 2)).all(axis=1)  # noqa: PLR2004
+    ranges: NDArray[np.float64] = np.where(whole, heights[:, 0] / standing.rises, np.nan)
+    ranges[~(ranges <= MAX_RANGE_M)] = np.nan
+    errors: NDArray[np.float64] = np.hypot(
+        heights[:, 1] / heights[:, 0], EDGE_ERROR_PIXELS / standing.pixels
+    )
+    errors = np.where(np.isnan(ranges), np.nan, np.minimum(errors, MOST_RANGE_ERROR))
+    return standing.bearings, ranges, errors
+
+
+def with_heights(taxonomy: Taxonomy) -> Taxonomy:
+    """Return classes with the heights of the built-in ones of their names, where not said."""
+    tall = {item.name: (item.height_m, item.height_sigma) for item in built_in_taxonomy().classes}
+    classes = []
+    for item in taxonomy.classes:
+        own = item.height_m, item.height_sigma
+        height, sigma = tall.get(item.name, own) if item.height_m is None else own
+        classes.append(replace(item, height_m=height, height_sigma=sigma))
+    return Taxonomy(tuple(classes))
+
+
+def read_shots(path: str | Path) -> dict[str, Shot]:
+    """Read what is known of single pictures from a CSV or JSON lines file, by name.
+
+    The columns are ``image``, the name of its file, and any of ``camera``, ``fov``, ``heading``,
+    ``heading_error``, ``pitch``, ``roll`` and ``place``. InputError if a row cannot be used.
+    """
+    shots: dict[str, Shot] = {}
+    for _, (name, shot) in read_rows(path, _shot_of, what="picture"):
+        shots[name] = shots[PurePosixPath(name).stem] = shot
+    return shots
+
+
+def _shot_of(row: Row) -> tuple[str, Shot]:
+    name = row_value(row, "image")
+    if name is None:
+        msg = "it names no image"
+        raise InputError(msg)
+    camera, place = row_value(row, "camera"), row_value(row, "place")
+    if camera is not None and camera not in get_args(Projection):
+        msg = f"the camera {camera!r} is none of {', '.join(get_args(Projection))}"
+        raise InputError(msg)
+    numbers: dict[str, Any] = {
+        name: float(value)
+        for name in ("fov", "heading", "pitch", "roll")
+        if (value := row_value(row, name)) is not None
+    }
+    if "heading" in numbers:
+        require_number(
+            "the heading", numbers["heading"], least=-FULL_TURN, most=FULL_TURN, unit="degrees"
+        )
+    error = row_value(row, "heading_error")
+    return str(name), Shot(
+        camera=camera,
+        place=None if place is None else str(place),
+        heading_error=None if error is None else north_sigma(error),
+        **numbers,
+    )
+
+
+def north_sigma(error: str | float) -> float:
+    """Return the error of a heading in degrees, infinite for ``unknown``."""
+    try:
+        return math.inf if error == "unknown" else float(error)
+    except ValueError as fault:
+        msg = f"the error of a heading is {error!r}; give degrees or 'unknown'."
+        raise InputError(msg) from fault
+
+
+def _names(picture: Picture) -> tuple[str, str, str]:
+    """Return the names by which others may call a picture."""
+    path = PurePosixPath(picture.name)
+    return picture.name, path.name, path.stem
+
+
+def _file_of(name: str, folders: Iterable[Path]) -> Path | None:
+    """Return the picture of a name in some folders, None if it is in none."""
+    path = PurePosixPath(name)
+    endings = ("", *PICTURE_SUFFIXES) if path.suffix == "" else ("",)
+    places = (
+        folder / f"{one}{ending}"
+        for folder in folders
+        for one in (path, path.name)
+        for ending in endings
+    )
+    return next((place for place in places if place.is_file()), None)
+
+
+def _metres(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Return about how far two places in degrees of latitude and longitude are apart."""
+    north = one[0] - other[0]
+    east = (one[1] - other[1]) * math.cos(math.radians(one[0]))
+    return METRES_PER_DEGREE * math.hypot(north, east)

@@ -1,0 +1,362 @@
+"""Views: what a detector or a person saw from one place, and in which directions they looked.
+
+A view is a signature of which more may be known: rough distances, scores of several classes, and
+the sectors that were looked at, as those of a photograph.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core.checks import require_number
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
+from semsig_gis.core.signature import Signature
+from semsig_gis.core.taxonomy import MAX_CODE, MAX_RANGE_M, WILDCARD
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from semsig_gis.core.taxonomy import Taxonomy
+
+LEAST_TURN = 0.001
+MOST_RANGE_ERROR = 3.0
+ROUNDING = 1e-6  # of sums of scores
+EDGE = 0.05  # degrees, of bearings and sectors that others rounded
+CLASSES = MAX_CODE + 1
+
+Sector = tuple[float, float]
+"""From one bearing clockwise to another, in degrees; the second may be 360 or more."""
+
+
+def check_north(north_sigma: float) -> None:
+    """Refuse a standard deviation of north, in degrees, that is out of range.
+
+    It is 0, or 0.001 to 360; infinite where nothing is known of north.
+    """
+    if north_sigma not in {0, math.inf}:
+        require_number(
+            "deviation of north",
+            north_sigma,
+            least=LEAST_TURN,
+            most=FULL_TURN,
+            unit="degrees, 0 or infinity",
+        )
+
+
+def _joined(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
+    """Return sectors clockwise from north, overlapping ones as one; none for the full turn."""
+    spans = []
+    for start, end in sectors:
+        for value in (start, end):
+            require_number("a sector", value, least=-FULL_TURN, most=2 * FULL_TURN, unit="degrees")
+        width = end - start
+        if width < 0 or width > FULL_TURN:
+            width %= FULL_TURN
+        if width == 0:
+            msg = f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
+            raise InputError(msg)
+        low = float(wrap_degrees(start))
+        spans.append((low, low + width))
+    merged: list[Sector] = []
+    for low, high in sorted(spans):
+        if merged and low <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(high, merged[-1][1])
+        else:
+            merged.append((low, high))
+    # The last ones may reach over north, into the first ones.
+    while len(merged) > 1 and merged[-1][1] - FULL_TURN >= merged[0][0]:
+        _, high = merged.pop(0)
+        merged[-1] = merged[-1][0], max(merged[-1][1], high + FULL_TURN)
+    whole = sum(high - low for low, high in merged) >= FULL_TURN
+    return () if whole else tuple(merged)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Photo:
+    """A look in some directions: a photograph, or a panorama.
+
+    Parameters
+    ----------
+    sectors : tuple of (float, float), default ()
+        What was seen: from one bearing clockwise to another, in degrees from -360 to 720. Sectors
+        that overlap become one; none stands for the full turn.
+    north_sigma : float, optional
+        Standard deviation in degrees of its north, 0 or 0.001 to 360, infinite if not known; by
+        which all its bearings and sectors are off together. None if the query sets it.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> Photo(sectors=((350, 20), (10, 40))).sectors
+    ((350.0, 400.0),)
+    >>> Photo.looking(heading=90, fov=70).sees([60, 200]).tolist()
+    [True, False]
+    """
+
+    sectors: tuple[Sector, ...] = ()
+    north_sigma: float | None = None
+
+    def __post_init__(self) -> None:  # noqa: D105
+        object.__setattr__(self, "sectors", _joined(self.sectors))
+        if self.north_sigma is not None:
+            check_north(self.north_sigma)
+
+    @classmethod
+    def looking(cls, *, heading: float, fov: float, north_sigma: float | None = None) -> Photo:
+        """Return the photo of a camera that looks at a bearing and sees `fov` degrees around it."""
+        require_number("heading", heading, least=-FULL_TURN, most=FULL_TURN, unit="degrees")
+        if not 0 < fov <= FULL_TURN:
+            msg = f"a field of view of {fov} degrees was given; give degrees above 0, at most 360."
+            raise InputError(msg)
+        start = float(wrap_degrees(heading - fov / 2.0))
+        sector = start, start + fov
+        return cls(sectors=() if fov == FULL_TURN else (sector,), north_sigma=north_sigma)
+
+    @property
+    def width(self) -> float:
+        """How many degrees were looked at."""
+        return sum(end - start for start, end in self.sectors) if self.sectors else FULL_TURN
+
+    def sees(self, bearings: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which bearings were looked at."""
+        angles = np.asarray(bearings, dtype=np.float64)
+        seen = np.full(angles.shape, not self.sectors)
+        for start, end in self.sectors:
+            seen |= wrap_degrees(angles - start) <= end - start
+        return seen
+
+    def turned(self, degrees: float) -> Photo:
+        """Return the same with bearings that are so many degrees larger."""
+        start = [(float(wrap_degrees(low + degrees)), high - low) for low, high in self.sectors]
+        return replace(self, sectors=tuple((low, low + width) for low, width in start))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON: ``sectors`` and ``heading_error``, if they are given."""
+        values: dict[str, Any] = {}
+        if self.sectors:
+            values["sectors"] = [[low, high % FULL_TURN] for low, high in self.sectors]
+        if self.north_sigma is not None:
+            unknown = math.isinf(self.north_sigma)
+            values["heading_error"] = "unknown" if unknown else self.north_sigma
+        return values
+
+
+FULL_VIEW: Photo = Photo()
+"""The full turn."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class View(Signature):
+    """What was seen from one place: a signature of which more may be known.
+
+    Methods on sequences take its `codes` and `bearings`; the likelihood takes all of it.
+
+    Parameters
+    ----------
+    codes, bearings : ndarray, shape (n,), or None
+        As of `Signature`; what follows, if anything, needs both or the bearings.
+    ranges : ndarray of float64, shape (n,), or None
+        Rough distance of each object in metres, NaN where it is not known.
+    range_errors : ndarray of float64, shape (n,), or None
+        Relative error of each distance, the standard deviation of its logarithm, above 0 and up to
+        3; NaN where the noise model is to say.
+    scores : ndarray of float64, shape (n, 256), or None
+        The detector's chance of each class code for each object; each row sums to one. What it
+        gives to code 0 stands for any class.
+    photo : ndarray of int64, shape (n,), or None
+        Which photo each object is from; the first by default.
+    photos : tuple of Photo, default one full turn
+        The directions looked at, each with its own error of north.
+
+    Raises
+    ------
+    InputError
+        If the parts differ in length, or a number is out of its range.
+
+    Examples
+    --------
+    >>> lamps = Signature(np.array([3, 3], np.uint8), np.array([80.0, 110.0]))
+    >>> view = View.of(lamps, photos=(Photo.looking(heading=90, fov=70),))
+    >>> len(view), view.photos[0].width
+    (2, 70.0)
+    """
+
+    ranges: NDArray[np.float64] | None = None
+    range_errors: NDArray[np.float64] | None = None
+    scores: NDArray[np.float64] | None = None
+    photo: NDArray[np.int64] | None = None
+    photos: tuple[Photo, ...] = (FULL_VIEW,)
+
+    def __post_init__(self) -> None:  # noqa: D105
+        super().__post_init__()
+        for name in ("ranges", "range_errors", "scores", "photo"):
+            value = getattr(self, name)
+            if value is not None:
+                kind = np.int64 if name == "photo" else np.float64
+                object.__setattr__(self, name, np.asarray(value, dtype=kind))
+        self._check()
+
+    def _facts(self) -> dict[str, object]:
+        seen = ", ".join(f"{photo.width:g}°" for photo in self.photos)
+        told = [name for name in ("ranges", "scores") if getattr(self, name) is not None]
+        return {**super()._facts(), "seen": seen, "told": ", ".join(told) or "no more"}
+
+    def _check(self) -> None:
+        """Refuse parts that do not fit each other, or numbers out of range."""
+        plain = self.photos == (FULL_VIEW,) and self.ranges is None
+        if self.bearings is None and not plain:
+            msg = "a view with ranges or sectors needs the bearings of its objects; give them."
+            raise InputError(msg)
+        shapes = {"ranges": (), "range_errors": (), "photo": (), "scores": (CLASSES,)}
+        for name, rest in shapes.items():
+            value = getattr(self, name)
+            if value is not None and value.shape != (len(self), *rest):
+                msg = (
+                    f"{len(value)} {name.replace('_', ' ')} were given for {len(self)} objects; "
+                    "give one for each."
+                )
+                raise InputError(msg)
+        for name, most in (("ranges", MAX_RANGE_M), ("range_errors", MOST_RANGE_ERROR)):
+            value = getattr(self, name)
+            if value is not None and len(
+                bad := value[~(np.isnan(value) | (value > 0)) | (value > most)]
+            ):
+                what = name.replace("_", " ").removesuffix("s")
+                msg = f"a {what} is {bad[0]:g}; give a number above 0 and up to {most:,.0f}."
+                raise InputError(msg)
+        if self.scores is not None and len(self):
+            sums = self.scores.sum(axis=1)
+            if not ((self.scores >= 0).all() and np.allclose(sums, 1.0, atol=ROUNDING)):
+                msg = (
+                    "the scores of an object are not chances; give numbers from 0 that add up to 1."
+                )
+                raise InputError(msg)
+        if not self.photos:
+            msg = "a view of no photo was given; give at least one, or leave photos out."
+            raise InputError(msg)
+        if len(self) and not 0 <= self.photo_rows.min() <= self.photo_rows.max() < len(self.photos):
+            msg = f"an object is from a photo that is not there; the view has {len(self.photos)}."
+            raise InputError(msg)
+
+    @classmethod
+    def of(cls, signature: Signature, **more: Any) -> View:  # noqa: ANN401 - any field
+        """Return a signature as a view, with some of its fields given anew."""
+        if isinstance(signature, View):
+            return replace(signature, **more) if more else signature
+        return cls(signature.codes, signature.bearings, **more)
+
+    @classmethod
+    def joined(cls, views: Iterable[Signature]) -> View:
+        """Return several views of one place as one, each photo with its own error of north."""
+        parts = [cls.of(view) for view in views]
+        before = np.cumsum([0, *(len(part.photos) for part in parts)])
+
+        def column(name: str, blank: float) -> NDArray[Any] | None:
+            columns = [getattr(part, name) for part in parts]
+            if all(value is None for value in columns):
+                return None
+            filled = [
+                np.full(len(part), blank) if value is None else value
+                for part, value in zip(parts, columns, strict=True)
+            ]
+            return np.concatenate(filled)
+
+        scored = any(part.scores is not None for part in parts)
+        shares = [part.class_scores() for part in parts] if scored else []
+        rows = [part.photo_rows + first for part, first in zip(parts, before, strict=False)]
+        return cls(
+            column("codes", WILDCARD),
+            column("bearings", math.nan),
+            ranges=column("ranges", math.nan),
+            range_errors=column("range_errors", math.nan),
+            scores=np.concatenate(shares) if scored else None,
+            photo=np.concatenate(rows),
+            photos=tuple(photo for part in parts for photo in part.photos),
+        )
+
+    @property
+    def photo_rows(self) -> NDArray[np.int64]:
+        """Which photo each object is from, shape (n,)."""
+        return np.zeros(len(self), np.int64) if self.photo is None else self.photo
+
+    def split(self) -> tuple[View, ...]:
+        """Return the views of its photos one by one."""
+        if len(self.photos) == 1:
+            return (self,)
+        rows = self.photo_rows
+        return tuple(
+            replace(self.select(rows == number), photo=None, photos=(photo,))
+            for number, photo in enumerate(self.photos)
+        )
+
+    def outside(self) -> NDArray[np.int64]:
+        """Return the rows of the objects where their photo did not look, but for rounding."""
+        if self.bearings is None:
+            return np.empty(0, np.int64)
+        around = self.bearings + np.array([[-EDGE], [0.0], [EDGE]])
+        seen = np.stack([photo.sees(around).any(axis=0) for photo in self.photos])
+        return np.flatnonzero(~seen[self.photo_rows, np.arange(len(self))])
+
+    def class_scores(self) -> NDArray[np.float64]:
+        """Return the chance of each class code for each object, shape (n, 256)."""
+        if self.scores is not None:
+            return self.scores
+        codes = np.full(len(self), WILDCARD) if self.codes is None else self.codes
+        return np.eye(CLASSES)[codes]
+
+    def among(self, codes: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which objects may be of these classes, or are of unknown class, shape (n,)."""
+        if self.scores is None:
+            return super().among(codes)
+        kept = np.append(np.asarray(codes, dtype=np.int64), WILDCARD)
+        return np.asarray(self.scores[:, kept].sum(axis=1) > 0)
+
+    def select(self, objects: NDArray[np.bool_ | np.int64]) -> View:
+        """Return the view with some of the objects alone, by their row numbers or a mask."""
+        names = ("codes", "bearings", "ranges", "range_errors", "scores", "photo")
+        values = {name: getattr(self, name) for name in names}
+        kept = {name: None if value is None else value[objects] for name, value in values.items()}
+        return View(kept.pop("codes"), kept.pop("bearings"), **kept, photos=self.photos)
+
+    def turned(self, degrees: float) -> View:
+        """Return the view with bearings that are so many degrees larger, clockwise."""
+        if self.bearings is None:
+            return self
+        bearings = wrap_degrees(self.bearings + degrees)
+        photos = tuple(photo.turned(degrees) for photo in self.photos)
+        turned = replace(self, bearings=bearings, photos=photos)
+        return turned.select(np.argsort(bearings, kind="stable"))
+
+    def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
+        """Return what `Signature.to_dict` gives, and what else is known, ready for JSON.
+
+        ``ranges`` and ``range_errors`` have None where nothing is known, ``scores`` is by name of
+        the class. What `Photo.to_dict` tells of one photo stands beside it; of several it is in
+        ``photos``, and ``photo`` tells which one each object is in. `parse_view` reads it again.
+        """
+        values = super().to_dict(taxonomy)
+        for name in ("ranges", "range_errors"):
+            column = getattr(self, name)
+            if column is not None:
+                values[name] = [None if math.isnan(one) else one for one in column.tolist()]
+        if self.scores is not None:
+            names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
+            values["scores"] = [
+                {names[code]: float(row[code]) for code in np.flatnonzero(row).tolist()}
+                for row in self.scores
+            ]
+        if len(self.photos) == 1:
+            return values | self.photos[0].to_dict()
+        photos = [photo.to_dict() for photo in self.photos]
+        return values | {"photos": photos, "photo": self.photo_rows.tolist()}

@@ -1,1 +1,0 @@
-"""Queries of known places and from files, and what spoils them."""

@@ -1,0 +1,1 @@
+"""The report that compares our figures with the paper's."""

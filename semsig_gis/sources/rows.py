@@ -1,0 +1,459 @@
+"""From the rows that a reader collects to a `RawLayer`, column by column."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import math
+import re
+from collections import Counter
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import shapely
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
+from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, NAME, SOURCE_ID, crs_label
+from semsig_gis.sources import RawLayer, RowCounts
+from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
+from semsig_gis.sources.layers import MAX_WIDTH_M, MIN_WIDTH_M
+from semsig_gis.sources.numbers import decimal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.sources.filters import Value
+    from semsig_gis.sources.layers import LayerSpec
+
+
+WGS84 = CRS.from_epsg(4326)
+# Half a turn and a quarter of one, with room for the rounding of the last decimal.
+LONGITUDE_LIMIT = 180.0 + 1e-6
+LATITUDE_LIMIT = 90.0 + 1e-6
+
+
+def parse_crs(text: str) -> CRS:
+    """Return the CRS that a person wrote; CrsError if pyproj does not know it, or no map has it."""
+    advice = "write a code such as 'EPSG:2154' or 'EPSG:4326'"
+    try:
+        crs = CRS.from_user_input(text)
+    except CRSError as error:
+        msg = f"CRS {text!r} is unknown; {advice}."
+        raise CrsError(msg) from error
+    if crs.is_geocentric or crs.is_vertical:
+        kind = crs.type_name.removesuffix(" CRS").lower()
+        msg = f"CRS {text!r} is {kind}, in which two coordinates do not give a place; {advice}."
+        raise CrsError(msg)
+    return crs
+
+
+@functools.lru_cache(maxsize=64)  # looking for the code takes 0.2 s
+def usable_crs(text: str) -> CRS | None:
+    """Return the CRS that a file states, or None where it does not tie coordinates to the Earth.
+
+    One that equals an EPSG definition becomes that, so that coordinates in it are not transformed.
+    """
+    if not text.strip():
+        return None
+    try:
+        crs = CRS.from_user_input(text)
+    except CRSError:
+        return None
+    geodetic = crs.geodetic_crs
+    if geodetic is None or not (crs.is_geographic or crs.is_projected):
+        return None  # an engineering CRS: a plane of its own
+    if not geodetic.name or crs.name.lower().startswith("undefined"):
+        return None  # without a named datum, a transformation is off by up to hundreds of metres
+    code = crs.to_epsg()
+    if code is not None:
+        epsg = CRS.from_epsg(code)
+        if epsg.equals(crs, ignore_axis_order=True):
+            return epsg
+    return crs
+
+
+def settle_crs(
+    own: CRS | None, *, implicit: bool, expected: str | None, given: str | None, where: str
+) -> tuple[CRS, tuple[str, ...]]:
+    """Return the CRS of a layer: the file's `own`, else that `given` by the user or `expected`.
+
+    `implicit` says that `own` is only the default of the format, which goes last. A note says where
+    the file contradicts the others. CrsError if nobody states one.
+    """
+    stated = given or expected
+    if own is not None and not implicit:
+        if stated is None or own.equals(parse_crs(stated), ignore_axis_order=True):
+            return own, ()
+        note = f"the file is in {crs_label(own)}, not in {stated} as stated; the file's CRS is used"
+        return own, (note,)
+    if stated is not None:
+        return parse_crs(stated), ()
+    if own is not None:
+        return own, ()
+    msg = (
+        f"{where} does not say which CRS its coordinates are in; "
+        "state its crs, such as 'EPSG:2154' or 'EPSG:4326'."
+    )
+    raise CrsError(msg)
+
+
+def off_the_globe(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.bool_]:
+    """Tell which coordinates cannot be degrees, shape (n,); where the CRS has none, all can."""
+    units = {axis.unit_name for axis in crs.axis_info}
+    if not crs.is_geographic or units != {"degree"}:
+        return np.zeros(len(xy), dtype=np.bool_)
+    return (np.abs(xy[:, 0]) > LONGITUDE_LIMIT) | (np.abs(xy[:, 1]) > LATITUDE_LIMIT)
+
+
+def fits_the_globe(xy: NDArray[np.float64]) -> bool:
+    """Tell whether every coordinate could be a longitude and a latitude in degrees."""
+    return len(xy) > 0 and not off_the_globe(xy, WGS84).any()
+
+
+KINDS = {
+    "point": ("Point", "MultiPoint"),
+    "line": ("LineString", "LinearRing", "MultiLineString"),
+    "polygon": ("Polygon", "MultiPolygon"),
+}
+ERRORS_KEPT = 10
+# Values that class_by does not list and that are named.
+UNLISTED_TOLD, LONGEST_VALUE = 8, 40
+# Rows of one id farther apart than this are told of: about a metre, by unit of the CRS.
+APART_DEGREES, APART_METRES = 1e-5, 1.0
+# How much an element of OpenStreetMap lacks, in the text that says so.
+SHARE = re.compile(r"\d+ of its \d+")
+WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
+
+T = TypeVar("T")
+# A point as its two coordinates, so that all points are built at once; else a built geometry.
+Position = tuple[float, float] | shapely.Geometry | None
+
+
+class BadFeatureError(ValueError):
+    """A feature cannot be used; readers catch it and report the message."""
+
+
+@dataclasses.dataclass(slots=True)
+class Rows:
+    """The rows of a layer as a reader collects them, each in four lists.
+
+    `numbers` count from 1 in the order of the file; `names` are the identifiers that rows have
+    without a field for it; `values` are those of `RowRules.fields`; of a row that cannot be used,
+    `positions` has the text that says why. `read` counts all rows, `filtered` those that the reader
+    leaves out, `closed` those with rings that it had to close, and `errors` says by number what is
+    wrong with rows that have no values at all.
+    """
+
+    read: int = 0
+    filtered: int = 0
+    closed: int = 0
+    errors: dict[int, str] = dataclasses.field(default_factory=dict)
+    numbers: list[int] = dataclasses.field(default_factory=list)
+    names: list[str] = dataclasses.field(default_factory=list)
+    values: list[Sequence[Any]] = dataclasses.field(default_factory=list)
+    positions: list[Position | str] = dataclasses.field(default_factory=list)
+
+    def add(self, values: Sequence[Any], name: str, position: Position | str) -> None:
+        """Add the row that was read last."""
+        self.numbers.append(self.read)
+        self.names.append(name)
+        self.values.append(values)
+        self.positions.append(position)
+
+    def lose(self, count: int, reason: str) -> None:
+        """Count the rows after the last one that was read, up to `count`, as unreadable."""
+        self.errors.update(dict.fromkeys(range(self.read + 1, count + 1), reason))
+        self.read = max(self.read, count)
+
+
+def raw_layer(
+    rows: Rows, rules: RowRules, crs: CRS, *, by_file: bool, notes: tuple[str, ...] = ()
+) -> RawLayer:
+    """Filter and classify the rows, build their geometries and check these against the CRS.
+
+    CrsError if that is in degrees and most coordinates are not; `by_file` if the file states it.
+    """
+    spec = rules.spec
+    sifted = rules.sift(rows)
+    table = sifted.table
+    broken = table[GEOMETRY][[isinstance(position, str) for position in table[GEOMETRY]]]
+    errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
+    table = table.drop(index=broken.index)
+    table[GEOMETRY] = pd.Series(built_geometries(table[GEOMETRY]), table.index, dtype=object)
+    off_globe = functools.partial(_off_globe, crs=crs, by_file=by_file, file=rules.file)
+    for check in (_not_finite, off_globe):
+        if bad := check(table):
+            errors |= bad
+            table = table.drop(index=list(bad))
+    repeated = 0
+    if spec.unique_id:
+        apart = APART_DEGREES if crs.is_geographic else APART_METRES
+        table, repeated, more = _one_of_each_id(table, apart=apart)
+        notes += more
+    geometry = table[GEOMETRY].to_numpy()
+    if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
+        notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
+    notes += tuple(_surprises(rows.read, table, spec))
+    if rows.closed:
+        notes += (f"{rows.closed} of {rows.read} rows have rings that are not closed; closed here",)
+    if spec.tags and errors:
+        notes += (_causes(errors.values()),)
+    table = table.drop(columns=GEOMETRY).reset_index(drop=True)
+    return RawLayer(
+        spec=spec,
+        table=gpd.GeoDataFrame(table, geometry=geometry, crs=crs),
+        counts=RowCounts(
+            read=rows.read,
+            unreadable=len(errors),
+            filtered=rows.filtered + sifted.filtered,
+            excluded=sifted.excluded,
+            duplicates=repeated,
+        ),
+        errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:ERRORS_KEPT]),
+        notes=(*sifted.notes, *notes),
+    )
+
+
+def built_geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
+    """Return the geometries of positions, all points built at once."""
+    positions = list(positions)
+    geometry = np.empty(len(positions), dtype=object)
+    geometry[:] = [None if isinstance(position, tuple) else position for position in positions]
+    points = [row for row, position in enumerate(positions) if isinstance(position, tuple)]
+    if points:
+        geometry[points] = shapely.points(np.array([positions[row] for row in points]))
+    return geometry
+
+
+def _not_finite(table: pd.DataFrame) -> dict[int, str]:
+    xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
+    wrong = ~np.isfinite(xy).all(axis=1)
+    return _refused(table.index[owner[wrong]], xy[wrong], "are not finite")
+
+
+def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> dict[int, str]:
+    """Refuse rows that are not degrees where they must be, or the CRS if they are most."""
+    xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
+    wrong = off_the_globe(xy, crs)
+    if 2 * wrong.sum() > len(xy):
+        x, y = xy[wrong][0]
+        remedy = "correct the file" if by_file else "state the crs they are in, such as 'EPSG:2154'"
+        if fits_the_globe(xy[:, ::-1]):
+            remedy = (
+                "with x and y exchanged they would be, so exchange x_field and y_field in the "
+                "catalogue, or the axes in the file"
+            )
+        msg = (
+            f"{file} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
+            f"{crs_label(crs)} means; {remedy}."
+        )
+        raise CrsError(msg)
+    return _refused(table.index[owner[wrong]], xy[wrong], f"are not in {crs_label(crs)}")
+
+
+def _refused(numbers: Iterable[int], xy: NDArray[np.float64], what: str) -> dict[int, str]:
+    bad: dict[int, str] = {}
+    for number, (x, y) in zip(numbers, xy, strict=True):
+        bad.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
+    return bad
+
+
+def _one_of_each_id(
+    table: pd.DataFrame, *, apart: float
+) -> tuple[pd.DataFrame, int, tuple[str, ...]]:
+    """Keep the first row of every id, but one that has a position rather than one that has none."""
+    geometry = table[GEOMETRY].to_numpy()
+    nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
+    ids = table[SOURCE_ID].iloc[np.argsort(nowhere, kind="stable")]
+    ids = ids[ids != ""]
+    firsts, repeated = ids.drop_duplicates(), ids[ids.duplicated()]
+    first_of = pd.Series(firsts.index, index=firsts).loc[repeated]
+    here, there = table[GEOMETRY].loc[repeated.index], table[GEOMETRY].loc[first_of]
+    metres = shapely.distance(here.to_numpy(), there.to_numpy())  # NaN where there is no position
+    far = int((metres > apart).sum())
+    note = f"{far} rows have the id of a row that stands elsewhere; the first one's place is used"
+    return table.drop(index=repeated.index), len(repeated), (note,) if far else ()
+
+
+def _surprises(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]:
+    """Yield where a layer is not what its specification expects."""
+    if read == 0:
+        yield "the layer has no rows"
+    elif spec.rows is not None and not spec.rows[0] <= read <= spec.rows[1]:
+        least, most = spec.rows
+        yield f"the layer has {read} rows, and {least} to {most} were expected"
+    types = pd.Series([item.geom_type for item in table[GEOMETRY].dropna()], dtype="str")
+    others = types[~types.isin(KINDS[spec.geometry])]
+    if len(others) and not spec.tags:  # of OpenStreetMap, each element says what it is
+        names = ", ".join(sorted(others.unique()))
+        yield f"{len(others)} of {read} rows are {names}, not {spec.geometry}"
+    unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0
+    if unknown:
+        yield f"{unknown} of {len(table)} streets have no known width"
+
+
+def _causes(errors: Iterable[str]) -> str:
+    """Say how many elements of OpenStreetMap are unreadable for which reason."""
+    causes = Counter(SHARE.sub("some of its", text.partition(" ")[2]) for text in errors)
+    listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
+    return f"unreadable: {listed}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, slots=True)
+class Sifted:
+    """The rows that the rules of a layer let pass, and how many they leave out, and why.
+
+    Rows are `filtered` by ``where`` or ``class_by``, and `excluded` by ``not``.
+    """
+
+    table: pd.DataFrame
+    filtered: int
+    excluded: int
+    notes: tuple[str, ...]
+
+
+class RowRules:
+    """The filter, classes, widths and identifiers of one layer, checked against its fields."""
+
+    def __init__(
+        self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str
+    ) -> None:
+        self.spec = spec
+        self.file = where  # for messages
+        try:
+            self._where, self._not = (
+                [(field, Condition.parse(accepted)) for field, accepted in rules if filters]
+                for rules in (spec.where, spec.exclusions)
+            )
+            listed = [
+                *(spec.class_by.classes if spec.class_by else ()),
+                *(spec.width_by.widths if spec.width_by else ()),
+            ]
+            for value, _ in listed:
+                pattern_of(str(value))
+        except CatalogError as error:
+            msg = f"{where}: {error}"
+            raise CatalogError(msg) from error
+        uses = [use for use in spec.fields if filters or use[0] not in {"where", "not"}]
+        for key, column in uses:
+            require_field(column, fields, where=where, key=key)
+        self.fields = tuple(dict.fromkeys(column for _, column in uses))
+
+    def sift(self, rows: Rows) -> Sifted:
+        """Return class, identifier, half-width in metres, name and position of rows that pass.
+
+        The index has their numbers. The half-width is NaN where nobody knows it, and the name
+        empty; the identifier is the row's number where it has none, or empty where ids are unique,
+        because the number could be another row's id.
+        """
+        spec = self.spec
+        size = len(rows.numbers)
+        columns = dict(zip(self.fields, zip(*rows.values, strict=True), strict=False))
+        kept = np.ones(size, bool)
+        for field, condition in self._where if size else ():
+            kept &= [condition.accepts(value) for value in columns[field]]
+        filtered = size - int(kept.sum())
+        excluded: dict[str, int] = {}
+        for field, condition in self._not if size else ():
+            out = kept & [condition.accepts(value, every=True) for value in columns[field]]
+            excluded[field] = int(out.sum())
+            kept &= ~out
+        classes = self._classes(columns, size)
+        unlisted = kept & np.array([name is None for name in classes], bool)
+        ids = columns.get(spec.id_field or "", [None] * size)
+        names = [""] * size if spec.unique_id else rows.names
+        titles = columns.get(spec.name_field or "", [None] * size)
+        table = pd.DataFrame(
+            {
+                CLASS_NAME: pd.Series(classes, dtype="str"),
+                SOURCE_ID: pd.Series(map(_identifier, ids, names), dtype="str"),
+                HALF_WIDTH: pd.Series(self._half_widths(columns, size), dtype="float64"),
+                NAME: pd.Series([_identifier(title, "") for title in titles], dtype="str"),
+                GEOMETRY: pd.Series(rows.positions, dtype=object),
+            }
+        ).set_index(pd.Index(rows.numbers, dtype=int))
+        unused = [HALF_WIDTH] * (not spec.has_width) + [NAME] * (spec.name_field is None)
+        notes = []
+        if any(excluded.values()):
+            told = (f"{field} {number}" for field, number in excluded.items() if number)
+            notes.append(f"left out by the catalogue's not: {', '.join(told)}")
+        if unlisted.any():
+            notes.append(self._unlisted(columns, unlisted))
+        return Sifted(
+            table[kept & ~unlisted].drop(columns=unused),
+            filtered=filtered + int(unlisted.sum()),
+            excluded=sum(excluded.values()),
+            notes=tuple(notes),
+        )
+
+    def _classes(self, columns: Mapping[str, Sequence[Any]], size: int) -> list[str | None]:
+        """Return the class of each row, None where `class_by` does not list its value."""
+        by, name = self.spec.class_by, self.spec.class_name
+        if by is None or self.spec.role != "objects":
+            return [name] * size
+        default = name if by.otherwise else None
+        values = columns.get(by.field, ())
+        return [_first(by.classes, value, default) or None for value in values]
+
+    def _unlisted(self, columns: Mapping[str, Sequence[Any]], rows: NDArray[np.bool_]) -> str:
+        """Name the values that `class_by` does not list, those of the most rows first."""
+        by, name = self.spec.class_by, self.spec.class_name
+        if by is None:
+            return ""
+        values = itertools.compress(columns[by.field], rows)
+        counts = Counter(
+            "no value" if v is None else repr(as_text(v)[:LONGEST_VALUE]) for v in values
+        )
+        told = [f"{value} {number}" for value, number in counts.most_common(UNLISTED_TOLD)]
+        others = len(counts) - len(told)
+        told += [f"and {others} others"] if others else []
+        remedy = f'; write otherwise = "class" to take them as {name}' if name else ""
+        return f"left out, unlisted in class_by {by.field!r}: {', '.join(told)}{remedy}"
+
+    def _half_widths(self, columns: Mapping[str, Sequence[Any]], size: int) -> NDArray[np.float64]:
+        by, own = self.spec.width_by, self.spec.width_field
+        widths = np.full(size, math.nan)
+        if own is not None and size:
+            widths = np.array([_metres(value) for value in columns[own]])
+        if by is not None and size:
+            default = math.nan if by.default is None else by.default
+            typical = [_first(by.widths, value, default) for value in columns[by.field]]
+            widths = np.where(np.isnan(widths), typical, widths)
+        return widths / 2
+
+
+def _first(choices: Iterable[tuple[Value, T]], value: object, default: T) -> T:
+    """Return what belongs to the first of the wanted values that a value is."""
+    return next((result for wanted, result in choices if matches(value, wanted)), default)
+
+
+def _identifier(value: object, name: str) -> str:
+    text = "" if value is None else as_text(value).strip()
+    whole = WHOLE_FLOAT.fullmatch(text)
+    return (whole[1] if whole else text) or name
+
+
+def _metres(value: object) -> float:
+    """Return a plausible width of a street from a field, or NaN."""
+    try:
+        width = decimal(as_text(value).strip().removesuffix("m"))
+    except ValueError:
+        return math.nan
+    return width if MIN_WIDTH_M <= width <= MAX_WIDTH_M else math.nan
+
+
+def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:
+    """Refuse a field that a file does not have; CatalogError lists the fields and the nearest."""
+    if field not in fields:
+        msg = (
+            f"{where} has no field {field!r}, which the catalogue names in {key}"
+            f"{nearest_name(field, fields)}; its fields are {', '.join(fields) or 'none at all'}."
+        )
+        raise CatalogError(msg)

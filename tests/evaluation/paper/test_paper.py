@@ -1,0 +1,351 @@
+"""The experiments of the paper: what is run, what is refused, and the report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from sentences import refused
+from worlds import QUERIES, TOWN, contents, save_town
+
+from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.database.file import open_database, save_database
+from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper.reproduction import paper_experiments, reproduce, time_queries
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.distance.scores import score_cells
+from semsig_gis.reports.paper.report import reproduction_report
+from semsig_gis.sources.synthetic.city import CitySpec
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from semsig_gis.evaluation.paper.reproduction import Reproduction
+    from semsig_gis.reports.report_model import Number, Report
+
+
+def test_everything_that_the_paper_runs_is_there(snapshot: Callable[[str, str], None]) -> None:
+    specs = paper_experiments(
+        "city.parquet",
+        ranges={20.0: "r20.parquet", 40.0: "r40.parquet"},
+        scales={8: "q8.parquet", 24: "q24.parquet", 32: "q32.parquet"},
+    )
+    snapshot("paper.toml", "\n".join(f"# {name}\n{one.to_toml()}" for name, one in specs.items()))
+    few = paper_experiments("city.parquet", ranges={}, scales={}, queries=7, seed=3)
+    assert {(spec.queries, spec.seeds) for spec in few.values()} == {(7, (3,))}
+
+
+@pytest.fixture(scope="module")
+def reproduction(reproduced: Path) -> Reproduction:
+    """Return the results of the experiments of the paper on a small town."""
+    return reproduce(reproduced, database=reproduced.parent / "city.parquet", queries=QUERIES)
+
+
+def test_everything_is_run(reproduction: Reproduction) -> None:
+    assert len(reproduction.database) == len(TOWN.database)
+    assert reproduction.settings["queries"] == QUERIES
+    assert reproduction.missing == ()
+    assert set(reproduction.variants) == {20.0, 40.0}
+    lengths = [reproduction.variants[r]["mean_length"] for r in (20.0, 40.0)]
+    assert lengths[0] < reproduction.summary["mean_length"] < lengths[1]
+    assert list(reproduction.experiments) == [
+        *("none", "medium", "levels", "readings", "ours"),
+        *("range-20", "range-40", "levels-8", "levels-24", "levels-32"),
+    ]
+    for results in reproduction.experiments.values():
+        for evaluation in results.values():
+            assert len(evaluation.queries) == QUERIES
+    assert list(reproduction.seconds) == list(paris.QUERY_MS)
+    levels = reproduction.experiments["levels-8"]["medium/stages-5-top1"]
+    assert levels.database["levels"] == 8
+    wide = reproduction.experiments["range-40"]["medium/stages-5-top1"]
+    assert wide.database["radius_m"] == 40.0
+    occurrences = reproduction.summary["occurrences"]
+    assert sum(one["objects"] for one in occurrences) <= len(TOWN.objects)
+
+
+def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
+    reproduced: Path, tmp_path: Path
+) -> None:
+    save_town(tmp_path)
+    calls = 0
+
+    def progress(label: str) -> Callable[[int, int], None] | None:
+        def stop(_: int, __: int) -> None:
+            nonlocal calls
+            calls += 1
+            if calls == 3:
+                raise KeyboardInterrupt
+
+        return stop if label == "answering queries" else None
+
+    options: dict[str, Any] = {"database": tmp_path / "city.parquet", "queries": QUERIES}
+    with pytest.raises(KeyboardInterrupt):
+        reproduce(tmp_path / "out", progress=progress, **options)
+    half = {path.name for path in (tmp_path / "out" / "experiments").iterdir()}
+    assert all(name.endswith(".partial") for name in half)
+    reproduce(tmp_path / "out", **options)
+    # The same files but for reports, which other tests write; digests of the same town differ.
+    ours, whole = contents(tmp_path / "out"), contents(reproduced)
+    assert set(ours) == {name for name in whole if name.startswith(("exp", "var", "settings"))}
+    figures = [name for name in ours if name.endswith(("figures.csv", "queries.parquet"))]
+    assert len(figures) > len(ours) / 4
+    assert [ours[name] for name in figures] == [whole[name] for name in figures]
+
+
+def test_a_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    before = contents(reproduced)
+    for name in ("build_database", "time_queries", "save_database"):
+        monkeypatch.setattr(f"semsig_gis.evaluation.paper.reproduction.{name}", never)
+    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", never)
+    database = reproduced.parent / "city.parquet"
+    found = reproduce(reproduced, database=database, queries=QUERIES)
+    assert found.settings["queries"] == QUERIES
+    assert contents(reproduced) == before
+
+
+def test_other_settings_are_refused(reproduced: Path, tmp_path: Path) -> None:
+    database = reproduced.parent / "city.parquet"
+    options: dict[str, Any] = {"database": database, "queries": QUERIES}
+    before = contents(reproduced)
+    moved = tmp_path / "city.parquet"
+    save_database(TOWN.database.select(slice(1, None)), moved)
+    for change, word in (
+        ({"queries": 11}, "queries"),
+        ({"seed": 5}, "seed"),
+        ({"size": "small"}, "size"),
+        ({"database": moved}, "database"),
+    ):
+        with refused(InputError, "other settings", f"differ in {word}"):
+            reproduce(reproduced, **{**options, **change})
+    assert contents(reproduced) == before
+
+
+@pytest.fixture
+def _few_methods(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave most methods out, where it is not they that count."""
+    module = "semsig_gis.evaluation.paper.reproduction"
+    for name, methods in {
+        "SINGLES": {"types-edit": "types:edit"},
+        "FUSIONS": {"fusion-edit": "edit+edit"},
+        "WEIGHTS": {0.5: "fusion-edit"},
+        "PERCENTS": {5: "stages-5", 100: "fusion-edit"},
+    }.items():
+        monkeypatch.setattr(f"{module}.{name}", methods)
+
+
+@pytest.mark.usefixtures("_few_methods")
+def test_without_street_objects_one_part_is_left_out(tmp_path: Path) -> None:
+    save_database(TOWN.database, tmp_path / "city.parquet")
+    found = reproduce(tmp_path / "out", database=tmp_path / "city.parquet", queries=5, size="small")
+    assert found.variants == {}
+    assert not any(name.startswith("range") for name in found.experiments)
+    (sentence,) = found.missing
+    assert "visibility ranges" in sentence
+    assert {one["objects"] for one in found.summary["occurrences"]} == {None}
+
+
+@pytest.mark.usefixtures("_few_methods")
+def test_a_city_is_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = "semsig_gis.evaluation.paper.reproduction"
+    cities = {"small": CitySpec(size=300.0), "full": CitySpec(size=400.0)}
+    monkeypatch.setattr(f"{module}.CITIES", cities)
+    monkeypatch.setattr(f"{module}.SMALL_QUERIES", 7)
+    with refused(InputError, "1000000 queries"):
+        reproduce(tmp_path / "out", queries=10**6)
+    # A run that came to nothing is not in the way.
+    notes: list[str] = []
+    found = reproduce(tmp_path / "out", size="small", note=notes.append)
+    settings = {"size": "small", "database": "a made-up city", "queries": 7, "seed": 0}
+    assert found.settings == settings
+    assert any("made up" in note for note in notes)
+    assert len(open_database(tmp_path / "out" / "city" / "city.parquet")) == len(found.database)
+    large = found.database.columns.max() - found.database.columns.min()
+    assert large * found.database.grid.step < 400.0
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"size": "huge"}, ["'huge'", "full or small"]),
+        ({"queries": 10**6}, ["1000000 queries", "number of cells"]),
+        ({"queries": 0}, ["0 queries", "number of cells"]),
+        ({"database": "nowhere.parquet"}, ["nowhere.parquet", "signature database"]),
+        ({"workers": -1}, ["-1 workers"]),
+        ({"seed": -1}, ["a seed is -1", "from 0 to"]),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, options: dict[str, Any], words: list[str]) -> None:
+    save_town(tmp_path)
+    with refused(SemsigError, *words):
+        reproduce(
+            tmp_path / "out", **{"database": tmp_path / "city.parquet", "queries": 5, **options}
+        )
+    assert not (tmp_path / "out").exists()
+
+
+def test_settings_of_another_program_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "settings.json").write_text("{}", encoding="utf-8")
+    (tmp_path / "me.jpg").touch()
+    with refused(InputError, str(tmp_path), "'me.jpg'", "another folder"):
+        reproduce(tmp_path, size="small")
+
+
+def test_every_method_is_asked_that_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    lengths: list[int] = []
+
+    def counted(database: object, queries: list[object], method: object) -> object:
+        lengths.append(len(queries[0]))  # type: ignore[arg-type]
+        return score_cells(database, queries, method)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("semsig_gis.evaluation.paper.reproduction.score_cells", counted)
+    methods = {"types": Method.parse("types:edit"), "both": Method()}
+    told: list[tuple[int, int]] = []
+    times = time_queries(
+        TOWN.database, methods, length=5, repetitions=4, progress=lambda *done: told.append(done)
+    )
+    assert list(times) == ["types", "both"]
+    assert min(times.values()) > 0
+    assert lengths == [5] * 12  # twice before the four that count
+    assert told == [(1, 2), (2, 2)]
+
+
+def test_the_nearest_length_is_taken() -> None:
+    longest = int(TOWN.database.lengths.max())
+    assert time_queries(TOWN.database, {"a": Method()}, length=longest + 50, repetitions=1)["a"] > 0
+
+
+def test_no_repetitions_are_refused() -> None:
+    with refused(InputError, "0 repetitions", "from 1"):
+        time_queries(TOWN.database, {}, repetitions=0)
+
+
+@pytest.fixture(scope="module")
+def report(reproduction: Reproduction) -> Report:
+    return reproduction_report(reproduction)
+
+
+def numbers(report: Report, section: str) -> dict[tuple[str, str], Number]:
+    """Return the numbers of a section by row and column."""
+    (found,) = (one for one in report.sections if one.name == section)
+    return {(one.row, one.column): one for one in found.numbers}
+
+
+def test_every_figure_that_the_paper_prints_stands_beside_ours(report: Report) -> None:
+    told = [one.paper for part in report.sections for one in part.numbers if one.paper is not None]
+    printed = [
+        *paris.OCCURRENCES.values(),
+        *paris.DATABASE.values(),
+        *(float(text.replace(",", "")) for key in ("count", "mean", "std", "max")
+          for text in paris.GROUPS[key]),
+        *(value for pair in paris.ACCURACY.values() for value in pair if value is not None),
+        *paris.QUERY_MS.values(),
+        paris.ALONE,
+    ]  # fmt: skip
+    assert set(printed) <= set(told)
+    points = [y for part in report.sections for plot in part.plots for _, y, _ in plot.paper]
+    assert set(paris.READ_OFF.values()) <= {*told, *points}
+
+
+def test_figures_are_those_of_the_evaluations(report: Report, reproduction: Reproduction) -> None:
+    experiments = reproduction.experiments
+    medium = experiments["medium"]["medium/stages-5-top1"]
+    shown = numbers(report, "levels")["medium", "P(error ≤ 50 m)"]
+    assert shown.ours == pytest.approx(medium.cdf([50])[0])
+    assert (shown.low, shown.high) == tuple(medium.means().loc["p50", ["low", "high"]])
+    assert shown.paper == 0.3733
+    recall = numbers(report, "ranges")["R = 40 m", "recall@10 %"]
+    assert recall.ours == pytest.approx(experiments["range-40"]["medium/stages-5-top1"].recall(10))
+    assert recall.paper == 0.7269
+    wide = experiments["range-40"]["medium/stages-5-top1"].queries
+    some = wide[(wide["length"] >= 10) & (wide["length"] <= 19)]
+    column = "P(error ≤ 50 m) of queries that see 10 to 19 objects"
+    middling = numbers(report, "ranges")["R = 40 m", column].ours
+    assert middling == (pytest.approx(some["p50"].mean()) if len(some) else None)
+    assert numbers(report, "scales")["Q = 24", "P(error ≤ 50 m)"].paper == 0.3861
+    single = numbers(report, "single")["edit, angles", "medium: recall@20 %"]
+    assert single.ours == pytest.approx(
+        experiments["medium"]["medium/angles-edit-top100"].recall(20)
+    )
+    best = numbers(report, "single")["best of these", "no distortion: P(error ≤ 10 m)"]
+    assert best.ours == max(
+        number.ours or 0.0
+        for (_, column), number in numbers(report, "single").items()
+        if column == best.column
+    )
+    times = numbers(report, "times")["edit distance", "angles"]
+    assert (times.paper, times.unit) == (1850.0, "ms")
+    assert times.ours == 1000 * reproduction.seconds["angles:edit"]
+
+
+def test_unambiguous_queries_alone(report: Report, reproduction: Reproduction) -> None:
+    queries = reproduction.experiments["levels"]["light/stages-5-top1"].queries
+    alone = queries[queries["type_group"] == 1]
+    found = numbers(report, "alone")
+    assert found["light", "P(error ≤ 50 m)"].ours == pytest.approx(alone["p50"].mean())
+    assert found["queries", "share alone"].ours == pytest.approx(len(alone) / QUERIES)
+
+
+def test_the_share_of_unambiguous_queries_can_be_the_papers(
+    report: Report, reproduction: Reproduction
+) -> None:
+    queries = reproduction.experiments["medium"]["medium/stages-5-top1"].queries
+    alone = queries["type_group"] == 1
+    row = "as the first, with the paper's share of unambiguous queries"
+    weighed = numbers(report, "readings")[row, "P(error ≤ 50 m)"]
+    expected = 0.418 * queries["p50"][alone].mean() + 0.582 * queries["p50"][~alone].mean()
+    assert weighed.ours == pytest.approx(expected)
+    assert (weighed.low or 1.0) < expected < (weighed.high or 0.0)
+
+
+def test_curves_end_where_they_must(report: Report) -> None:
+    plots = [plot for part in report.sections for plot in part.plots]
+    assert len(plots) >= 14
+    for plot in plots:
+        assert plot.curves
+        for curve in plot.curves:
+            assert list(curve.x) == sorted(curve.x)
+            if plot.name.endswith(("error", "recall")):
+                assert list(curve.y) == sorted(curve.y)
+            if plot.name.endswith("recall"):
+                assert curve.y[-1] == pytest.approx(1.0)
+
+
+def test_the_headline_tells_the_papers_figure_and_ours(
+    report: Report, reproduction: Reproduction
+) -> None:
+    ours = reproduction.experiments["ours"]["medium/likelihood-top1"].cdf([50])[0]
+    assert (
+        f"within 50 m (the paper, on Paris: 37 %); the likelihood method places {100 * ours:.0f}"
+        in (report.headline)
+    )
+    assert "recommended" in report.sections[0].title
+
+
+def test_the_papers_values_are_drawn_beside_ours(report: Report) -> None:
+    plots = {plot.name: plot for part in report.sections for plot in part.plots}
+    ours, theirs, _, recalls = plots["ranges-shares"].curves
+    assert theirs.x == recalls.x == (20.0, 30.0, 40.0)
+    assert theirs.y == (0.1793, 0.3733, 0.4946)
+    assert recalls.y == (0.5110, 0.6462, 0.7269)
+    assert all(low <= y <= high for low, y, high in zip(ours.low, ours.y, ours.high, strict=True))
+    _, theirs = plots["scales-shares"].curves
+    assert (theirs.x, theirs.y) == ((8.0, 16.0, 24.0, 32.0), (0.3243, 0.3733, 0.3861, 0.3766))
+    drawn = {name: {(x, y) for x, y, _ in plot.paper} for name, plot in plots.items()}
+    assert drawn["levels-error"] == {(50.0, 0.3733), (10.0, 0.70), (10.0, 0.25)}
+    assert drawn["levels-recall"] == {(10.0, 0.6462), (10.0, 0.90), (10.0, 0.50)}
+    assert drawn["fusion-none-error"] == {(0.0, 0.93)}
+    assert all(plot.log for name, plot in plots.items() if name.endswith(("error", "recall")))
+
+
+def test_parts_that_could_not_be_run_are_left_out(reproduction: Reproduction) -> None:
+    less = {k: v for k, v in reproduction.experiments.items() if not k.startswith("range")}
+    found = replace(reproduction, experiments=less, variants={}, missing=("No ranges.",))
+    report = reproduction_report(found)
+    assert "ranges" not in [part.name for part in report.sections]
+    assert "No ranges." in report.text

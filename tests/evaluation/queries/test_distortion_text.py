@@ -1,0 +1,261 @@
+"""Chains of distortions, and what distortions and drawn queries refuse."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from functools import partial
+from math import inf, nan
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyproj import CRS
+from sentences import refused
+from sights import CITY, CLASSES, many, paper_errors, rows, seeds, sights
+from worlds import random_town
+
+from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
+from semsig_gis.core.signature import Signature
+from semsig_gis.evaluation.queries.distortion_text import (
+    NAMED_DISTORTIONS,
+    chain_text,
+    parse_chain,
+    ready_chain,
+)
+from semsig_gis.evaluation.queries.distortions import (
+    BlockedSectors,
+    ClassScores,
+    CompassBias,
+    Detector,
+    Distortion,
+    FieldOfView,
+    HiddenBehind,
+    MissingClasses,
+    Obstacles,
+    RoughRanges,
+    distort,
+    named_distortion,
+)
+from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
+from semsig_gis.localization.noise.model import NOISES, NoiseSpec
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.errors import SemsigError
+    from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
+    from semsig_gis.evaluation.queries.true_view import Sight
+
+MINE = NoiseSpec(detection=0.7, name="mine")
+KNOWN = {**NOISES, "mine": MINE}
+classes = st.lists(
+    st.sampled_from(["alignment_tree", "street_light", "traffic_light", "bench"]), unique=True
+).map(tuple)
+any_distortion: st.SearchStrategy[QueryDistortion] = st.one_of(
+    st.sampled_from(list(NAMED_DISTORTIONS.values())),
+    paper_errors,
+    st.builds(CompassBias, sigma=st.floats(0, 180)),
+    st.builds(MissingClasses, classes=classes, others=st.booleans()),
+    st.builds(FieldOfView, degrees=st.floats(0.1, 360), told=st.booleans()),
+    st.builds(RoughRanges, percent=st.floats(0.1, 300)),
+    st.builds(ClassScores, right=st.floats(0.51, 0.999)),
+    st.builds(HiddenBehind, width=st.floats(0, 5)),
+    st.builds(Obstacles, count=st.floats(0, 9), width=st.floats(0, 9)),
+    st.builds(BlockedSectors, count=st.integers(0, 5), degrees=st.floats(0, 360)),
+    st.builds(Detector, noise=st.sampled_from(list(KNOWN.values())), half=st.floats(1, 99)),
+)
+chains = st.lists(any_distortion, max_size=4).map(tuple)
+
+
+@given(chain=chains)
+def test_written_and_read_is_the_same(chain: tuple[QueryDistortion, ...]) -> None:
+    assert parse_chain(chain_text(chain), noises=KNOWN) == chain
+    assert parse_chain((chain_text([one]) for one in chain), noises=KNOWN) == chain
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "medium",
+        "none",
+        "strong:resort=false:false_class=frequency",
+        "errors:4",
+        "errors:4:bearing_sigma=2.5",
+        "compass:10",
+        "missing:bench/bus_stop",
+        "known:alignment_tree",
+        "view:60, behind:0.5, obstacles:2, blocked:1:degrees=45",
+        "view:60:told=false",
+        "ranges:25, scores:0.8",
+        "detector:mine:half=20",
+        "",
+    ],
+)
+def test_texts_that_read_well(text: str) -> None:
+    assert chain_text(parse_chain(text, noises=KNOWN)) == text
+
+
+@given(one=sights, chain=chains, seed=seeds, number=st.integers(0, 99))
+def test_any_order_of_any_distortions_gives_a_query(
+    one: Sight, chain: tuple[QueryDistortion, ...], seed: int, number: int
+) -> None:
+    before = rows(one)
+    for order in itertools.islice(itertools.permutations(chain), 6):
+        seen, again = (ready_chain(order, CITY)(one, seed, number) for _ in range(2))
+        assert set(seen.codes.tolist()) <= set(CLASSES)
+        assert ((seen.bearings >= 0) & (seen.bearings < 360)).all()
+        assert (seen.distances >= 0).all()
+        assert len(seen.signature) == len(seen)
+        assert seen.photo.sees(seen.bearings).all()
+        assert (rows(again), again.heading) == (rows(seen), seen.heading)
+    assert rows(one) == before
+
+
+@given(one=sights, chain=chains, seed=seeds)
+def test_a_kind_has_the_same_chances_in_any_company(
+    one: Sight, chain: tuple[QueryDistortion, ...], seed: int
+) -> None:
+    others = tuple(item for item in chain if not isinstance(item, CompassBias))
+    alone = ready_chain([CompassBias(sigma=20.0)], CITY)(one, seed, 3)
+    for place in (0, len(others)):
+        order = (*others[:place], CompassBias(sigma=20.0), *others[place:])
+        assert ready_chain(order, CITY)(one, seed, 3).heading == alone.heading
+
+
+def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
+    spoil = ready_chain([CompassBias(), CompassBias()], CITY)
+    headings = {spoil(many(1), seed, number).heading for seed in (0, 1) for number in (0, 1, 2)}
+    assert len(headings) == 6
+    once = ready_chain([CompassBias()], CITY)(many(1), 0, 0).heading
+    twice = spoil(many(1), 0, 0).heading
+    assert twice != pytest.approx(2.0 * once % 360.0)
+
+
+def test_misses_and_clutter_add_up() -> None:
+    # Seen in half of the turn, half of what is left is detected.
+    half = NoiseSpec(detection=0.5, misnamed=0.0, clutter=0.0, name="half")
+    spoil = ready_chain(parse_chain("view:180, detector:half", noises={"half": half}), CITY)
+    kept = np.array([len(spoil(many(1), 0, number)) for number in range(4000)])
+    assert kept.mean() == pytest.approx(0.25, abs=0.04)
+
+
+def test_the_streams_of_random_numbers_are_fixed() -> None:
+    # A change would change every seeded result that was ever written down.
+    streams = {name: one.stream for name, one in NAMED_DISTORTIONS.items() if name != "known"}
+    for level in ("none", "light", "medium", "strong"):
+        assert streams.pop(level) == streams["errors"]
+    assert streams == {
+        "errors": 795_306_091,
+        "compass": 3_628_719_812,
+        "missing": 2_848_656_676,
+        "view": 20_362_731,
+        "behind": 3_881_164_136,
+        "obstacles": 626_356_719,
+        "blocked": 4_207_042_345,
+        "detector": 4_129_241_295,
+        "ranges": 2_716_057_031,
+        "scores": 1_530_938_417,
+    }
+
+
+# --- Refusals ---------------------------------------------------------------------------------
+
+MISSPELT = NoiseSpec(detection_by_class={"bnech": 0.5})
+DATABASE = random_town().database
+ORIGIN = np.zeros(1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "values", "words"),
+    [
+        (Distortion, "occurrences", [-1], ["occurrences", "from 0"]),
+        (Distortion, "bearing_sigma", [-0.1, nan], ["bearing sigma", "from 0"]),
+        (Distortion, "bearing_clip", [-0.1, inf], ["bearing clip", "from 0"]),
+        (CompassBias, "sigma", [-1.0, nan, inf], ["compass", "from 0"]),
+        (FieldOfView, "degrees", [0.0, -5.0, 360.5, nan], ["above 0", "at most 360"]),
+        (HiddenBehind, "width", [-1.0, nan, inf], ["width of the objects", "from 0"]),
+        (Obstacles, "count", [-1.0, nan, inf], ["number of obstacles", "from 0"]),
+        (Obstacles, "width", [-1.0, nan, inf], ["width of the obstacles", "from 0"]),
+        (BlockedSectors, "count", [-1], ["sectors", "from 0"]),
+        (BlockedSectors, "degrees", [-1.0, nan, inf], ["degrees", "from 0 to 360"]),
+        (partial(Detector, noise=MINE), "half", [0.0, -3.0, nan], ["from 0.01"]),
+        (RoughRanges, "percent", [0.0, -5.0, 301.0, nan], ["error of the ranges", "to 300 %"]),
+        (ClassScores, "right", [0.5, 1.0, nan], ["mean score", "from 0.51"]),
+        (QuerySpec, "number", [0], ["queries", "from 1"]),
+        (QuerySpec, "seeds", [[], [1, 1]], ["at least one", "none twice"]),
+        (QuerySpec, "seeds", [[-1]], ["-1", "from 0"]),
+    ],
+)
+def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: list[str]) -> None:  # noqa: ANN401
+    for value in values:
+        with refused(InputError, str(value).strip("[]"), *words):
+            kind(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        (UnknownNameError, "meduim", ["'meduim'", "nearest is 'medium'"]),
+        (UnknownNameError, "medium,,view:90", ["''", "not a distortion"]),
+        (UnknownNameError, "medium:7", ["'7'", "is not a setting", "of medium are occurrences"]),
+        (UnknownNameError, "view:90:degree=3", ["'degree'", "nearest is 'degrees'"]),
+        (UnknownNameError, "detector:mime", ["'mime'", "nearest is 'mine'"]),
+        (UnknownNameError, "missing:bnech", ["'bnech'", "nearest is 'bench'"]),
+        (InputError, "detector:misspelt", ["'bnech'", "nearest is 'bench'"]),
+        (InputError, "compass:5:sigma=6", ["compass:5:sigma=6", "'sigma'", "given twice"]),
+        (InputError, "view:sixty", ["'sixty'", "a number"]),
+        (InputError, "errors:2.5", ["'2.5'", "a whole number"]),
+        (InputError, "medium:resort=no", ["'no'", "true or false"]),
+        (InputError, "view:0", ["0.0 degrees", "above 0"]),
+        (InputError, "view:70:told=no", ["'no'", "true or false"]),
+    ],
+)
+def test_texts_of_distortions(kind: type[SemsigError], text: str, words: list[str]) -> None:
+    with refused(kind, *words):
+        ready_chain(parse_chain(text, noises={**KNOWN, "misspelt": MISSPELT}), CITY)
+
+
+def spoil(
+    classes: list[int],
+    weights: list[float] | None = None,
+    *,
+    bearings: NDArray[np.float64] | None = ORIGIN,
+    false: Any = "frequency",  # noqa: ANN401
+) -> None:
+    one, rng = Signature(np.array([1], np.uint8), bearings), np.random.default_rng(0)
+    distort(one, Distortion(false_class=false), classes=classes, weights=weights, rng=rng)
+
+
+def draw(crs: int = 2154, **options: Any) -> None:  # noqa: ANN401
+    draw_queries(DATABASE, QuerySpec(**options), city=replace(DATABASE, crs=CRS(crs)))
+
+
+CASES: list[tuple[type[SemsigError], Callable[[], object], list[str]]] = [
+    (UnknownNameError, lambda: spoil([1], false="frequencies"), ["frequencies", "is 'frequency'"]),
+    (UnknownNameError, lambda: spoil([1], false="rarity"), ["rarity", "uniform or frequency"]),
+    (UnknownNameError, lambda: named_distortion("heavy"), ["heavy", "light, medium or strong"]),
+    (UnknownNameError, lambda: draw(seen_from="anywere"), ["is 'anywhere'", "cells or"]),
+    (InputError, lambda: draw(number=10**6), ["1000000 queries", f"1 to {len(DATABASE)}"]),
+    (InputError, lambda: draw(number=1, seen_from="anywhere"), ["street objects"]),
+    (CrsError, lambda: draw(32631, number=1), ["EPSG:32631", "EPSG:2154"]),
+    (InputError, lambda: spoil([]), ["distinct codes", "at least one"]),
+    (InputError, lambda: spoil([3, 3]), ["distinct codes"]),
+    (InputError, lambda: spoil([1, 3]), ["need weights", "one for each class"]),
+    (InputError, lambda: spoil([1, 3], [1]), ["1 weights for 2 classes"]),
+    (InputError, lambda: spoil([1, 3], [1, -1]), ["0 or more"]),
+    (InputError, lambda: spoil([1, 3], [0, 0]), ["all zero", "above zero"]),
+    (InputError, lambda: spoil([1, 3], [1, 1], bearings=None), ["one with both"]),
+]
+
+
+@pytest.mark.parametrize(("kind", "call", "words"), CASES)
+def test_what_cannot_be_used_is_refused(
+    kind: type[SemsigError], call: Callable[[], object], words: list[str]
+) -> None:
+    with refused(kind, *words):
+        call()

@@ -1,0 +1,542 @@
+"""What is seen, the errors of the paper, and everything else that happens to a query."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from math import atan, degrees, erfc, exp, pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from noisy_cells import noise_specs, parts_of, random_database
+from scipy.stats import poisson
+from sights import (
+    CITY,
+    CLASSES,
+    REACH,
+    all_round,
+    assert_rate,
+    away,
+    many,
+    paper_errors,
+    rows,
+    seeds,
+    sight,
+    sights,
+)
+
+from semsig_gis.core.geometry import angular_distance
+from semsig_gis.core.signature import Signature
+from semsig_gis.evaluation.queries.distortion_text import parse_chain, ready_chain
+from semsig_gis.evaluation.queries.distortions import (
+    DISTORTIONS,
+    BlockedSectors,
+    ClassScores,
+    CompassBias,
+    Detector,
+    Distortion,
+    FieldOfView,
+    HiddenBehind,
+    MissingClasses,
+    Obstacles,
+    RoughRanges,
+    distort,
+)
+from semsig_gis.evaluation.queries.true_view import CitySights
+from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
+from semsig_gis.observation.view import FULL_VIEW, View
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
+    from semsig_gis.evaluation.queries.distortions import FalseClass
+    from semsig_gis.evaluation.queries.true_view import Sight
+    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization.noise.table import NoiseTable
+
+# --- What is seen -----------------------------------------------------------------------------
+
+
+@given(one=sights, turn=st.floats(-400, 400))
+def test_a_turn_moves_all_bearings_and_is_remembered(one: Sight, turn: float) -> None:
+    there = one.turned(turn)
+    assert (np.diff(there.bearings) >= 0).all()
+    assert ((there.bearings >= 0) & (there.bearings < 360)).all()
+    expected = sorted(((code, distance) for code, _, distance in rows(one)))
+    assert sorted((code, distance) for code, _, distance in rows(there)) == expected
+    true = (there.bearings + there.heading) % 360.0
+    found = np.sort(np.exp(1j * np.radians(true)))
+    assert np.allclose(found, np.sort(np.exp(1j * np.radians(one.bearings))), atol=1e-6)
+
+
+def test_objects_on_one_bearing_stay_in_order() -> None:
+    one = sight([(3, 7.0, 1.0), (1, 7.0, 2.0), (5, 2.0, 3.0)])
+    assert one.clockwise().codes.tolist() == [5, 3, 1]
+    assert parts_of(one.signature)[0].tolist() == [3, 1, 5]
+
+
+def test_what_there_is_to_see_in_a_database() -> None:
+    database = random_database(3)
+    city = CitySights.of(database)
+    counts = Counter(database.codes.tolist())
+    assert list(zip(city.codes, city.frequencies, strict=True)) == sorted(counts.items())
+    assert (city.reach, city.taxonomy) == (database.reach, database.taxonomy)
+
+
+@given(seed=seeds)
+def test_false_things_are_anywhere_in_the_circle(seed: int) -> None:
+    distances = CITY.false_distances(4000, np.random.default_rng(seed))
+    assert ((distances >= 0) & (distances <= REACH)).all()
+    # A uniform place in a circle has d^2 / R^2 uniform on [0, 1].
+    shares = (distances / REACH) ** 2
+    assert abs(shares.mean() - 0.5) < 6 / np.sqrt(12 * 4000)
+    assert abs((shares < 0.25).mean() - 0.25) < 6 * np.sqrt(0.25 * 0.75 / 4000)
+
+
+# --- The errors of the paper ------------------------------------------------------------------
+
+QUIET = Distortion(occurrences=0, bearing_sigma=0.0)
+WEIGHTS = [4, 3, 2, 1]
+
+
+def signature(codes: list[int], bearings: Sequence[float] | None = None) -> Signature:
+    places = np.linspace(0, 350, len(codes)) if bearings is None else np.array(bearings, float)
+    return Signature(codes=np.array(codes, np.uint8), bearings=places)
+
+
+def distorted(
+    one: Signature,
+    how: Distortion,
+    seed: int | np.random.Generator = 0,
+    *,
+    classes: Sequence[int] = CLASSES,
+    weights: Sequence[float] | None = WEIGHTS,
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return codes and bearings after a distortion."""
+    rng = np.random.default_rng(seed)
+    return parts_of(distort(one, how, classes=classes, weights=weights, rng=rng))
+
+
+def test_the_levels_of_the_paper() -> None:
+    levels = {"none": (0, 0.0), "light": (1, 5.0), "medium": (7, 5.0), "strong": (13, 5.0)}
+    assert {
+        name: Distortion(occurrences=count, bearing_sigma=sigma, bearing_clip=30.0)
+        for name, (count, sigma) in levels.items()
+    } == DISTORTIONS
+
+
+@given(one=sights, how=paper_errors, seed=seeds)
+def test_errors_change_so_many_objects(one: Sight, how: Distortion, seed: int) -> None:
+    codes, bearings = distorted(one.signature, how, seed)
+    assert abs(len(codes) - len(one)) <= how.occurrences
+    assert codes.dtype == np.uint8
+    if how.resort:
+        assert (np.diff(bearings) >= 0).all()
+    none = distorted(one.signature, DISTORTIONS["none"], seed)
+    assert np.array_equal(none, parts_of(one.signature))
+
+
+@given(one=sights, seed=seeds)
+def test_order_kept_or_sorted_again_hold_the_same_objects(one: Sight, seed: int) -> None:
+    kept, again = (
+        distorted(one.signature, replace(DISTORTIONS["strong"], resort=resort), seed)
+        for resort in (False, True)
+    )
+    assert sorted(zip(*kept, strict=True)) == sorted(zip(*again, strict=True))
+
+
+@given(one=sights, how=paper_errors, seed=seeds)
+def test_objects_keep_their_distances(one: Sight, how: Distortion, seed: int) -> None:
+    seen = how.ready(CITY)(one, np.random.default_rng(seed))
+    codes, bearings = distorted(one.signature, how, seed, weights=CITY.frequencies.tolist())
+    assert seen.codes.tolist() == codes.tolist()
+    assert seen.bearings.tolist() == bearings.tolist()
+    assert ((seen.distances >= 0) & (seen.distances <= REACH)).all()
+    lost = Counter(one.distances.tolist()) - Counter(seen.distances.tolist())
+    false = Counter(seen.distances.tolist()) - Counter(one.distances.tolist())
+    assert lost.total() + false.total() <= how.occurrences
+    if how.occurrences == 0:
+        assert sorted(seen.distances.tolist()) == sorted(one.distances.tolist())
+
+
+def test_order_is_kept_or_sorted_again() -> None:
+    assert distorted(signature([3, 1, 3, 5], [7, 7, 7, 7]), QUIET)[0].tolist() == [3, 1, 3, 5]
+    noise = replace(QUIET, bearing_sigma=40.0, resort=False)
+    false_only = replace(QUIET, occurrences=6, resort=False)
+    for seed in range(50):
+        # The order is that before the noise, and a false object stands where it belongs.
+        codes, _ = distorted(signature([1, 3, 5, 10], [10, 11, 12, 359]), noise, seed)
+        assert codes.tolist() == [1, 3, 5, 10]
+        _, bearings = distorted(signature([1, 1, 1], [10, 120, 240]), false_only, seed)
+        assert (np.diff(bearings) >= 0).all()
+
+
+def test_the_three_operations_are_equally_likely() -> None:
+    one = signature([1, 3, 1, 3, 5])
+    rng = np.random.default_rng(5)
+    once = replace(QUIET, occurrences=1)
+    trials = 6000
+    counts = Counter[int]()
+    changed_places = np.zeros(len(one))
+    for _ in range(trials):
+        codes, bearings = distorted(one, once, rng)
+        difference = len(codes) - len(one)
+        counts[difference] += 1
+        if difference == 0:
+            assert bearings.tolist() == parts_of(one)[1].tolist()
+            changed = codes != parts_of(one)[0]
+            assert changed.sum() == 1  # a false classification always changes the class
+            changed_places += changed
+    spread = sqrt(trials * 2 / 9)
+    assert counts.keys() == {-1, 0, 1}
+    assert all(abs(count - trials / 3) < 4 * spread for count in counts.values())
+    share = counts[0] / len(one)
+    assert (np.abs(changed_places - share) < 4 * sqrt(share)).all()
+
+
+@pytest.mark.parametrize(
+    ("false_class", "shares"),
+    [("uniform", [0.25, 0.25, 0.25, 0.25]), ("frequency", [0.4, 0.3, 0.2, 0.1])],
+)
+def test_classes_and_bearings_of_false_objects(
+    false_class: FalseClass, shares: list[float]
+) -> None:
+    # Operations that find no object are idle, so the signature grows and shrinks; count what
+    # one occurrence on nothing invents.
+    once = replace(QUIET, occurrences=1, false_class=false_class)
+    rng = np.random.default_rng(11)
+    drawn = [distorted(signature([]), once, rng) for _ in range(9000)]
+    invented = np.concatenate([codes for codes, _ in drawn])
+    bearings = np.concatenate([angles for _, angles in drawn])
+    assert abs(len(invented) - 3000) < 4 * sqrt(9000 * 2 / 9)
+    for code, share in zip(CLASSES, shares, strict=True):
+        mean = len(invented) * share
+        assert abs((invented == code).sum() - mean) < 4 * sqrt(mean * (1 - share))
+    quadrants = np.bincount((bearings // 90).astype(int), minlength=4) / len(bearings)
+    assert np.abs(quadrants - 0.25).max() < 4 * sqrt(0.25 * 0.75 / len(bearings))
+
+
+def test_false_classes_leave_the_true_one_out() -> None:
+    how = replace(QUIET, occurrences=1, false_class="frequency")
+    rng = np.random.default_rng(2)
+    drawn = [
+        distorted(signature([1]), how, rng, classes=[1, 3, 5], weights=[98, 1.5, 0.5])[0]
+        for _ in range(3000)
+    ]
+    renamed = np.array([codes[0] for codes in drawn if len(codes) == 1])
+    assert set(renamed.tolist()) == {3, 5}
+    assert abs((renamed == 3).mean() - 0.75) < 4 * sqrt(0.75 * 0.25 / len(renamed))
+    # Without another class, a false classification changes nothing.
+    cases: list[tuple[FalseClass, list[int]]] = [("uniform", [3]), ("frequency", [3, 5])]
+    for false_class, classes in cases:
+        often = replace(how, occurrences=5, false_class=false_class)
+        codes, _ = distorted(signature([3] * 3), often, 1, classes=classes, weights=[1, 0])
+        assert set(codes.tolist()) <= {3}
+
+
+def test_the_noise_of_bearings_is_normal_and_clipped() -> None:
+    one = signature([1] * 40_000, [1.0] * 40_000)  # wrapped below north, too
+    little, much = (
+        away(distorted(one, replace(QUIET, bearing_sigma=sigma, resort=False))[1], 1.0)
+        for sigma in (5.0, 20.0)
+    )
+    assert abs(little.mean()) < 4 * 5 / sqrt(40_000)
+    assert little.std() == pytest.approx(5.0, rel=0.02)
+    assert np.abs(much).max() == pytest.approx(30.0)
+    clipped = np.isclose(np.abs(much), 30.0).mean()
+    assert clipped == pytest.approx(erfc(1.5 / sqrt(2)), rel=0.05)  # both tails beyond 1.5 sigma
+
+
+# --- Everything else --------------------------------------------------------------------------
+
+TRIALS = 4000
+PERFECT = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=1e-9)
+NAMES = {1: "alignment_tree", 3: "street_light", 5: "traffic_light", 10: "bench"}
+
+
+def spoiled(how: QueryDistortion, one: Sight, seed: int = 0) -> Sight:
+    return how.ready(CITY)(one, np.random.default_rng(seed))
+
+
+def assert_shown(how: QueryDistortion, seed: int, chance: float, distance: float = 10.0) -> None:
+    """Check how often one object is left."""
+    spoil, rng = how.ready(CITY), np.random.default_rng(seed)
+    shown = sum(len(spoil(many(1, distance=distance), rng)) for _ in range(1500))
+    assert_rate(shown, 1500, chance)
+
+
+@settings(max_examples=30)
+@given(sigma=st.floats(0.5, 40.0), seed=seeds)
+def test_moments_of_a_compass(sigma: float, seed: int) -> None:
+    spoil = CompassBias(sigma=sigma).ready(CITY)
+    rng = np.random.default_rng(seed)
+    off = np.array([away(spoil(many(2), rng).bearings, 90.0) for _ in range(1500)])
+    assert (off[:, 0] == off[:, 1]).all()  # the same for all objects of a query
+    if sigma < 30.0:  # else some are turned by more than half a turn
+        assert abs(off[:, 0].mean()) < 6 * sigma / sqrt(1500)
+        assert abs(off[:, 0].std() / sigma - 1.0) < 6 / sqrt(2 * 1500)
+
+
+@given(one=sights, names=st.sets(st.sampled_from(sorted(NAMES.values()))), seed=seeds)
+def test_missing_and_known_share_the_objects_out(one: Sight, names: set[str], seed: int) -> None:
+    missing = spoiled(MissingClasses(classes=tuple(names)), one, seed)
+    known = spoiled(MissingClasses(classes=tuple(names), others=True), one, seed)
+    assert rows(missing) == [row for row in rows(one) if NAMES[row[0]] not in names]
+    assert rows(known) == [row for row in rows(one) if NAMES[row[0]] in names]
+
+
+@given(degrees=st.floats(1.0, 360.0), one=sights, seed=seeds)
+def test_a_view_holds_what_fits_in_its_angle(degrees: float, one: Sight, seed: int) -> None:
+    there = spoiled(FieldOfView(degrees=degrees), one, seed)
+    kept = rows(there)
+    assert kept == [row for row in rows(one) if row in kept]
+    if len(kept) > 1:
+        gaps = np.diff([*there.bearings, there.bearings[0] + 360.0])
+        assert gaps.max() >= 360.0 - degrees - 1e-6  # the part of the turn that is out of view
+    if degrees == 360.0:
+        assert kept == rows(one)
+
+
+@settings(max_examples=30)
+@given(degrees=st.floats(5.0, 360.0), seed=seeds)
+def test_each_object_is_in_view_as_often_as_the_view_is_wide(degrees: float, seed: int) -> None:
+    view = FieldOfView(degrees=degrees)
+    assert_shown(view, seed, degrees / 360.0)
+    # Of objects all round, just the width of the view is shown every time.
+    assert abs(len(spoiled(view, all_round(3600), seed)) - 10.0 * degrees) <= 1.5
+
+
+@given(degrees=st.floats(1.0, 360.0), turn=st.floats(-400, 400), one=sights, seed=seeds)
+def test_a_view_tells_where_it_looked(degrees: float, turn: float, one: Sight, seed: int) -> None:
+    there = spoiled(FieldOfView(degrees=degrees), one, seed)
+    untold = spoiled(FieldOfView(degrees=degrees, told=False), one, seed)
+    assert rows(there) == rows(untold)
+    assert untold.photo == FULL_VIEW
+    assert there.photo.width == pytest.approx(degrees)
+    middle = np.deg2rad(there.photo.turned(turn).sectors[0]).mean() if there.photo.sectors else 0.0
+    turned = there.turned(turn)
+    if there.photo.sectors:  # they turn with the objects in them
+        found = np.deg2rad(turned.photo.sectors[0]).mean()
+        assert np.exp(1j * found) == pytest.approx(np.exp(1j * middle), abs=1e-9)
+        view = turned.signature
+        assert isinstance(view, View)
+        assert view.photos == (turned.photo,)
+
+
+@given(first=st.floats(1.0, 359.0), second=st.floats(1.0, 359.0), seed=seeds)
+def test_of_a_view_of_a_view_the_common_part_is_told(
+    first: float, second: float, seed: int
+) -> None:
+    chain = (FieldOfView(degrees=first), FieldOfView(degrees=second))
+    both = ready_chain(chain, CITY)(all_round(3600), seed, 0)
+    if len(both):
+        assert both.photo.width == pytest.approx(len(both) / 10.0, abs=0.3)
+        assert both.photo.sees(both.bearings).all()
+
+
+def test_nothing_false_is_out_of_a_view_that_is_told() -> None:
+    for text, inside in (("view:40, errors:13", True), ("view:40:told=false, errors:13", False)):
+        seen = [ready_chain(parse_chain(text), CITY)(many(0), 0, number) for number in range(300)]
+        gaps = [np.diff([*one.bearings, one.bearings[0] + 360.0]).max() for one in seen if len(one)]
+        assert bool(min(gaps) >= 320.0) is inside
+
+
+@pytest.mark.parametrize("percent", [10.0, 25.0, 80.0])
+def test_rough_ranges_are_off_by_their_error(percent: float) -> None:
+    seen = spoiled(RoughRanges(percent=percent), many(TRIALS, distance=12.0))
+    assert seen.ranges is not None
+    off = np.log(seen.ranges / 12.0) / (percent / 100.0)
+    assert abs(off.mean()) < 6.0 / sqrt(TRIALS)
+    assert abs(off.std() - 1.0) < 6.0 / sqrt(2 * TRIALS)
+    view = seen.signature
+    assert isinstance(view, View)
+    assert view.range_errors is not None
+    assert (view.range_errors == percent / 100.0).all()
+
+
+@pytest.mark.parametrize("text", ["errors:200, ranges:80", "ranges:80, errors:200", "ranges:80, F"])
+def test_false_objects_are_anywhere_on_the_disc(text: str) -> None:
+    noise = replace(PERFECT, clutter=70.0, name="F")
+    chain = parse_chain(text.replace("F", "detector:F"), noises={"F": noise})
+    seen = [ready_chain(chain, CITY)(many(0), 0, number) for number in range(40)]
+    squares = (np.concatenate([one.ranges for one in seen if one.ranges is not None]) / REACH) ** 2
+    assert len(squares) > 300
+    assert 0.0 < squares.min() <= squares.max() <= 1.0
+    assert abs(squares.mean() - 0.5) < 6.0 / sqrt(12 * len(squares))
+
+
+@pytest.mark.parametrize("right", [0.55, 0.8, 0.95])
+def test_scores_can_be_trusted(right: float) -> None:
+    each = TRIALS * 2
+    codes = np.repeat(np.array(CLASSES, np.uint8), each)
+    here = sight([(code, 90.0, 10.0) for code in codes.tolist()])
+    seen = spoiled(ClassScores(right=right), here)
+    assert seen.scores is not None
+    assert (seen.codes == seen.scores.argmax(axis=1)).all()
+    own = seen.scores[np.arange(len(codes)), codes]
+    assert own.mean() == pytest.approx(right, abs=0.02)
+    for code in CLASSES:  # of all that is given such a score of a class, so much is of the class
+        said = seen.scores[:, code]
+        for low in np.arange(0.0, 1.0, 0.2):
+            some = (said >= low) & (said < low + 0.2)
+            spread = sqrt(0.25 / max(some.sum(), 1))
+            assert abs(said[some].mean() - (codes[some] == code).mean()) < 4 * spread
+    # What is misnamed or made up afterwards, the detector is sure of.
+    after = spoiled(Distortion(occurrences=40), seen.only(np.arange(20)))
+    assert after.scores is not None
+    sure = after.scores.max(axis=1) == 1.0
+    assert 15 < sure.sum() < len(after)
+    assert (after.codes[sure] == after.scores[sure].argmax(axis=1)).all()
+
+
+def test_types_and_bearings_alone_are_no_view() -> None:
+    assert type(spoiled(Distortion(), all_round(9)).signature) is Signature
+
+
+@given(one=sights, width=st.floats(0.0, 5.0))
+def test_hidden_behind_nearer_objects(one: Sight, width: float) -> None:
+    expected = [
+        row
+        for row in rows(one)
+        if not any(
+            near < row[2]
+            and angular_distance(row[1], other) < degrees(atan(width / 2 / max(near, 0.01)))
+            for _, other, near in rows(one)
+        )
+    ]
+    assert rows(spoiled(HiddenBehind(width=width), one)) == expected
+
+
+@given(one=sights, seed=seeds)
+def test_obstacles_only_take_away(one: Sight, seed: int) -> None:
+    seen = rows(spoiled(Obstacles(count=3.0), one, seed))
+    assert seen == [row for row in rows(one) if row in seen]
+    for harmless in (Obstacles(count=0.0), Obstacles(count=9.0, width=0.0)):
+        assert rows(spoiled(harmless, one, seed)) == rows(one)
+
+
+@settings(max_examples=30)
+@given(
+    count=st.floats(0.2, 5.0), width=st.floats(0.5, 8.0), distance=st.floats(5.0, 30.0), seed=seeds
+)
+def test_how_often_obstacles_hide(count: float, width: float, distance: float, seed: int) -> None:
+    # The chance of one obstacle, over its distance r with density 2 r / R^2: atan(w / 2r) / pi.
+    middles = (np.arange(20_000) + 0.5) * (distance / 20_000)
+    one = (np.arctan(width / 2 / middles) / pi * 2 * middles / REACH**2).mean() * distance
+    assert_shown(Obstacles(count=count, width=width), seed, exp(-count * one), distance)
+
+
+@settings(max_examples=30)
+@given(
+    count=st.integers(0, 6), width=st.floats(1.0, 359.0), distance=st.floats(0, REACH), seed=seeds
+)
+def test_how_often_sectors_are_blocked(
+    count: int, width: float, distance: float, seed: int
+) -> None:
+    sectors = BlockedSectors(count=count, degrees=width)
+    assert_shown(sectors, seed, (1.0 - width / 360.0) ** count, distance)
+    left = len(spoiled(sectors, all_round(3600), seed)) / 10.0
+    assert left >= 360.0 - count * width - 1.0 * count - 0.2
+    if count == 1:
+        assert left == pytest.approx(360.0 - width, abs=0.2)
+
+
+def table_of(noise: Noise) -> NoiseTable:
+    (table, *_), _ = noise_tables(
+        noise,
+        taxonomy=CITY.taxonomy,
+        codes=CITY.codes,
+        longest=LONGEST_TABLE,
+        radius=CITY.reach,
+    )
+    return table
+
+
+@given(noise=noise_specs(), code=st.sampled_from(CLASSES), seed=seeds)
+def test_detection_naming_and_bearings_are_those_of_the_model(
+    noise: NoiseSpec, code: int, seed: int
+) -> None:
+    noise = replace(noise, bearing_sigma_by_class={"bench": noise.bearing_sigma / 3})
+    table = table_of(noise)
+    kind = int(table.row_of[code])
+    seen = spoiled(Detector(noise=noise), many(TRIALS, code=code, distance=17.0), seed)
+    assert (np.diff(seen.bearings) >= 0).all()
+    assert seen.heading == 0.0
+    true = seen.only(seen.distances == 17.0)  # false objects seem to be anywhere else
+    assert_rate(len(true), TRIALS, 1.0 - table.missed[LONGEST_TABLE, kind])
+    for name, chance in zip(table.codes, table.named[LONGEST_TABLE, kind], strict=True):
+        assert_rate(int((true.codes == name).sum()), len(true), float(min(chance, 1.0)))
+    sigma = float(table.sigma[kind])
+    off = np.exp(1j * np.radians(true.bearings - 90.0)).mean() if len(true) else 1.0
+    # The mean direction of a wrapped normal is exp(-sigma^2 / 2) long.
+    expected = np.exp(-(np.radians(sigma) ** 2) / 2.0)
+    assert abs(off - expected) < 6.0 / sqrt(max(len(true), 1))
+
+
+@settings(max_examples=12)
+@given(noise=noise_specs(), seed=seeds)
+def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> None:
+    table = table_of(noise)
+    spoil = Detector(noise=noise).ready(CITY)
+    rng = np.random.default_rng(seed)
+    found = [spoil(many(0), rng) for _ in range(600)]
+    for code, mean in zip(table.codes, table.clutter, strict=True):
+        count = sum(int((one.codes == code).sum()) for one in found)
+        # Poisson, too, with the mean of all: neither tail is unheard of.
+        assert min(poisson.cdf(count, 600 * mean), poisson.sf(count - 1, 600 * mean)) > 1e-9
+    bearings, distances = np.concatenate([(one.bearings, one.distances) for one in found], axis=1)
+    if len(bearings) > 50:
+        assert abs(np.exp(1j * np.radians(bearings)).mean()) < 6.0 / sqrt(len(bearings))
+        assert abs(((distances / REACH) ** 2).mean() - 0.5) < 6.0 / sqrt(12 * len(distances))
+
+
+@given(half=st.floats(3.0, 60.0), distance=st.floats(0.0, REACH), seed=seeds)
+def test_detection_falls_with_distance(half: float, distance: float, seed: int) -> None:
+    seen = spoiled(Detector(noise=PERFECT, half=half), many(TRIALS, distance=distance), seed)
+    nearby = 1.0 - float(table_of(PERFECT).missed[LONGEST_TABLE, 1])
+    chance = nearby * 0.5 ** ((distance / half) ** 2)
+    # Hardly a false object in a thousand signatures.
+    true = int((seen.distances == distance).sum())
+    assert_rate(true, TRIALS, chance)
+
+
+def test_a_step_aside_turns_near_objects_most() -> None:
+    spoil = Detector(noise=replace(PERFECT, position_sigma=0.5)).ready(CITY)
+    rng = np.random.default_rng(1)
+    for distance in (5.0, 25.0):
+        bearings = np.concatenate(
+            [spoil(many(1, distance=distance), rng).bearings for _ in range(TRIALS)]
+        )
+        sigma = degrees(0.5 / distance)
+        turned = away(bearings, 90.0)
+        turned = turned[np.abs(turned) < 8.0 * sigma]  # a few objects are false
+        assert turned.std() == pytest.approx(sigma, rel=0.08)
+        assert abs(turned.mean()) < 6 * sigma / sqrt(TRIALS)
+
+
+def test_of_a_mixture_one_model_makes_a_query() -> None:
+    both = NoiseMixture(specs=(replace(PERFECT, detection=0.05), PERFECT), weights=(0.25, 0.75))
+    spoil = Detector(noise=both).ready(CITY)
+    rng = np.random.default_rng(2)
+    shares = np.array([len(spoil(many(200), rng)) / 200 for _ in range(800)])
+    assert ((shares < 0.2) | (shares > 0.9)).all()
+    assert_rate(float((shares > 0.9).sum()), 800, 0.75)
+
+
+def test_the_levels_of_the_paper_lose_objects_by_number() -> None:
+    # Of few objects, seven errors leave a smaller share than of many.
+    spoil = Detector(noise=named_noise("medium")).ready(CITY)
+    rng = np.random.default_rng(3)
+    few, lots = (
+        np.mean([(spoil(many(n), rng).distances == 10.0).sum() / n for _ in range(600)])
+        for n in (4, 40)
+    )
+    assert few == pytest.approx((1 - 1 / 4) ** (7 / 3), abs=0.05)
+    assert lots == pytest.approx((1 - 1 / 40) ** (7 / 3), abs=0.02)

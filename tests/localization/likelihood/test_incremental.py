@@ -1,0 +1,43 @@
+"""Photos of which more and more is told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from small_city import small_city
+
+from semsig_gis import build_index, named_noise
+from semsig_gis.localization.likelihood import incremental as memos
+from semsig_gis.localization.likelihood.incremental import TurnMemo
+from semsig_gis.observation.view import Photo, View
+
+
+@pytest.mark.parametrize("kept", [True, False])
+@pytest.mark.parametrize("sectors", [(), ((10.0, 130.0),)])
+def test_what_is_gone_on_from_gives_the_same_scores(
+    sectors: tuple[tuple[float, float], ...],
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    kept: bool,
+) -> None:
+    if not kept:
+        monkeypatch.setattr(memos, "MOST_BYTES", 0)
+    database, _ = small_city()
+    index, memo = build_index(database, named_noise("generic")), TurnMemo()
+    seen = View.of(
+        database.signature(int(database.lengths.argmax())),
+        photos=(Photo(sectors=sectors, north_sigma=math.inf),),
+    )
+    near = np.where(np.arange(len(seen)) % 2, np.nan, 12.0)
+    steps = [[0], [0, 1], [0, 2], [0, 1, 2], [0, 1, 2, 2], [1, 2], [], [0, 1, 2, 3, 4]]
+    for rows in [*steps, *steps[::-1]]:
+        for view in (seen, View.of(seen, ranges=near)):
+            told = view.select(np.array(rows, np.int64))
+            one, other = index.scores(told), index.scores(told, memo=memo)
+            assert other.loglik == pytest.approx(one.loglik, abs=1e-4)
+            assert one.heading is not None
+            assert other.heading is not None
+            assert (one.heading == other.heading).mean() > 0.99
+    assert (len(memo._photos) == 2) == kept

@@ -1,0 +1,222 @@
+"""The first sum over all cells, held to a slow one; see also `view_oracle`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from noisy_cells import NOTHING, noise_specs, parts_of, random_database, random_query
+from scipy.stats import binom, poisson
+from view_oracle import cell_loglik, random_view, scene_of, set_loglik, turned_loglik
+from worlds import random_town
+
+from semsig_gis.core.geometry import consecutive
+from semsig_gis.core.signature import Signature
+from semsig_gis.localization.likelihood.index import TURNS, build_index, index_fingerprint
+from semsig_gis.localization.likelihood.kernels import promising_cells
+from semsig_gis.localization.likelihood.off_centre import views_aside
+from semsig_gis.localization.noise.model import cell_noise, named_noise
+from semsig_gis.localization.noise.table import database_tables
+from semsig_gis.observation.view import Photo, View
+
+if TYPE_CHECKING:
+    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.noise.model import NoiseSpec
+
+SEEDS = st.integers(0, 10_000)
+NOISE = named_noise("generic")
+TURN = 360.0 / TURNS
+TOWN = random_town()
+
+
+def slow_counts(index: LikelihoodIndex, query: list[int], cell: int) -> float:
+    """Return the likelihood of so many objects of each class, by sums over all hits."""
+    table, database = index.table, index.database
+    length = int(database.lengths[cell])
+    codes = database.codes[database.offsets[cell] : database.offsets[cell + 1]]
+    own = np.bincount(table.row_of[codes], minlength=len(table.codes))
+    share = sum(query[:-1]) / sum(query)
+    detected = own * (1 - table.missed[length])
+    named, right = table.named[length], np.diag(table.named[length])
+    strays = share * (table.clutter + detected @ named - detected * right)
+    chances = share * (1 - table.missed[length]) * right
+    total = 0.0
+    if share:
+        for number, count, stray, chance in zip(query, own, strays, chances, strict=False):
+            hits = np.arange(min(count, number) + 1)
+            each = binom.pmf(hits, count, chance) * poisson.pmf(number - hits, stray)
+            total += math.log(each.sum())
+    if query[-1]:
+        rate = (1 - share) * float(table.clutter.sum() + detected.sum())
+        total += float(poisson.logpmf(query[-1], rate))
+    return total
+
+
+FADING = st.none() | st.just({"all": [[5, 1.0], [20, 0.8], [30, 0.3]]})
+PLACES = st.just(0.0) | st.floats(0.5, 5.0)
+SECTORS = st.lists(
+    st.tuples(st.floats(0, 360), st.floats(5, 300)), max_size=2, unique_by=lambda one: one[0]
+).map(lambda some: tuple((low, low + width) for low, width in some))
+
+
+@settings(max_examples=40)
+@given(SEEDS, noise_specs(), FADING, PLACES, st.lists(SECTORS, min_size=1, max_size=2))
+def test_scores_are_the_formula(
+    seed: int,
+    noise: NoiseSpec,
+    fading: dict[str, list[list[float]]] | None,
+    position_sigma: float,
+    sectors: list[tuple[tuple[float, float], ...]],
+) -> None:
+    database = random_database(seed, cells=8)
+    noise = replace(
+        noise,
+        fading=fading or {},
+        position_sigma=position_sigma,
+        bearing_sigma=max(noise.bearing_sigma, 3.0),  # against steps of 0.7 degrees
+    )
+    photos = [Photo(sectors=some) for some in sectors]
+    view = random_view(database, np.random.default_rng(seed), size=3, photos=photos)
+    scores = build_index(database, noise).scores(view)
+    assert scores.headings == (None,) * len(photos)
+    expected = [
+        cell_loglik(database, view, noise, cell, form=set_loglik) for cell in range(len(database))
+    ]
+    # The scan takes bearings in steps and distances in levels, by which ranges go most. A level is
+    # up to 9 % off, and so is a spread; where all that explains a thing is an object that hardly
+    # fits, the square of that counts.
+    errors = np.abs(scores.loglik - expected)
+    assert np.median(errors) < 0.25 * len(view)
+    assert (errors < 0.5 * len(view) + 0.2 * np.abs(expected)).all()
+
+
+@settings(max_examples=15)
+@given(SEEDS, st.sampled_from([4.0, 20.0, math.inf]), SECTORS)
+def test_turns_are_summed_over_with_their_chances(
+    seed: int, sigma: float, sectors: tuple[tuple[float, float], ...]
+) -> None:
+    database = random_database(seed, cells=20)
+    index = build_index(database, named_noise("medium"))
+    photo = Photo(sectors=sectors, north_sigma=sigma)
+    view = View.of(random_query(database, seed, size=6), photos=(photo,))
+    turns = np.arange(-32, 32) * TURN
+    chances = np.exp(-0.5 * (turns / sigma) ** 2)
+    chances /= chances.sum()
+    known = replace(view, photos=(replace(photo, north_sigma=0.0),))
+    logliks = [index.scores(known.turned(turn)).loglik for turn in turns.tolist()]
+    found = index.scores(view)
+    with np.errstate(divide="ignore"):
+        each = np.stack(logliks).astype(np.float64) + np.log(chances)[:, None]
+    assert found.loglik == pytest.approx(np.logaddexp.reduce(each, axis=0), abs=2e-2)
+    assert found.heading is not None
+    rows = np.rint((found.heading + 180.0) / TURN).astype(int)
+    reached = each[rows, np.arange(len(database))]
+    assert reached == pytest.approx(each.max(axis=0), abs=2e-2)
+
+
+@settings(max_examples=10)
+@given(SEEDS, noise_specs(), SECTORS)
+def test_places_aside_are_summed_over(
+    seed: int, noise: NoiseSpec, sectors: tuple[tuple[float, float], ...]
+) -> None:
+    town = TOWN.database
+    # Against steps of 0.7 degrees, and of metres at the edge of range.
+    sigma = max(noise.bearing_sigma, 8.0)
+    noise = replace(noise, bearing_sigma=sigma, clutter=5.0, clutter_shares={}, position_sigma=0.0)
+    view = random_view(town, np.random.default_rng(seed), size=3, photos=[Photo(sectors=sectors)])
+    view = replace(view, ranges=None, range_errors=None)
+    cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
+    step = town.grid.step
+    places = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
+    seen = views_aside(town, cells, places)
+    (spec,) = cell_noise(noise, step / 2.0).specs
+    (table,), _ = database_tables(town, spec)
+    codes = town.present_codes.tolist()
+    # What is seen there, as if it were in the middle of the cells.
+    units = np.rint(seen.distances * 255.0 / town.reach).clip(0, 255)
+    each = []
+    for place in range(len(places)):
+        views = np.arange(len(cells)) * len(places) + place
+        part = consecutive(seen.offsets[views], seen.lengths[views])
+        there = replace(
+            town.select(cells),
+            offsets=np.append(0, np.cumsum(seen.lengths[views])),
+            codes=seen.codes[part],
+            bearing_units=np.floor(seen.bearings[part] * 20.0).astype(np.uint16),
+            distance_units=units[part].astype(np.uint8),
+        )
+        scenes = [scene_of(there, row, spec, table) for row in range(len(cells))]
+        north = [[(0.0, 1.0)]]
+        each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
+    expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
+    found = build_index(town, cell_noise(noise, step)).scorer_aside(view, north_sigma=0.0)(cells)
+    assert found == pytest.approx(expected, abs=0.5 * len(view))
+    assert np.median(np.abs(found - expected)) < 0.1 * len(view)
+
+
+@settings(max_examples=20)
+@given(SEEDS, noise_specs(), st.lists(st.integers(0, 4), min_size=1, max_size=9))
+def test_types_alone_are_compared_by_their_numbers(
+    seed: int, spec: NoiseSpec, codes: list[int]
+) -> None:
+    database = random_database(seed, cells=30)
+    index = build_index(database, spec)
+    query = Signature(np.array(codes, np.uint8), None)
+    counts = np.bincount(index.table.query_rows(query), minlength=5).tolist()
+    expected = [slow_counts(index, counts, cell) for cell in range(len(database))]
+    assert index.scores(query).loglik == pytest.approx(np.array(expected), rel=1e-4, abs=1e-3)
+
+
+def test_a_query_of_many_objects_is_scored() -> None:
+    database = random_database(2, cells=5)
+    index = build_index(database, named_noise("medium"))
+    one = random_query(database, 2, size=1)
+    many = Signature(*(np.repeat(part, 600) for part in parts_of(one)))
+    single, found = index.scores(one).loglik, index.scores(many).loglik
+    nothing = index.scores(NOTHING).loglik
+    assert found - nothing == pytest.approx(600 * (single - nothing), rel=1e-4)
+
+
+def test_scores_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    database = random_database(8, cells=390)
+    query = random_query(database, 8, size=6)
+    alone = build_index(database, NOISE).scores(query).loglik
+    monkeypatch.setattr("semsig_gis.core.threads.ROWS_A_PART", 50)
+    monkeypatch.setattr("semsig_gis.core.threads.cores", lambda: 3)
+    assert np.array_equal(build_index(database, NOISE).scores(query).loglik, alone)
+
+
+def test_the_fingerprint_changes_with_what_the_index_depends_on() -> None:
+    database = random_database(8)
+    nearer = replace(database, distance_units=database.distance_units // 2)
+    others = [random_database(9), database.select(slice(39)), nearer]
+    prints = {index_fingerprint(one, NOISE) for one in (database, *others)}
+    prints.add(index_fingerprint(database, named_noise("light")))
+    assert len(prints) == 5
+    assert index_fingerprint(random_database(8), NOISE) in prints
+
+
+@given(
+    st.lists(st.one_of(st.floats(-500, 0, width=32), st.just(-math.inf)), min_size=1, max_size=60),
+    st.integers(1, 60),
+)
+def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
+    array = np.array(scores, np.float32)
+    count = min(count, len(array))
+    cells = promising_cells(array, count)
+    assert len(cells) >= count
+    assert (np.diff(cells) > 0).all()
+    worst = np.sort(array[cells])[-count]
+    assert worst > np.delete(array, cells).max(initial=-math.inf) or len(cells) == len(array)
+
+
+def test_promising_cells_bear_scores_that_are_no_numbers() -> None:
+    scores = np.array([math.nan, -3.0, math.inf, -1.0, -math.inf], np.float32)
+    for top in (scores, scores[[0, 1, 3, 4]], scores[:1]):
+        cells = promising_cells(top, min(2, len(top)))
+        assert set(cells.tolist()) <= set(range(len(top)))

@@ -1,0 +1,107 @@
+"""The oracle of views itself: it is a density, and agrees with what is known of full turns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from noisy_cells import every_association, mixtures, random_database, random_query
+from view_oracle import (
+    Scene,
+    Seen,
+    Thing,
+    cell_loglik,
+    exact_loglik,
+    mass_inside,
+    random_view,
+    set_loglik,
+)
+
+from semsig_gis.localization.likelihood.association import align_cells
+from semsig_gis.localization.noise.model import NoiseSpec
+from semsig_gis.observation.view import FULL_VIEW, Photo
+
+LAMP = Thing(
+    chance=0.8,
+    names=(0.9, 0.1),
+    bearing=45.0,
+    bearing_sigma=6.0,
+    distance=12.0,
+    range_sigma=0.25,
+)
+PHOTO = Photo(sectors=((0.0, 50.0), (350.0, 355.0)))
+
+
+@pytest.mark.parametrize("ranged", [False, True])
+@pytest.mark.parametrize("form", [exact_loglik, set_loglik])
+def test_the_chances_of_none_and_of_one_detection_are_those_of_the_process(
+    form: type, *, ranged: bool
+) -> None:
+    scene = Scene(things=(LAMP,), clutter=(0.5, 0.3), reach=30.0)
+    inside = 0.8 * mass_inside(45.0, 6.0, PHOTO)
+    false = 0.8 * 55.0 / 360.0
+    assert math.exp(form(scene, [], PHOTO)) == pytest.approx((1 - inside) * math.exp(-false))
+    steps = np.linspace(math.log(0.01), math.log(30.0), 400)
+    ranges = np.exp(steps) if ranged else np.array([math.nan])
+    each = [
+        math.exp(form(scene, [Seen(bearing=bearing % 360.0, weights=row, range=metres)], PHOTO))
+        for bearing in [*np.arange(-9.5, -5, 1.0), *np.arange(0.5, 50, 1.0)]
+        for row in ((1.0, 0.0), (0.0, 1.0))
+        for metres in ranges
+    ]
+    found = sum(each) * (steps[1] - steps[0] if ranged else 1.0)
+    expected = math.exp(-false) * ((1 - inside) * false + inside)
+    assert found == pytest.approx(expected, rel=2e-3)
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 10_000), mixtures(), st.integers(1, 4))
+def test_of_a_full_turn_it_is_what_it_was(seed: int, noise: NoiseSpec, size: int) -> None:
+    database = random_database(seed, cells=6, longest=4)
+    query = random_query(database, seed, size=size)
+    found = cell_loglik(database, query, noise, 0)
+    near = align_cells(database, query, noise, np.zeros(1, np.int64))[0]
+    assert near - 1e-2 <= found <= near + 0.35 * size + 1e-2
+
+
+def test_associations_are_summed_as_elsewhere() -> None:
+    rng = np.random.default_rng(3)
+    things = [
+        Thing(
+            chance=0.7,
+            names=(0.8, 0.2),
+            bearing=bearing,
+            bearing_sigma=20.0,
+            distance=10.0,
+            range_sigma=0.3,
+        )
+        for bearing in (10.0, 30.0, 50.0)
+    ]
+    scene = Scene(things=things, clutter=(1.0, 1.0), reach=30.0)
+    seen = [Seen(bearing=float(a), weights=(1.0, 0.0)) for a in rng.uniform(0, 60, 3)]
+    weights = np.array(
+        [[set_loglik(Scene(things=[one], clutter=(1.0, 1.0), reach=30.0), [each], FULL_VIEW)
+          for each in seen] for one in things]
+    )  # fmt: skip
+    alone = math.log(0.3) - 2.0 + math.log(1 / 360)
+    pairs, _ = every_association(np.exp(weights - alone) - 1.0)
+    expected = pairs + 3 * math.log(0.3) - 2.0 + 3 * math.log(1 / 360)
+    assert exact_loglik(scene, seen, FULL_VIEW) == pytest.approx(expected)
+
+
+def test_photos_multiply_and_turns_are_summed() -> None:
+    database = random_database(1, cells=3, longest=4)
+    noise = NoiseSpec(fading={"all": ((10.0, 1.0), (30.0, 0.2))}, position_sigma=1.0)
+    photos = (Photo.looking(heading=20, fov=70), Photo.looking(heading=200, fov=50))
+    view = random_view(database, np.random.default_rng(0), size=2, photos=photos)
+    one, other = (cell_loglik(database, part, noise, 0) for part in view.split())
+    assert cell_loglik(database, view, noise, 0) == pytest.approx(one + other)
+    turns = [[(0.0, 0.5), (20.0, 0.5)], [(0.0, 1.0)]]
+    turned = cell_loglik(database, view.split()[0].turned(20.0), noise, 0)
+    expected = np.logaddexp(one, turned) - math.log(2.0) + other
+    found = cell_loglik(database, view, noise, 0, headings=turns)
+    assert found == pytest.approx(expected)
+    assert found != pytest.approx(cell_loglik(database, view, noise, 0, form=set_loglik))

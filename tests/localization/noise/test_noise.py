@@ -1,0 +1,200 @@
+"""Noise models, and what they say in numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import TAXONOMY, mixtures, noise_specs, random_database
+from sentences import refused
+
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.signature import Signature
+from semsig_gis.evaluation.queries.distortions import distort, named_distortion
+from semsig_gis.localization.noise.model import (
+    NOISES,
+    NoiseMixture,
+    NoiseSpec,
+    cell_noise,
+    named_noise,
+    noise_from_dict,
+    open_noise,
+    place_noise,
+    save_noise,
+)
+from semsig_gis.localization.noise.table import database_tables, mean_table, noise_tables
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization.noise.table import NoiseTable
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        ({"detection": -0.1}, "detection of the noise is -0.1; give a chance from 0 to 1."),
+        ({"detection": True}, "detection of the noise is True"),
+        ({"misnamed": float("nan")}, "misnamed of the noise is nan"),
+        ({"clutter": -1}, "clutter of the noise is -1; give a number from 0"),
+        ({"bearing_sigma": 0}, "bearing_sigma of the noise is 0; give degrees above 0"),
+        ({"bearing_sigma": 200}, "up to 180"),
+        ({"position_sigma": float("inf")}, "position_sigma of the noise is inf"),
+        ({"detection_by_class": {"bench": 2}}, "detection_by_class 'bench' of the noise is 2"),
+        ({"detection_by_class": 0.5}, "give a table by the names of the classes"),
+        (
+            {"confusion": {"bench": {"bench": 0.9}}},
+            "confusion row 'bench' of the noise sums to 0.9",
+        ),
+        ({"confusion": {"bench": {"bench": -1, "bus_stop": 2}}}, "is -1; give a chance"),
+        ({"confusion": {"bench": 1}}, "give a table by the names of the classes"),
+        ({"clutter_shares": {"bench": 0.4}}, "clutter_shares of the noise sums to 0.4"),
+        ({"detecton": 0.4}, "no field 'detecton'; the nearest is 'detection'"),
+        ({"name": 3}, "give a text"),
+        ({"specs": []}, "a mixture of noise models cannot be used"),
+        ({"specs": [], "weights": []}, "give at least one model"),
+        ({"specs": [{}], "weights": [0.5]}, "weights of the mixture of the noise sums to 0.5"),
+        ({"specs": [{}, {}], "weights": [1.0, 0.0]}, "leave out models without weight"),
+        ({"specs": [{"specs": [{}], "weights": [1]}], "weights": [1]}, "another mixture"),
+        ({"specs": [{"clutter": -1}], "weights": [1]}, "clutter of the noise is -1"),
+    ],
+)
+def test_what_cannot_be_a_model_is_refused_in_a_sentence(
+    values: dict[str, object], fault: str
+) -> None:
+    with refused(InputError, fault):
+        noise_from_dict(values)
+
+
+@given(
+    mixtures() | st.sampled_from(list(NOISES.values())),
+    st.text(st.characters(codec="utf-8")),
+    st.sampled_from(["json", "toml", "TOML"]),
+)
+def test_any_model_survives_a_file(
+    tmp_path_factory: pytest.TempPathFactory, noise: Noise, name: str, suffix: str
+) -> None:
+    file = tmp_path_factory.mktemp("noise") / f"noise.{suffix}"
+    save_noise(replace(noise, name=name), file)
+    assert open_noise(file) == replace(noise, name=name)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-3, 0.7, 30.0])
+def test_a_cell_widens_the_noise_of_a_place(sigma: float) -> None:
+    noise = NoiseMixture(specs=(NoiseSpec(), NoiseSpec(position_sigma=sigma)), weights=(0.5, 0.5))
+    wide = cell_noise(noise, 6.0)
+    expected = [math.sqrt(3.0), math.hypot(sigma, math.sqrt(3.0))]
+    assert [spec.position_sigma for spec in wide.specs] == pytest.approx(expected)
+    assert cell_noise(noise.specs[1], 6.0) == wide.specs[1]
+    back = [spec.position_sigma for spec in place_noise(wide, 6.0).specs]
+    assert back == pytest.approx([0.0, sigma], abs=2e-3)
+
+
+def test_a_file_and_a_name_without_a_model_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "noise.json"
+    for text, word in (("{", "noise.json cannot be read"), ("[1]", "a table of its fields")):
+        file.write_text(text)
+        with refused(InputError, word):
+            open_noise(file)
+    with refused(UnknownNameError, "'genric'", "the nearest is 'generic'"):
+        named_noise("genric")
+
+
+# --- In numbers -------------------------------------------------------------------------------
+
+CODES = np.array([1, 3, 4], np.uint8)
+NAMES = ["alignment_tree", "street_light", "indicator"]
+
+
+def tables_of(noise: Noise, longest: int) -> tuple[tuple[NoiseTable, ...], np.ndarray]:
+    return noise_tables(noise, taxonomy=TAXONOMY, codes=CODES, longest=longest, radius=30.0)
+
+
+def slow_named(spec: NoiseSpec, kind: int, name: int, length: int) -> float:
+    """Return the chance of a name, one number at a time."""
+    misnamed = spec.misnamed_by_class.get(NAMES[kind], spec.misnamed)
+    alike = dict.fromkeys(NAMES, misnamed / 2) | {NAMES[kind]: 1 - misnamed}
+    row = spec.confusion.get(NAMES[kind], alike)
+    shares = [row.get(one, 0.0) for one in NAMES]
+    wrong = sum(share for one, share in enumerate(shares) if one != kind)
+    right = shares[kind] * (1 - 1 / length) ** spec.misnamed_each
+    right = 1 - min(max(1 - right, 1e-3), 0.95)
+    if name == kind:
+        return float(right)
+    part = shares[name] / wrong if wrong else 1 / (len(NAMES) - 1)
+    return float((1 - right) * part)
+
+
+@given(noise_specs(), st.integers(1, 30))
+def test_a_table_says_what_the_model_says(spec: NoiseSpec, length: int) -> None:
+    (table,), weights = tables_of(spec, 30)
+    assert weights.tolist() == [1.0]
+    for kind, name in enumerate(NAMES):
+        detected = spec.detection_by_class.get(name, spec.detection)
+        detected *= (1 - 1 / length) ** spec.missed_each
+        assert table.missed[length, kind] == pytest.approx(min(max(1 - detected, 1e-3), 0.95))
+        assert table.sigma[kind] == spec.bearing_sigma_by_class.get(name, spec.bearing_sigma)
+        share = spec.clutter_shares.get(name, 0.0) if spec.clutter_shares else 1 / 3
+        assert table.clutter[kind] == pytest.approx(max(spec.clutter * share, 1e-3 / 3))
+        for other in range(len(NAMES)):
+            expected = slow_named(spec, kind, other, length)
+            assert table.named[length, kind, other] == pytest.approx(expected)
+    assert np.allclose(table.named.sum(axis=2), 1.0)
+    assert table.density[-1] * 360 == pytest.approx(table.clutter.sum())
+
+
+@pytest.mark.parametrize("level", ["light", "medium", "strong"])
+def test_the_levels_predict_what_the_distortion_does(level: str) -> None:
+    length, draws = 20, 3000
+    rng = np.random.default_rng(3)
+    true = Signature(np.full(length, 1, np.uint8), np.arange(0.0, 360.0, 18.0))
+    seen = [distort(true, named_distortion(level), classes=CODES, rng=rng) for _ in range(draws)]
+    (table,), _ = tables_of(named_noise(level), length)
+    detected = (1 - table.missed[length, 0]) * length
+    expected = detected + table.clutter.sum()
+    # A false object may itself be missed again, which the model does not tell.
+    assert np.mean([len(one) for one in seen]) == pytest.approx(expected, abs=0.6)
+    wrong = np.mean([np.count_nonzero(one.codes != 1) for one in seen])
+    modelled = detected * table.misnamed[length, 0] + table.clutter.sum() * 2 / 3
+    assert wrong == pytest.approx(modelled, rel=0.25)
+
+
+@given(noise_specs(), noise_specs())
+def test_a_mean_lies_between_its_models(one: NoiseSpec, other: NoiseSpec) -> None:
+    mixture = NoiseMixture(specs=(one, other), weights=(0.25, 0.75))
+    both, weights = tables_of(mixture, 9)
+    mean = mean_table(both, weights)
+    for name in ("missed", "misnamed", "clutter", "sigma", "others"):
+        values = [getattr(table, name) for table in both]
+        found = getattr(mean, name)
+        assert (found >= np.minimum(*values) - 1e-12).all()
+        assert (found <= np.maximum(*values) + 1e-12).all()
+    assert np.allclose(mean.named.sum(axis=2), 1.0)
+    assert np.allclose(mean.missed, 0.25 * both[0].missed + 0.75 * both[1].missed)
+
+
+def test_a_position_that_is_not_known_turns_near_objects_most() -> None:
+    spec = NoiseSpec(bearing_sigma=5.0, position_sigma=3.0)
+    (table,), _ = tables_of(spec, 9)
+    sigmas = table.sigmas
+    assert (np.diff(sigmas, axis=1) <= 0).all()
+    assert sigmas[0, 255] == pytest.approx(math.hypot(5.0, math.degrees(3.0 / 30.0)))
+    assert sigmas[0, 0] == 180.0
+
+
+def test_a_single_class_is_never_misnamed() -> None:
+    database = random_database(1, classes=1)
+    (table,), _ = database_tables(database, named_noise("strong"))
+    assert (table.named == 1.0).all()
+
+
+def test_queries_are_checked_for_their_classes() -> None:
+    (table,), _ = tables_of(NoiseSpec(), 9)
+    assert table.query_rows(Signature(np.array([4, 0, 1], np.uint8), None)).tolist() == [2, 3, 0]
+    assert table.query_rows(Signature(None, np.array([4.0]))).tolist() == [3]

@@ -1,0 +1,389 @@
+from __future__ import annotations
+
+import json
+import math
+import random
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_query
+from sentences import refused
+from worlds import CODES, World
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import Signature
+from semsig_gis.core.statistics import wilson_interval
+from semsig_gis.database.database import views_in
+from semsig_gis.localization.noise.fit import (
+    ALL,
+    drawn_rates,
+    estimated_rates,
+    expected_counts,
+    gather_evidence,
+    model_change,
+    next_model,
+)
+from semsig_gis.localization.noise.learn import Sample, learn_noise, read_samples
+from semsig_gis.localization.noise.model import noise_from_dict
+from semsig_gis.observation.view import Photo, View
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.localization.noise.learn import NoiseEstimate
+
+# What the simulated detector does; the estimator has no part in it.
+DETECTION = {1: 0.9, 2: 0.7, 3: 0.8, 4: 0.6}
+MISNAMED = {1: 0.05, 2: 0.1, 3: 0.02, 4: 0.2}
+SIGMA = {1: 3.0, 2: 6.0, 3: 4.0, 4: 5.0}
+CLUTTER = {1: 0.5, 2: 0.1, 3: 0.3, 4: 0.2}
+TRUTH = {"detection": DETECTION, "misnamed": MISNAMED, "clutter": CLUTTER, "bearing_sigma": SIGMA}
+DATABASE = random_database(1, cells=200)
+
+
+def detector(seed: int, seen: list[tuple[int, float]]) -> Signature:
+    """Detect things as a plain loop over the throws of dice."""
+    dice = random.Random(seed)  # noqa: S311
+    given: list[tuple[float, int]] = []
+    for code, bearing in seen:
+        if dice.random() < DETECTION[code]:
+            name = code
+            if dice.random() < MISNAMED[code]:
+                name = dice.choice([other for other in DETECTION if other != code])
+            given.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name))
+    for code, rate in CLUTTER.items():
+        alive = dice.random()
+        while alive > math.exp(-rate):  # Knuth's Poisson numbers
+            given.append((dice.uniform(0, 360), code))
+            alive *= dice.random()
+    given.sort()
+    return Signature(
+        np.array([code for _, code in given], np.uint8), np.array([angle for angle, _ in given])
+    )
+
+
+def simulated(database: SignatureDatabase, count: int, *, seed: int = 0) -> list[Sample]:
+    views = views_in(database, np.arange(len(database)))
+    samples = []
+    for number in range(count):
+        cell = number % len(database)
+        part = slice(views.offsets[cell], views.offsets[cell + 1])
+        seen = zip(views.codes[part].tolist(), views.bearings[part].tolist(), strict=True)
+        signature = detector(seed * 100_000 + number, list(seen))
+        samples.append(Sample(signature=signature, cell_id=int(database.cell_ids[cell])))
+    return samples
+
+
+def truths(estimate: NoiseEstimate) -> list[tuple[float, float, float]]:
+    """Return the true value of each rate of a class, and its interval."""
+    codes = {item.name: item.code for item in TAXONOMY.classes}
+    rows = estimate.rates[estimate.rates["class"] != "all"]
+    return [
+        (TRUTH[row["quantity"]][codes[row["class"]]], row["low_95"], row["high_95"])
+        for row in rows.to_dict("records")
+    ]
+
+
+@pytest.fixture(scope="module")
+def estimate() -> NoiseEstimate:
+    return learn_noise(simulated(DATABASE, 500), DATABASE)
+
+
+def test_the_true_rates_are_recovered_within_their_intervals(estimate: NoiseEstimate) -> None:
+    rows = truths(estimate)
+    assert len(rows) == 16
+    assert sum(low <= true <= high for true, low, high in rows) >= 14
+    assert (estimate.rates["low_95"] <= estimate.rates["low_90"]).all()
+    assert (estimate.rates["high_95"] >= estimate.rates["high_90"]).all()
+    assert np.isfinite(estimate.rates["value"]).all()
+    spec = estimate.spec
+    assert spec.detection_by_class["alignment_tree"] == pytest.approx(0.9, abs=0.04)
+    assert spec.clutter == pytest.approx(sum(CLUTTER.values()), abs=0.15)
+    assert spec.bearing_sigma_by_class["water_fountain"] == pytest.approx(6.0, abs=0.5)
+    plain = json.loads(json.dumps(estimate.to_dict()))
+    assert noise_from_dict(plain["spec"]) == spec
+    assert (plain["samples"], plain["skipped"]) == (500, 0)
+    assert estimate.objects == np.resize(DATABASE.lengths, 500).sum()
+    detected = estimate.rates["samples"][estimate.rates.index[5]]  # what misnamed is a share of
+    assert estimate.confusion.to_numpy().sum() == pytest.approx(detected, rel=1e-6)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    database = random_database(2, cells=100, longest=8)
+    inside = []
+    for seed in range(12):
+        found = learn_noise(simulated(database, 250, seed=seed + 1), database)
+        inside += [low <= true <= high for true, low, high in truths(found)]
+    assert 0.88 <= np.mean(inside) <= 0.995
+
+
+def test_a_class_of_few_samples_is_drawn_to_the_whole() -> None:
+    rare = 5
+    codes = DATABASE.codes.copy()
+    codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
+    found = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
+    name = TAXONOMY.by_code(rare).name
+    row = found.rates[(found.rates["quantity"] == "detection") & (found.rates["class"] == name)]
+    overall = found.spec.detection
+    assert row["samples"].item() == 2
+    assert abs(row["value"].item() - overall) < abs(row["own"].item() - overall) + 1e-9
+    assert row["value"].item() == pytest.approx(overall, abs=0.2)
+
+
+def test_places_in_cells_turn_bearings() -> None:
+    rng = np.random.default_rng(0)
+    world = World(
+        tuple((x, y, int(rng.choice(CODES[:2]))) for x, y in rng.uniform(0, 300, (90, 2)))
+    )
+    database, objects = world.database, world.street_objects
+    samples = []
+    for _ in range(400):
+        xy = rng.uniform(0, 300, 2)
+        away = objects.xy - xy
+        near = np.flatnonzero(np.hypot(*away.T) <= 30.0)
+        angles = np.degrees(np.arctan2(away[near, 0], away[near, 1])) + rng.normal(0, 2, len(near))
+        seen = Signature(objects.codes[near], np.asarray(angles % 360.0))
+        samples.append(Sample(signature=seen, xy=(float(xy[0]), float(xy[1]))))
+    exact = learn_noise(samples, objects)
+    assert exact.spec.bearing_sigma == pytest.approx(2.0, abs=0.15)
+    assert exact.spec.detection > 0.99
+    lost = Sample(signature=samples[0].signature, xy=(9e6, 9e6))
+    with_lost = learn_noise([lost, *samples], objects)
+    assert (with_lost.skipped, with_lost.spec) == (exact.skipped + 1, exact.spec)
+    naive = learn_noise(samples, database)
+    told = learn_noise(samples, database, position_sigma=10 / math.sqrt(12))
+    assert naive.spec.bearing_sigma > 2 * told.spec.bearing_sigma
+    assert told.spec.position_sigma == pytest.approx(2.89, abs=0.01)
+    assert told.skipped == naive.skipped > 0
+
+
+def test_one_class_alone() -> None:
+    database = random_database(4, classes=1)
+    ids = enumerate(database.cell_ids.tolist())
+    samples = [Sample(signature=database.signature(cell), cell_id=number) for cell, number in ids]
+    found = learn_noise(samples, database)
+    assert found.spec.detection > 0.98
+    assert found.spec.confusion == {"alignment_tree": {"alignment_tree": 1.0}}
+
+
+# --- Views ------------------------------------------------------------------------------------
+
+LEFT = (1.0, 0.9, 0.7, 0.45, 0.3)  # of the detection, at fifths of 30 m
+METRES = (6.0, 12.0, 18.0, 24.0, 30.0)
+RANGE_SIGMA = {1: 0.2, 2: 0.4, 3: 0.25, 4: 0.3}
+
+
+def left(distance: float) -> float:
+    return float(np.interp(distance, METRES, LEFT))
+
+
+def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
+    """Take two photos of things with their bearings and distances, by a plain loop."""
+    dice = random.Random(seed)  # noqa: S311
+    photos = tuple(
+        Photo.looking(heading=dice.uniform(0, 360), fov=fov)
+        for fov in dice.sample((60, 90, 120), 2)
+    )
+    rows: list[tuple[float, int, float, int]] = []
+    for number, photo in enumerate(photos):
+        found = []
+        for code, bearing, distance in seen:
+            if dice.random() < DETECTION[code] * left(distance):
+                name = code
+                if dice.random() < MISNAMED[code]:
+                    name = dice.choice([other for other in DETECTION if other != code])
+                metres = max(distance, 0.1) * math.exp(dice.gauss(0, RANGE_SIGMA[code]))
+                found.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name, metres))
+        for code, rate in CLUTTER.items():
+            alive = dice.random()
+            while alive > math.exp(-3 * rate):
+                found.append((dice.uniform(0, 360), code, 30 * math.sqrt(dice.random())))
+                alive *= dice.random()
+        rows += [(*one, number) for one in found if photo.sees(one[0])]
+    scores = np.zeros((len(rows), 256))
+    for row, (_, name, _, _) in enumerate(rows):
+        both = [name, dice.choice([other for other in DETECTION if other != name])]
+        # The truth is as likely as it scores; half are sure.
+        scores[row, both if dice.random() < 0.75 else both[::-1]] = 0.75, 0.25
+        if dice.random() < 0.5:
+            scores[row] = np.eye(256)[name]
+    columns = np.array(rows, np.float64).reshape(-1, 4).T
+    told = [dice.random() < 0.7 for _ in rows]
+    return View(
+        columns[1].astype(np.uint8),
+        columns[0],
+        ranges=np.where(told, columns[2], np.nan),
+        scores=scores,
+        photo=columns[3].astype(np.int64),
+        photos=photos,
+    )
+
+
+def photographed(count: int, *, seed: int = 0) -> NoiseEstimate:
+    """Learn from photos from the cells of a random city."""
+    database = random_database(seed, cells=100, longest=14)
+    views = views_in(database, np.arange(len(database)))
+    samples = []
+    for number in range(count):
+        cell = number % len(database)
+        part = slice(views.offsets[cell], views.offsets[cell + 1])
+        columns = (views.codes, views.bearings, views.distances)
+        seen = list(zip(*(column[part].tolist() for column in columns), strict=True))
+        view = photographer(seed * 100_000 + number, seen)
+        samples.append(Sample(signature=view, cell_id=int(database.cell_ids[cell])))
+    return learn_noise(samples, database)
+
+
+def photo_truth(quantity: str, code: int, distance: float) -> float:
+    if quantity in {"detection", "fading"}:
+        return DETECTION[code] * left(distance)
+    if quantity == "clutter":
+        return 3 * CLUTTER[code]
+    return {**TRUTH, "range_sigma": RANGE_SIGMA}[quantity][code]
+
+
+def test_photos_teach_what_panoramas_teach_and_ranges_and_fading() -> None:
+    codes = {item.name: item.code for item in TAXONOMY.classes}
+    inside = []
+    for seed in range(2):
+        found = photographed(800, seed=seed)
+        rows = found.rates[found.rates["class"] != ALL].to_dict("records")
+        assert len(rows) == 4 * (5 + 4)
+        for one in rows:
+            true = photo_truth(one["quantity"], codes[one["class"]], one["distance"])
+            inside.append(one["low_95"] <= true <= one["high_95"])
+    assert np.mean(inside) >= 0.87
+
+
+def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
+    (tmp_path / "seen.CSV").write_text(
+        'note,cell_id,types,bearings,x,y\nfirst,7,DB,"10, 350",,\nnothing,8,,,,\n,,D,-10,1.5,2\n'
+    )
+    lines = [
+        {"cell_id": 7, "types": "DB", "bearings": [10, 350]},
+        {"cell_id": 8, "types": "", "bearings": []},
+        {"x": 1.5, "y": 2, "types": "D", "bearings": -10},
+    ]
+    (tmp_path / "seen.jsonl").write_text("\n\n".join(map(json.dumps, lines)))
+    for name in ("seen.CSV", "seen.jsonl"):
+        found = [
+            (one.cell_id, one.xy, *(part.tolist() for part in parts_of(one.signature)))
+            for one in read_samples(tmp_path / name, taxonomy=TAXONOMY)
+        ]
+        assert found == [
+            (7, None, [3, 1], [10.0, 350.0]),
+            (8, None, [], []),
+            (None, (1.5, 2.0), [3], [350.0]),
+        ]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("cell_id,types,bearings\n7,DB,10\n", ["line 2", "2 types", "1 bearings"]),
+        ("cell_id,types,bearings\n7,D,10\n7,%,10\n", ["line 3", "%"]),
+        ("cell_id,types,bearings\n7,?,10\n", ["line 2", "unknown class"]),
+        ("cell_id,types,bearings\n7,D,nan\n", ["line 2", "nan"]),
+        ("cell_id,types,bearings\n7,D,400\n", ["line 2", "400"]),
+        ("cell_id,types,bearings\n7,D,north\n", ["line 2", "north"]),
+        ("cell_id,types,bearings\nx7,D,10\n", ["line 2", "x7"]),
+        ("x,types,bearings\n7,D,10\n", ["line 2", "place"]),
+        ("x,y,types,bearings\n7,inf,D,10\n", ["line 2", "inf"]),
+        ("x,y,bearings\n7,8,10\n", ["line 2", "types"]),
+        ("x,y,types,bearings\n", ["no rows", "one sample"]),
+        ("[1]", ["line 1"]),
+        ("{", ["line 1"]),
+        ('{"types": "D", "bearings": {"a": 1}, "cell_id": 7}', ["line 1"]),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, text: str, words: list[str]) -> None:
+    path = tmp_path / ("seen.jsonl" if text[0] in "[{" else "seen.csv")
+    path.write_text(text)
+    with refused(InputError, *words):
+        read_samples(path, taxonomy=TAXONOMY)
+
+
+# --- One round of the fit ---------------------------------------------------------------------
+
+NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
+
+
+@given(st.integers(0, 500))
+def test_counts_add_up(seed: int) -> None:
+    database = random_database(seed, cells=20)
+    detected = [NOTHING]
+    for cell in range(1, 20):
+        query = random_query(database, seed + cell, size=cell % 7)
+        codes, bearings = parts_of(query)
+        detected.append(Signature(codes[codes > 0], bearings[codes > 0]))
+    views = views_in(database, np.arange(20))
+    evidence = gather_evidence(views, detected, taxonomy=TAXONOMY, position_sigma=2.0)
+    model = evidence.start
+    counts = expected_counts(evidence, model)
+    hits = counts.named.sum()
+    assert hits == pytest.approx(counts.chances.sum())
+    # What is neither an object nor clutter came into range with the observer.
+    assert 0.8 * len(evidence.seen.bearings) < hits + counts.false.sum()
+    assert hits + counts.false.sum() <= len(evidence.seen.bearings) + 0.05
+    assert (counts.named.sum(axis=1) <= counts.trials.sum() + 0.05).all()
+    assert (counts.turns >= 0).all()
+    new = next_model(evidence, counts, model)
+    assert new.clutter.sum() * 20 == pytest.approx(counts.false.sum(), rel=0.02)
+    assert new.named.sum(axis=2) == pytest.approx(1.0)
+
+
+def test_rounds_raise_the_likelihood() -> None:
+    database = random_database(3, cells=60, longest=5)
+    rng = np.random.default_rng(0)
+    detected = [distorted(database, cell, rng) for cell in range(60)]
+    evidence = gather_evidence(views_in(database, np.arange(60)), detected, taxonomy=TAXONOMY)
+    model = evidence.start
+    before = -math.inf
+    for _ in range(8):
+        counts = expected_counts(evidence, model)
+        assert counts.log_likelihood > before - 0.1  # classes are drawn to the whole, too
+        before = counts.log_likelihood
+        new = next_model(evidence, counts, model)
+        assert model_change(model, model) == 0.0
+        assert model_change(model, new) > 0
+        model = new
+
+
+def test_where_every_association_is_certain_the_intervals_are_the_text_books() -> None:
+    database = random_database(0, cells=300, longest=1, classes=1)
+    views = views_in(database, np.arange(300))
+    seen = [
+        Signature(views.codes[[row]], (views.bearings[[row]] + 1.0 - 2.0 * (row % 2)) % 360)
+        if row % 10
+        else NOTHING
+        for row in range(300)
+    ]
+    evidence = gather_evidence(views, seen, taxonomy=TAXONOMY)
+    model = replace(
+        evidence.start,
+        missed=np.array([[0.1]]),
+        clutter=np.array([1e-6]),
+        sigma=np.array([1.0]),
+    )
+    rates = estimated_rates(evidence, expected_counts(evidence, model), model)
+    rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
+    found = rows["detection"]
+    assert found["own"] == pytest.approx(0.9, abs=1e-4)
+    assert found["samples"] == 300
+    expected = wilson_interval(0.9, 300)
+    assert (found["low_95"], found["high_95"]) == pytest.approx(expected, abs=0.003)
+    sigma = rows["bearing_sigma"]
+    assert sigma["own"] == pytest.approx(1.0, abs=0.03)  # half a unit of bearing is noise too
+    assert math.log(sigma["high_95"] / sigma["own"]) >= 1.96 / math.sqrt(2 * 270) - 1e-6
+    assert len(rates) == 8
+
+
+def test_rates_are_drawn_as_the_overall_rate_with_eight_samples() -> None:
+    found = drawn_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
+    assert found == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
+    assert drawn_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]

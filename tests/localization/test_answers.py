@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import refused
+
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.database.database import SequenceTable
+from semsig_gis.localization.answers import DistanceMemo, Requirement
+from semsig_gis.sources.catalog import paper_taxonomy
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from semsig_gis.core.errors import SemsigError
+
+
+def test_distances_are_measured_once_and_the_time_is_told() -> None:
+    asked: list[str] = []
+
+    def measure(name: str) -> NDArray[np.float32]:
+        asked.append(name)
+        time.sleep(0.01)
+        return np.array([len(asked)], np.float32)
+
+    memo = DistanceMemo()
+    found = [float(memo.get(name, partial(measure, name))[0]) for name in "abaab"]
+    assert found == [1.0, 2.0, 1.0, 1.0, 2.0]
+    assert asked == ["a", "b"]
+    # Three times a distance was known that takes a hundredth of a second to measure.
+    assert memo.spared >= 0.03
+
+
+PAPER = paper_taxonomy()
+UNREADABLE = ["", "M,", "M;B", "B>2", "B>=", "B>=-1", "B=x", "MB"]
+ROWS = st.lists(st.lists(st.integers(1, 4), max_size=6), max_size=20)
+LIMIT = st.tuples(
+    st.sampled_from([WILDCARD, 1, 2, 3, 11]),
+    st.integers(0, 3),
+    st.integers(3, 5) | st.just(math.inf),
+)
+
+
+@given(ROWS, st.lists(LIMIT, max_size=3))
+def test_requirement_is_checked_as_if_cell_by_cell(
+    rows: list[list[int]], limits: list[tuple[int, int, float]]
+) -> None:
+    expected = []
+    for row in rows:
+        seen = Counter(row) | Counter({WILDCARD: len(row)})
+        expected.append(all(low <= seen[code] <= high for code, low, high in limits))
+    flat = np.array([value for row in rows for value in row], np.uint8)
+    table = SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)]))
+    assert Requirement(tuple(limits)).met(table).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "limits"),
+    [
+        ("M", {11: (1, math.inf)}),
+        ("2B", {1: (2, math.inf)}),
+        ("B>=2", {1: (2, math.inf)}),
+        (" B <= 5 ", {1: (0, 5)}),
+        ("B=0", {1: (0, 0)}),
+        ("?=12", {WILDCARD: (12, 12)}),
+        ("2B,B<=5,M", {1: (2, 5), 11: (1, math.inf)}),
+    ],
+)
+def test_parse(text: str, limits: dict[int, tuple[int, float]]) -> None:
+    read = Requirement.parse(text, PAPER).limits
+    assert {code: (low, high) for code, low, high in read} == limits
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        *((InputError, text, "cannot be read") for text in UNREADABLE),
+        (InputError, "3B,B<=2", "at least 3 and at most 2 of 'B'"),
+        (UnknownNameError, "2", "symbol '2'"),
+        (UnknownNameError, "Z", "'Z'"),
+    ],
+)
+def test_text_that_is_no_requirement(kind: type[SemsigError], text: str, words: str) -> None:
+    with refused(kind, words):
+        Requirement.parse(text, PAPER)

@@ -1,0 +1,71 @@
+"""Queries answered by a method of either kind, and by the one that nobody names."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from sentences import refused
+from worlds import random_town, save_town
+
+import semsig_gis
+from semsig_gis.core.defaults import DEFAULT_METHOD, PAPER_METHOD
+from semsig_gis.core.errors import InputError
+from semsig_gis.database.city import open_city
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.localization.answers import Requirement
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.likelihood.method import LikelihoodMethod
+from semsig_gis.localization.locator import localize, parse_method
+from semsig_gis.localization.noise.model import cell_noise, named_noise
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+TOWN = random_town()
+CITY = TOWN.database
+LONGEST = int(CITY.lengths.argmax())
+QUERY = CITY.signature(LONGEST)
+INDEX = build_index(CITY, cell_noise(named_noise("generic"), CITY.grid.step))
+
+
+def test_nobody_names_another_method() -> None:
+    assert isinstance(parse_method(DEFAULT_METHOD), LikelihoodMethod)
+    assert isinstance(parse_method(PAPER_METHOD), Method)
+    for function in (semsig_gis.localize, semsig_gis.evaluate):
+        assert inspect.signature(function).parameters["method"].default is DEFAULT_METHOD
+
+
+def test_a_database_is_asked_by_likelihood() -> None:
+    assert localize(CITY, QUERY).to_dict() == locate(INDEX, QUERY).to_dict()
+    met = localize(CITY, QUERY, requirement=Requirement.parse("?<=3", CITY.taxonomy))
+    assert met.candidates["length"].max() <= 3
+    with refused(InputError, "store"):
+        localize(CITY, QUERY, method="likelihood:generic:refined")
+
+
+def test_a_city_tells_the_place_between_the_cells(tmp_path: Path) -> None:
+    city = open_city(save_town(tmp_path, TOWN))
+    refined = locate(INDEX, QUERY, store=city.store, refined=True)
+    assert localize(city, QUERY).to_dict() == refined.to_dict()
+    on_grid = localize(city, QUERY, method=LikelihoodMethod.parse("likelihood:generic:on_grid"))
+    assert on_grid.answer.cell == LONGEST
+    assert localize(city, QUERY, method=PAPER_METHOD).to_dict() == (
+        localize(CITY, QUERY, method=Method.parse(PAPER_METHOD)).to_dict()
+    )
+
+
+@pytest.mark.parametrize("method", [DEFAULT_METHOD, PAPER_METHOD])
+def test_evaluations_take_the_text_of_a_method(method: str) -> None:
+    settings: dict[str, Any] = {"queries": 12, "seed": 3}
+    named = evaluate(CITY, method=method, **settings)
+    grid = build_index(CITY, named_noise("generic"))
+    given = grid if method == DEFAULT_METHOD else Method.parse(method)
+    same = evaluate(CITY, method=given, **settings)
+    assert named.queries.equals(same.queries)
+    assert str(named.method) == str(same.method)
+    with refused(InputError, "refined"):
+        evaluate(CITY, method="likelihood:generic:refined", **settings)

@@ -1,0 +1,328 @@
+"""What all maps share: boxes, search, layers, and refusals."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from functools import partial
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import folium
+import geopandas as gpd
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from machine import PATIENCE_S
+from map_pages import HOSTILE, LEGEND, hostile_database
+from pyproj import CRS, Transformer
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
+from sentences import refused
+from small_city import chances_of
+from worlds import TAXONOMY, random_town
+
+from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
+from semsig_gis.core.signature import SignatureSpec
+from semsig_gis.core.symbology import CANDIDATE_RAMP, OBJECT_COLOURS, VERDICTS
+from semsig_gis.core.taxonomy import Taxonomy
+from semsig_gis.database.build import build_database
+from semsig_gis.database.store import ObjectStore
+from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.queries.distortions import MissingClasses
+from semsig_gis.evaluation.queries.draw import QuerySpec
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.locator import localize
+from semsig_gis.localization.noise.model import named_noise
+from semsig_gis.maps.cells import ambiguity_map, identifiability_map
+from semsig_gis.maps.drift import drift_map
+from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.maps.location import localization_map, location_map
+from semsig_gis.maps.objects import ground_map, objects_map
+from semsig_gis.maps.page_elements import layers_of, page_element, search_area, to_latlon
+from semsig_gis.objects.table import Licence, StreetObjects
+from semsig_gis.sources.catalog import paper_taxonomy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from map_pages import MapPage
+
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.localization.noise.model import Noise
+
+WORLD = random_town()
+CITY, OBJECTS = WORLD.database, WORLD.street_objects
+HOUSE = gpd.GeoDataFrame(geometry=[shapely.box(765_300, 6_275_100, 765_320, 6_275_120)], crs=2154)
+NO_PLACE = gpd.GeoDataFrame(geometry=[None], crs=2154)
+LANE = gpd.GeoDataFrame(geometry=[shapely.LineString([(3.0, 43.0), (3.1, 43.0)])], crs=4326)
+EVALUATION = evaluate(CITY, queries=5, method=Method())
+LOCALIZATION = localize(CITY, CITY.signature(0), top=5, method=Method())
+OTHER_CHANCES = chances_of(CITY.select(slice(1, None)))
+OTHER_CITY = dataclasses.replace(CITY, rows=CITY.rows + 10_000)
+OTHER_SIGHT = dataclasses.replace(CITY, codes=CITY.codes[::-1].copy())
+OTHER = dataclasses.replace(TAXONOMY.classes[0], name="other")
+OTHER_CLASSES = dataclasses.replace(CITY, taxonomy=Taxonomy((OTHER, *TAXONOMY.classes[1:])))
+EMPTY, NARROW = CITY.select(slice(0)), build_database(OBJECTS, spec=SignatureSpec(20.0))
+NO_OBJECTS = dataclasses.replace(OBJECTS, table=OBJECTS.table.iloc[:0])
+DRIFT = partial(drift_map, CITY, CITY)
+TURNED = dataclasses.replace(OBJECTS, table=OBJECTS.table.to_crs("EPSG:32631"))
+NOWHERE, FAR = LANE.set_crs(None, allow_override=True), (0.0, 0.0, 1.0, 1.0)
+BROWSER_FILES = sorted(
+    one.name for one in resources.files("semsig_gis.maps").joinpath("js").iterdir()
+)
+
+
+def maps_of(
+    city: SignatureDatabase, objects: StreetObjects, evaluation: Evaluation, noise: Noise
+) -> dict[str, Callable[..., folium.Map]]:
+    """Return what draws each map of a city."""
+    query, index = city.signature(0), build_index(city, noise)
+    location = locate(index, query, top=5, explained=1, store=ObjectStore.of(objects))
+    chances = dataclasses.replace(chances_of(city), noise=noise)
+    later = dataclasses.replace(objects, table=objects.table[3:])
+    dates: dict[str, Any] = {"objects_before": objects, "objects_after": later}
+    return {
+        "evaluation": partial(evaluation_map, evaluation, city),
+        "localization": partial(
+            localization_map, localize(city, query, top=5, method=Method()), city
+        ),
+        "location": partial(location_map, location),
+        "ambiguity": partial(ambiguity_map, city),
+        "identifiability": partial(identifiability_map, chances),
+        "drift": partial(drift_map, city, build_database(later), **dates),
+        "objects": partial(objects_map, objects),
+        "ground": partial(ground_map, buildings=HOUSE),
+    }
+
+
+MAPS = maps_of(CITY, OBJECTS, EVALUATION, named_noise("light"))
+LAYERS = {
+    "evaluation": {"Share of queries that fail", "Lines from true to estimated places"},
+    "localization": {"Candidates (5)"},
+    "location": {"Best place", "Chance of a cell", "Candidates (5)"},
+    "ambiguity": {"Same types", "Same types and angle levels"},
+    "identifiability": {"Chance to be found"},
+    "drift": {"What has changed"},
+    "ground": {"Streets and buildings"},
+}
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> None:
+    draw, layers = MAPS[name], LAYERS.get(name, set())
+    own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
+    assert draw(map_=own) is own
+    assert draw(map_=own) is own
+    names = [getattr(child, "layer_name", "") for child in layers_of(own).values()]
+    assert layers | {f"{layer}, 2" for layer in layers} <= set(names)
+    for once in ("Objects seen from a cell", "Describe a cell when clicked"):
+        assert names.count(once) <= 1
+    body = own.get_root().render().partition("</head>")[2]
+    # No legend brings a view along.
+    assert all(" null, " in call[-12:] for call in re.findall(r"semsig\.legend\(.*\);", body))
+    assert "NaN" not in body
+
+
+@pytest.mark.parametrize("name", sorted(MAPS.keys() - {"ground"}))
+def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
+    draw = MAPS[name]
+    body = draw(tiles="openstreetmap.mapnik").get_root().render()
+    assert "tile.openstreetmap.org" in body
+    assert "contributors" in body
+    with refused(InputError, "OpenStreetMap"):
+        draw(tiles="OpenStreetMap", map_=folium.Map(tiles=None))
+
+
+@pytest.mark.parametrize(
+    ("tiles", "words"),
+    [
+        ("Openstreetmop", "not known"),
+        ("CartoDB.Positron", "need a key"),
+        ("Thunderforest Outdoors", "need a key"),
+        ("https://tiles.example/{z}/{x}/{y}.png", "not known"),
+    ],
+)
+def test_tiles_that_nobody_can_see_are_refused_with_some_that_can(tiles: str, words: str) -> None:
+    with refused(InputError, tiles, words, "'OpenStreetMap.Mapnik'"):
+        MAPS["ambiguity"](tiles=tiles)
+    draw = MAPS["ambiguity"](tiles="CyclOSM")
+    assert len([one for one in layers_of(draw).values() if isinstance(one, folium.TileLayer)]) == 1
+
+
+@pytest.mark.parametrize(
+    ("draw", "error", "words"),
+    [
+        (partial(evaluation_map, EVALUATION, CITY.select(slice(9))), InputError, "evaluat"),
+        (partial(localization_map, LOCALIZATION, OTHER_CITY), InputError, "localization"),
+        (partial(localization_map, LOCALIZATION, OTHER_SIGHT), InputError, "localization"),
+        (partial(ambiguity_map, EMPTY), InputError, "no cells"),
+        (partial(ambiguity_map, CITY, identifiability=OTHER_CHANCES), InputError, "other cells"),
+        (partial(drift_map, EMPTY, EMPTY), InputError, "no cells"),
+        (partial(drift_map, CITY, OTHER_CITY), InputError, "same city"),
+        (partial(drift_map, CITY, OTHER_CLASSES), InputError, "'other'"),
+        (partial(drift_map, CITY, NARROW), DatabaseError, "radius=20.0"),
+        (partial(DRIFT, objects_before=OBJECTS, objects_after=TURNED), CrsError, "EPSG:32631"),
+        (partial(objects_map, NO_OBJECTS), EmptyResultError, "no street object"),
+        (ground_map, EmptyResultError, "streets or buildings"),
+        (partial(ground_map, buildings=NO_PLACE), EmptyResultError, "streets or buildings"),
+        (partial(ground_map, buildings=HOUSE, box=FAR), EmptyResultError, "streets or buildings"),
+        (partial(ground_map, buildings=HOUSE, streets=LANE), CrsError, "one CRS"),
+        (partial(ground_map, buildings=HOUSE, streets=NOWHERE), CrsError, "one CRS"),
+    ],
+)
+def test_what_cannot_be_drawn(
+    draw: Callable[[], folium.Map], error: type[Exception], words: str
+) -> None:
+    with refused(error, words):
+        draw()
+
+
+@pytest.mark.parametrize("file", BROWSER_FILES)
+def test_style_and_script_end_where_their_element_does(file: str) -> None:
+    assert page_element(file).count("</") == 1
+
+
+HARMFUL = hostile_database(CITY)
+HARMFUL_OBJECTS = dataclasses.replace(
+    OBJECTS,
+    table=OBJECTS.table.assign(source=HOSTILE, source_id=HOSTILE),
+    taxonomy=HARMFUL.taxonomy,
+    licenses=(Licence(HOSTILE),),
+)
+HARMFUL_MAPS = maps_of(
+    HARMFUL,
+    HARMFUL_OBJECTS,
+    dataclasses.replace(
+        EVALUATION, asked=QuerySpec(distortions=(MissingClasses(classes=(HOSTILE,)),))
+    ),
+    dataclasses.replace(named_noise("light"), name=HOSTILE),
+)
+HELPED = int(np.flatnonzero((chances_of(CITY).gains > 0.1).any(axis=1))[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "subject", "counts"),
+    [
+        ("evaluation", "failed", (3, 5)),
+        ("localization", CANDIDATE_RAMP[0], (2, 1)),
+        ("location", VERDICTS["matched"], (3, 4)),
+        ("drift", OBJECT_COLOURS["removed"], (6, 3)),
+        ("ambiguity", 0, (2, 1)),
+        ("identifiability", HELPED, (9, 3)),
+    ],
+)
+def test_hostile_data_is_shown_word_for_word_and_never_run(
+    page: MapPage, name: str, subject: str | int, counts: tuple[int, int]
+) -> None:
+    page.open(HARMFUL_MAPS[name]())
+    if isinstance(subject, str):
+        page.panel_of(subject)
+    else:
+        page.click(HARMFUL, subject)
+    texts = (page.text(LEGEND), page.text(".semsig-panel"))
+    assert tuple(text.count(HOSTILE) for text in texts) == counts
+    page.assert_text_stays_text()
+
+
+@pytest.mark.parametrize("screen", [(390, 800), (844, 390), (720, 600)])
+def test_a_small_screen_is_not_covered(page: MapPage, screen: tuple[int, int]) -> None:
+    map_ = evaluation_map(EVALUATION, CITY)
+    localization_map(LOCALIZATION, CITY, map_=map_)
+    with page.screen(*screen):
+        page.open(map_)
+        legends = page.all(LEGEND)
+        assert max(legend.size["height"] for legend in legends) < 60
+        assert page.all(".leaflet-control-layers-expanded") == []
+        top = page.one(".leaflet-top.leaflet-left").rect
+        for legend in legends:
+            legend.find_element(By.TAG_NAME, "summary").click()
+            assert legend.size["height"] > 100
+            assert legend.size["width"] <= screen[0] - 20
+            # One is open at a time, and both are below the buttons.
+            assert len(page.all(".semsig-legend[open]")) == 1
+            assert min(one.rect["y"] for one in legends) >= top["y"] + top["height"]
+
+
+def test_boxes_fold_when_the_window_becomes_small(evaluated: MapPage) -> None:
+    boxes = ".semsig-legend[open], .leaflet-control-layers-expanded"
+    wait = WebDriverWait(evaluated.browser, PATIENCE_S)
+    assert len(evaluated.all(boxes)) == 2
+    with evaluated.screen(500, 900, mobile=False):
+        wait.until(lambda _: evaluated.all(boxes) == [])
+    wait.until(lambda _: len(evaluated.all(boxes)) == 1)
+    evaluated.switch("Failed")  # the layers are there again
+    assert evaluated.circles("failed") == 0
+
+
+def test_nothing_lies_below_the_boxes(evaluated: MapPage) -> None:
+    legend = evaluated.one(LEGEND).rect
+    layers = evaluated.one(".leaflet-control-layers").rect
+    left, right = legend["x"] + legend["width"], layers["x"]
+    places = """
+    return [...signs("successful"), ...signs("failed")].map(
+      (one) => map.latLngToContainerPoint(one.getLatLng()).x);
+    """
+    across = evaluated.ask(places)
+    assert left <= min(across) <= max(across) <= right
+    for side in (-0.95, 0.95):
+        evaluated.ask("clickAt(signs('failed')[0], arguments[0])", side)
+        where = evaluated.ask("return map.latLngToContainerPoint(toldPlace()).x")
+        assert left <= where <= evaluated.one(".semsig-panel").rect["x"]
+        rows = [line.split("\t") for line in evaluated.panel().splitlines() if "\t" in line]
+        assert [label for label, *_ in rows[:3]] == [
+            "Expected error",
+            "P(error ≤ 50 m)",
+            "True rank",
+        ]
+        evaluated.ask("semsig.hide(map)")
+
+
+def test_the_search_offers_the_best_match_first(evaluated: MapPage) -> None:
+    for number in (1, 2, 5, 12, 60):  # of both layers
+        for text in (f"Query {number}", f"query {number}:", str(number)):
+            assert evaluated.search(text)[0].startswith(f"Query {number}: ")
+    # By its number it is as well called as what is called so on another map.
+    exact = "return semsig.finders.flatMap((one) => one('12', 9)).map((one) => one.rank)"
+    assert evaluated.ask(exact).count(0) == 1
+    assert evaluated.search("query")[0].startswith("Query")
+    assert evaluated.search(f"of {60}") == []
+    evaluated.search("Query 3", Keys.ENTER)
+    assert evaluated.panel().startswith("Query 3: ")
+    evaluated.browser.switch_to.active_element.send_keys(Keys.ESCAPE)
+    assert evaluated.ask("return panel() === ''")
+
+
+@settings(max_examples=20)
+@given(
+    st.sampled_from(["EPSG:2154", "EPSG:32631", "EPSG:3879", "EPSG:2039", "EPSG:28992"]),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1.0),
+    st.floats(10.0, 40_000.0),
+)
+def test_the_search_places_x_and_y_to_the_centimetre(
+    crs: str, across: float, along: float, size: float
+) -> None:
+    system = CRS(crs)
+    assert system.area_of_use is not None
+    west, south, east, north = system.area_of_use.bounds
+    middle = Transformer.from_crs("EPSG:4326", system, always_xy=True).transform(
+        (west + east) / 2, (south + north) / 2
+    )
+    corners = np.array(middle) + size * np.array([[-0.5, -0.5], [0.5, 0.5]])
+    table = gpd.GeoDataFrame(
+        {"class_code": np.array([1, 1], np.uint8)}, geometry=shapely.points(corners), crs=system
+    )
+    area = search_area(StreetObjects(table, paper_taxonomy(), ()))
+    place = corners[0] + size * np.array([across, along])
+    u, v = (place - area["middle"]) / area["half"]
+    found = sum(u**i * v**j * np.array(weights) for i, j, *weights in area["terms"])
+    expected = to_latlon(place[None], system, digits=12)[0]
+    metres = (found - expected) * 111_320.0 * [1.0, np.cos(np.radians(expected[0]))]
+    assert np.hypot(*metres) < 0.01

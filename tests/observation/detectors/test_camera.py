@@ -1,0 +1,121 @@
+"""Cameras: a rendered scene, its boxes, and back to bearings and ranges."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import refused
+
+from benchmarks.rendered import Scene
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.geometry import angular_distance
+from semsig_gis.observation.detectors.camera import Camera
+
+if TYPE_CHECKING:
+    from semsig_gis.observation.detectors.camera import Projection
+
+PROJECTIONS: dict[Projection, float] = {
+    "pinhole": 80.0,
+    "equirectangular": 360.0,
+    "cylindrical": 360.0,
+    "fisheye": 180.0,
+}
+TILTS = st.floats(-15, 15)
+
+
+@given(
+    st.sampled_from(sorted(PROJECTIONS)),
+    st.one_of(st.just((0.0, 0.0)), st.tuples(TILTS, TILTS)),
+    st.integers(0, 2**32),
+)
+def test_boxes_of_a_rendered_scene_give_its_bearings_and_ranges(
+    projection: Projection, tilt: tuple[float, float], seed: int
+) -> None:
+    camera = Camera(
+        width=5000,
+        height=2500,
+        fov=PROJECTIONS[projection],
+        projection=projection,
+        pitch=tilt[0],
+        roll=tilt[1],
+    )
+    scene = Scene.random(seed)
+    boxes = scene.boxes(camera)
+    whole = np.flatnonzero(np.isfinite(boxes).all(axis=1))
+    scene = scene.select(whole)
+    found = camera.standing(np.round(boxes[whole]))  # as detectors give them
+    assert (angular_distance(found.bearings, scene.bearings) < 0.1).all()
+    off = np.abs(scene.heights / found.rises / scene.distances - 1)
+    # Both ends are off by half a pixel, and in a tilted picture the sides, too.
+    assert (off <= 1.5 / (found.pixels - 1) + 0.002).all()
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_directions_undo_pixels(projection: Projection) -> None:
+    camera = Camera(width=400, height=300, fov=90, projection=projection, pitch=-20, roll=130)
+    pixels = np.random.default_rng(0).uniform(0, 300, (50, 2))
+    assert np.allclose(camera.pixels(camera.directions(pixels)), pixels)
+
+
+def test_a_box_as_a_detector_draws_it_need_not_be_of_any_upright_thing() -> None:
+    # Too narrow for something tall in a tilted picture, in a corner, or of no height at all.
+    camera = Camera(width=4000, height=3000, fov=70, roll=20)
+    boxes = [[2000, 500, 2010, 2500], [0, 0, 5, 5], [2000, 1500, 2100, 1500], [3990, 0, 4000, 3000]]
+    found = camera.standing(boxes)
+    middles = [[(left + right) / 2, (top + bottom) / 2] for left, top, right, bottom in boxes]
+    rays = camera.directions(middles)
+    assert np.isfinite(found.bearings).all()
+    expected = np.degrees(np.arctan2(rays[:, 0], rays[:, 2]))
+    assert (angular_distance(found.bearings, expected) < 12).all()
+    assert math.isnan(found.rises[2])
+    assert len(camera.standing([]).bearings) == 0
+
+
+WIDE = math.degrees(2 * math.atan(0.75 * math.tan(math.radians(30))))
+# The horizon is below the middle, and crosses the sides nearer to where the camera looks; at 40
+# degrees it is out of the picture, and what is in the middle counts.
+LIFTED = math.degrees(math.atan(math.tan(math.radians(30)) * math.cos(math.radians(20))))
+OVER = 40.405
+
+
+@pytest.mark.parametrize(
+    ("camera", "sectors"),
+    [
+        (Camera(width=400, height=300, fov=60), [(-30, 30)]),
+        (Camera(width=400, height=300, fov=60, roll=90), [(-WIDE / 2, WIDE / 2)]),
+        (Camera(width=400, height=300, fov=60, pitch=20), [(-LIFTED, LIFTED)]),
+        (Camera(width=400, height=300, fov=60, pitch=40), [(-OVER, OVER)]),
+        (Camera(width=400, height=300, fov=60, pitch=90), []),
+        (Camera(width=400, height=400, fov=90, pitch=90, projection="fisheye"), []),
+        (Camera(width=400, height=200, fov=360, projection="equirectangular"), []),
+        (Camera(width=400, height=200, fov=200, projection="cylindrical"), [(-100, 100)]),
+        (Camera(width=400, height=400, fov=180, projection="fisheye"), [(-90, 90)]),
+    ],
+    ids=str,
+)
+def test_what_a_picture_sees(camera: Camera, sectors: list[tuple[float, float]]) -> None:
+    found = np.reshape(camera.sectors(), (-1, 2))
+    assert np.allclose(found, np.reshape(sectors, (-1, 2)), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"fov": 0}, "the field of view of a pinhole camera is 0; give a number from 0.1 to 175"),
+        ({"fov": 180}, "to 175.0 degrees"),
+        ({"fov": 361, "projection": "fisheye"}, "to 360.0 degrees"),
+        ({"projection": "box"}, "the cameras are pinhole"),
+        ({"width": 0}, "the width of a picture is 0"),
+        ({"pitch": 91}, "from -90 to 90 degrees"),
+        ({"roll": math.nan}, "from -180 to 180 degrees"),
+    ],
+)
+def test_numbers_that_no_camera_has_are_refused(wrong: dict[str, object], words: str) -> None:
+    values: dict[str, object] = {"width": 400, "height": 300, "fov": 70, **wrong}
+    with refused(InputError, words):
+        Camera(**values)  # type: ignore[arg-type]

@@ -1,0 +1,110 @@
+"""EXIF: focal length, heading and place of photographs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from PIL import Image
+from PIL.ExifTags import GPS, IFD, Base
+from sentences import refused
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.observation.detectors.exif import read_exif
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+def save(path: Path, **groups: Mapping[Any, Any]) -> Path:
+    """Write a picture with EXIF tags of the groups ``image``, ``exif`` and ``gps``."""
+    exif = Image.Exif()
+    exif.update(groups.get("image", {}))
+    exif.get_ifd(IFD.Exif).update(groups.get("exif", {}))
+    exif.get_ifd(IFD.GPSInfo).update(groups.get("gps", {}))
+    Image.new("L", (400, 300)).save(path, exif=exif)
+    return path
+
+
+def test_a_phone_tells_how_it_was_held(tmp_path: Path) -> None:
+    gps = {
+        GPS.GPSLatitudeRef: "N",
+        GPS.GPSLatitude: (43.0, 44.0, 6.0),
+        GPS.GPSLongitudeRef: "W",
+        GPS.GPSLongitude: (7.0, 30.0, 0.0),
+        GPS.GPSImgDirectionRef: "M",
+        GPS.GPSImgDirection: 123.5,
+    }
+    path = save(tmp_path / "a.jpg", exif={Base.FocalLengthIn35mmFilm: 26}, gps=gps)
+    shot = read_exif(path)
+    assert shot.size == (400, 300)
+    # 26 mm where the diagonal is 43.27 mm, which is 500 pixels.
+    assert shot.focal == pytest.approx(26 / math.hypot(36, 24) * 500 / 400)
+    assert (shot.heading, shot.north, shot.heading_error) == (123.5, "magnetic", 10.0)
+    assert shot.position == pytest.approx((43.735, -7.5))
+
+
+UTC = {GPS.GPSDateStamp: "2026:05:31", GPS.GPSTimeStamp: (10.0, 5.0, 9.0)}
+LOCAL = {Base.DateTimeOriginal: "2026:05:31 12:05:09"}
+
+
+@pytest.mark.parametrize(
+    ("exif", "gps", "time"),
+    [
+        (LOCAL, UTC, "2026-05-31T10:05:09+00:00"),
+        (LOCAL | {Base.OffsetTimeOriginal: "+02:00"}, {}, "2026-05-31T12:05:09+02:00"),
+        (LOCAL, {}, None),  # nobody knows of which zone
+        ({}, UTC | {GPS.GPSDateStamp: "never"}, None),
+    ],
+)
+def test_when_a_picture_was_taken(
+    exif: Mapping[Any, Any], gps: Mapping[Any, Any], time: str | None, tmp_path: Path
+) -> None:
+    assert read_exif(save(tmp_path / "a.jpg", exif=exif, gps=gps)).time == time
+
+
+@pytest.mark.parametrize(
+    ("unit", "resolution", "taken"), [(3, 2000.0, 4000), (2, 5080.0, 4000), (3, 200.0, 400)]
+)
+def test_the_pixels_of_the_sensor_give_the_focal_length(
+    unit: int, resolution: float, taken: int, tmp_path: Path
+) -> None:
+    exif = {
+        Base.FocalLength: 20.0,
+        Base.FocalPlaneXResolution: resolution,
+        Base.FocalPlaneResolutionUnit: unit,
+        Base.ExifImageWidth: taken,
+    }
+    # 20 mm of 200 pixels a millimetre, of 4,000 across, and the same of a smaller copy.
+    assert read_exif(save(tmp_path / "a.jpg", exif=exif)).focal == pytest.approx(1.0)
+
+
+def test_a_picture_that_stands_on_its_side_is_shown_upright(tmp_path: Path) -> None:
+    path = save(tmp_path / "a.jpg", image={Base.Orientation: 6})
+    assert read_exif(path).size == (300, 400)
+
+
+@pytest.mark.parametrize(
+    "groups",
+    [
+        {},
+        {"exif": {Base.FocalLengthIn35mmFilm: 0}},
+        {"exif": {Base.FocalLength: 4.0}},
+        {"gps": {GPS.GPSImgDirection: 400.0, GPS.GPSLatitude: (1.0, 2.0, 3.0)}},
+        {"gps": {GPS.GPSLatitude: 43.0, GPS.GPSLongitude: 7.0}},
+    ],
+)
+def test_what_is_not_told_or_makes_no_sense_is_not_known(
+    groups: dict[str, dict[Any, Any]], tmp_path: Path
+) -> None:
+    shot = read_exif(save(tmp_path / "a.jpg", **groups))
+    assert (shot.focal, shot.heading, shot.position) == (None, None, None)
+
+
+def test_a_file_that_is_no_picture_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.jpg").write_text("no")
+    for name in ("a.jpg", "absent.jpg"):
+        with refused(InputError, name, "give a picture"):
+            read_exif(tmp_path / name)

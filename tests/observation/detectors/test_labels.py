@@ -1,0 +1,111 @@
+"""Label maps: what comes with the package, and files of one's own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from sentences import refused
+
+from semsig_gis.core.errors import CatalogError, InputError, UnknownNameError
+from semsig_gis.observation.detectors.labels import LabelMap, Meaning, label_maps
+from semsig_gis.sources.catalog import built_in_taxonomy, paper_taxonomy
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ALL = LabelMap.open([], built_in_taxonomy())
+
+
+def test_what_comes_with_the_package() -> None:
+    assert label_maps() == ("cityscapes", "coco", "mapillary_vistas")
+
+
+@pytest.mark.parametrize(
+    ("label", "classes"),
+    [
+        ("fire hydrant", ["fire_hydrant"]),
+        ("Fire_Hydrant", ["fire_hydrant"]),
+        ("traffic light", ["traffic_light"]),
+        ("object--street-light", ["street_light"]),
+        ("Street Light", ["street_light"]),
+        ("object--traffic-light--general-upright-front", ["traffic_light"]),
+        ("object--traffic-sign--front", ["indicator"]),
+        ("regulatory--stop--g1", ["indicator"]),
+        ("marking--discrete--crosswalk-zebra", ["pedestrian_crossing"]),
+        ("pole", ["street_light", "indicator", "traffic_light"]),
+        ("person", []),
+        ("marking--general", []),
+        ("object--vehicle--car", []),
+        ("taxi_station", ["taxi_station"]),  # by its own name
+        ("Taxi station", ["taxi_station"]),
+        ("litter bins", ["waste_basket"]),  # by a word for it
+    ],
+)
+def test_labels_stand_for_classes(label: str, classes: list[str]) -> None:
+    meaning = ALL.find(label)
+    assert meaning is not None
+    assert [name for name, _ in meaning.classes] == classes
+
+
+def test_an_unknown_label_stands_for_nothing() -> None:
+    assert ALL.find("lion") is None
+    assert ALL.find("unknown") is None
+    assert LabelMap.open(["cityscapes"], paper_taxonomy()).find("object--bench") is None
+
+
+def test_a_map_of_ones_own_goes_before_the_next(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'left_out = ["bench*"]\n[labels]\nlamp = "street_light"\n'
+        '"mast?" = { class = { street_light = 0.5, indicator = 0.25 }, part = true }\n'
+        'bin = { class = "bollard", height_m = 1.1, height_sigma = 0.1 }\n'
+    )
+    labels = LabelMap.open([mine, "coco"], paper_taxonomy())
+    assert labels.find("Lamp") == Meaning((("street_light", 1.0),))
+    assert labels.find("mast2") == Meaning((("street_light", 0.5), ("indicator", 0.25)), part=True)
+    assert labels.find("bin") == Meaning((("bollard", 1.0),), height=(1.1, 0.1))
+    assert labels.find("benches") == Meaning(())
+    assert labels.find("bench") == Meaning((("bench", 1.0),))  # COCO writes it out
+    assert labels.find("fire hydrant") is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        ("lables = 3", CatalogError, "'lables', which is unknown; the nearest is 'labels'"),
+        ("left_out = 3", CatalogError, "write a list"),
+        ('[labels]\na = "lamp"', CatalogError, "label 'a' has the class 'lamp', which is unknown"),
+        ("[labels]\na = 3", CatalogError, "label 'a' has class = 3; write the name"),
+        ("[labels]\na = { bench = 1 }", CatalogError, "'bench', which is unknown"),
+        ("[labels]\na = { part = true }", CatalogError, "lacks the key 'class'"),
+        ("[labels]\na = { class = {} }", CatalogError, "write the name of a class"),
+        (
+            "[labels]\na = { class = { bench = 0.7, indicator = 0.7 } }",
+            CatalogError,
+            "sum to 1 at most",
+        ),
+        ("[labels]\na = { class = { bench = -1 } }", CatalogError, "sum to 1 at most"),
+        ('[labels]\na = { class = "bench", height_m = 2 }', CatalogError, "height_sigma"),
+        (
+            '[labels]\na = { class = "bench", height_m = "2", height_sigma = 1 }',
+            CatalogError,
+            "write metres",
+        ),
+        ("a", CatalogError, "is not valid TOML"),
+        (None, InputError, "cannot be read"),
+    ],
+)
+def test_a_map_that_is_wrong_is_refused(
+    text: str | None, error: type[Exception], words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    if text is not None:
+        path.write_text(text)
+    with refused(error, "mine.toml", words):
+        LabelMap.open([path], paper_taxonomy())
+
+
+def test_a_name_of_no_map_is_refused() -> None:
+    with refused(UnknownNameError, "'cocoa'", "the nearest is 'coco'"):
+        LabelMap.open(["cocoa"], paper_taxonomy())

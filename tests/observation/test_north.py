@@ -1,0 +1,124 @@
+"""What bearings count from: grid, true and magnetic north."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from noisy_cells import parts_of
+from pyproj import CRS
+from sentences import refused
+from worlds import random_town
+
+from semsig_gis.core.errors import InputError, UnknownNameError
+from semsig_gis.core.geometry import GridSpec, grid_convergence
+from semsig_gis.core.signature import Signature
+from semsig_gis.database.file import PartitionedDatabase, save_database
+from semsig_gis.localization.distance.method import Method
+from semsig_gis.localization.likelihood.index import build_index
+from semsig_gis.localization.likelihood.locate import locate
+from semsig_gis.localization.locator import localize
+from semsig_gis.localization.noise.model import named_noise
+from semsig_gis.observation.north import GRID_NORTH, North, declination
+from semsig_gis.observation.view import Photo, View
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CITY = random_town().database
+DAY = dt.date(2024, 5, 31)
+CELL = int(CITY.lengths.argmax())
+
+
+def moved(crs: str, x: float, y: float, step: float = 10.0) -> Any:  # noqa: ANN401
+    west, south = x - step * int(CITY.columns.min()), y - step * int(CITY.rows.min())
+    return replace(CITY, crs=CRS(crs), grid=GridSpec(step=step, origin=(west, south)))
+
+
+@pytest.mark.parametrize(
+    ("lon", "lat", "day", "expected"),
+    [  # of the World Magnetic Model, which is another one
+        (24.94, 60.17, dt.date(2026, 11, 22), 10.49),
+        (2.35, 48.86, dt.date(2020, 1, 1), 1.04),
+        (-122.4, 37.8, dt.date(2025, 1, 1), 12.99),
+    ],
+)
+def test_the_declination_of_the_reference_field(
+    lon: float, lat: float, day: dt.date, expected: float
+) -> None:
+    found = declination(np.array([lon]), np.array([lat]), day)
+    assert found == pytest.approx(expected, abs=0.05)
+
+
+def test_north_is_that_of_the_middle_of_the_city(tmp_path: Path) -> None:
+    # West of the middle of its zone, grid north lies west of true north.
+    helsinki = moved("EPSG:32635", 386_000.0, 6_672_000.0)
+    convergence = grid_convergence(helsinki.crs, helsinki.xy).mean()
+    true = North.of("true", helsinki)
+    assert true.turn == pytest.approx(-convergence, abs=0.01)
+    assert 1.7 < true.turn < 1.9
+    magnetic = North.of("magnetic", helsinki, date=DAY)
+    assert magnetic.turn - true.turn == pytest.approx(10.10, abs=0.02)
+    assert magnetic.to_dict()["date"] == "2024-05-31"
+    assert North.of("magnetic", helsinki).date is not None
+    assert North.of("grid", helsinki) == GRID_NORTH
+    save_database(helsinki, tmp_path / "part.parquet")
+    parted = PartitionedDatabase((tmp_path / "part.parquet",), len(helsinki))
+    assert North.of("true", parted) == true
+
+
+def test_a_city_where_north_differs_is_told_of() -> None:
+    assert not North.of("true", moved("EPSG:32635", 386_000.0, 6_672_000.0)).notes
+    wide = North.of("true", moved("EPSG:32635", 386_000.0, 6_672_000.0, step=5000.0))
+    (note,) = wide.notes
+    assert f"true north differs by up to {wide.spread:.1f}" in note
+    assert localize(CITY, CITY.signature(CELL), north=wide, method=Method()).notes == (note,)
+
+
+def test_bearings_are_turned_and_told_in_their_north() -> None:
+    north = North(name="magnetic", turn=12.0, date=DAY)
+    codes, bearings = parts_of(CITY.signature(CELL))
+    query = Signature(codes, bearings).turned(-12.0)
+    assert parts_of(query)[1].min() >= 0
+    assert np.allclose(parts_of(north.to_grid(query))[1], bearings)
+    index = build_index(CITY, named_noise("light"))
+    plain = locate(index, Signature(codes, bearings), explained=1)
+    found = locate(index, query, north=north, explained=1)
+    assert np.allclose(found.chances, plain.chances)
+    told, expected = found.to_dict(), plain.to_dict()
+    assert told["north"] == {"name": "magnetic", "turn": 12.0, "spread": 0.0, "date": "2024-05-31"}
+    assert told["query"]["bearings"] == parts_of(query)[1].tolist()
+    rows, others = (one["candidates"][0]["explanation"]["rows"] for one in (told, expected))
+    for name in ("query_bearing", "object_bearing"):
+        here, there = (
+            np.array(sorted(row[name] for row in part if row[name] is not None))
+            for part in (rows, others)
+        )
+        assert np.allclose(np.sort((here + 12.0) % 360.0), there)
+    ranked = localize(CITY, query, north=north, method=Method())
+    assert ranked.candidates["cell"][0] == CELL
+    assert ranked.candidates["distance"][0] == 0.0
+    # A view is turned with all that is known of it.
+    photo = Photo.looking(heading=float(bearings[0]), fov=200)
+    view = View.of(CITY.signature(CELL), ranges=np.full(len(codes), 12.0), photos=(photo,))
+    here, there, other = (
+        answer.candidates["loglik"].to_numpy()
+        for answer in (locate(index, view), locate(index, view.turned(-12.0), north=north), plain)
+    )
+    assert np.allclose(here, there)
+    assert not np.allclose(here, other)
+    # What was turned on purpose is found as a heading in the north of the query.
+    turned = locate(index, query.turned(-30.0), north=north, north_sigma=float("inf"))
+    assert turned.estimate.heading == pytest.approx(30.0, abs=3.0)
+
+
+def test_what_is_no_north_is_refused() -> None:
+    with refused(UnknownNameError, "'tru'", "nearest is 'true'"):
+        North.of("tru", CITY)  # type: ignore[arg-type]
+    with refused(InputError, "true north"):
+        North.of("true", CITY, date=DAY)
+    with refused(InputError, "2030-01-01", "1900-01-01 to 2029-12-31"):
+        North.of("magnetic", CITY, date=dt.date(2030, 1, 1))

@@ -1,0 +1,231 @@
+"""Views that are told in rows and in words."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import refused
+
+from semsig_gis.core.errors import SemsigError
+from semsig_gis.observation.sentences import GUESS_ERROR, parse_view
+from semsig_gis.observation.view import Photo
+from semsig_gis.sources.catalog import load_catalog
+
+if TYPE_CHECKING:
+    from semsig_gis.observation.view import View
+
+TAXONOMY = load_catalog("openstreetmap").taxonomy
+
+
+def read(row: dict[str, Any], radius: float = 30.0) -> View:
+    return parse_view(row, taxonomy=TAXONOMY, radius=radius)
+
+
+def told(row: dict[str, Any]) -> dict[str, Any]:
+    return read(row).to_dict(TAXONOMY)
+
+
+SAME = """
+{"types": "LD", "bearings": [40, 80], "ranges": [null, 12]}
+{"types": "DL", "bearings": "80 40", "ranges": "12 ?"}
+{"types": "DL", "bearings": "80;40", "ranges": "12;"}
+{"see": "bench at 40, lamp at 80 12 m"}
+{"see": "lamp @80° about 12 metres\\na bench at 40 degrees"}
+{"see": "amenity=bench 40 right; street light 80 right 12m away", "heading": 0}
+{"see": "bench ahead, D 40 right 12 m", "heading": 40}
+{"detections": [{"class": "D", "bearing": 80, "range": "12"}, {"class": "Bench", "bearing": 40}]}
+{"detections": [{"class": "D", "offset": 90, "range": 12}, {"class": "L", "offset": 50}],
+ "heading": -10}
+{"photos": [{"see": "bench at 40, lamp at 80 12 m"}]}
+
+{"types": "DG", "bearings": [80, 100], "sectors": [[55, 125]], "heading_error": "unknown"}
+{"types": "DG", "bearings": [80, 100], "fov": 70, "heading": 90, "heading_error": "unknown"}
+{"types": "DG", "bearings": "80 100", "fov": "70", "heading": "90", "heading_error": "unknown"}
+{"types": "DG", "bearings": [80, 100], "sectors": "55-90, 80 - 125", "heading_error": "unknown"}
+{"photos": [{"see": "lamp 10 left, signal 10 right", "heading": 90}], "fov": 70,
+ "heading_error": "unknown"}
+
+{"types": "BD", "bearings": [20, 350], "photo": [1, 0],
+ "photos": [{"sectors": [[325, 15]]}, {"sectors": [[0, 40]], "heading_error": 5}]}
+{"photos": [{"see": "lamp at 350", "heading": -10},
+ {"see": "tree at 20", "heading": 20, "fov": 40, "heading_error": "5"}], "fov": 50}
+
+{"types": "D", "bearings": [80], "scores": [{"D": 0.5, "G": 0.25, "?": 0.25}]}
+{"detections": [{"class": {"lamp": 0.25, "D": 0.25, "traffic light": 0.25}, "bearing": 80}]}
+
+{}
+{"types": ""}
+{"types": null, "bearings": []}
+{"detections": []}
+{"see": " "}
+
+{"types": "DL"}
+{"see": "lamp, bench"}
+{"detections": [{"class": "D"}, {"class": "L"}]}
+"""
+
+
+@pytest.mark.parametrize("rows", SAME.strip().split("\n\n"))
+def test_one_view_in_all_forms(rows: str) -> None:
+    first, *others = [told(json.loads(row)) for row in rows.replace("\n ", " ").split("\n")]
+    assert others
+    for other in others:
+        assert other == first
+
+
+@pytest.mark.parametrize(
+    "bearings", [[360, -10, -360], "360;-10;-360", "360, -10,-360", " 360 -10 -360 "]
+)
+def test_bearings_in_any_shape_and_beyond_the_circle(bearings: object) -> None:
+    assert told({"types": " DBL ", "bearings": bearings})["bearings"] == [0.0, 0.0, 350.0]
+
+
+def test_without_a_heading_the_north_of_offsets_is_not_known() -> None:
+    view = read({"see": "bench 20 left, lamp 10 right", "fov": 70})
+    assert view.bearings is not None
+    assert view.bearings.tolist() == [10.0, 340.0]
+    assert view.photos == (Photo.looking(heading=0, fov=70, north_sigma=math.inf),)
+    assert view.photos[0].sees(view.bearings).all()
+
+
+def test_likeliest_class_stands_for_scores() -> None:
+    rows = [{"lamp": 0.4, "bench": 0.3}, {"lamp": 0.3}, {"lamp": 0.5}, {}]
+    items = [{"class": scores, "bearing": 10} for scores in rows]
+    assert told({"detections": items})["types"] == "D?D?"
+
+
+WORDS = {
+    "near": (0.0, 10.0),
+    "middle": (10.0, 20.0),
+    "far": (20.0, 30.0),
+    "within 12 m": (0.0, 12.0),
+}
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_words_stand_for_what_lies_anywhere_in_a_ring(word: str) -> None:
+    low, high = WORDS[word]
+    rng = np.random.default_rng(0)
+    logs = np.log(np.sqrt(rng.uniform(low**2, high**2, 200_000)))
+    view = read({"see": f"lamp at 10 {word}"})
+    assert view.ranges is not None
+    assert view.range_errors is not None
+    assert view.ranges[0] == pytest.approx(math.exp(logs.mean()), rel=0.01)
+    assert view.range_errors[0] == pytest.approx(math.hypot(logs.std(), GUESS_ERROR), rel=0.01)
+
+
+def test_near_and_far_go_by_the_range_of_the_class() -> None:
+    row = {"types": "DF?", "bearings": [1, 2, 3], "ranges": "far,far,far"}
+    ranges = read(row, radius=60.0).ranges
+    assert ranges is not None
+    # A hydrant is seen from 15 m.
+    assert (ranges / ranges[0]).tolist() == pytest.approx([1.0, 0.25, 1.0])
+    assert 40.0 < ranges[0] < 60.0
+
+
+def test_an_error_that_is_told_goes_before_that_of_a_word() -> None:
+    row = {"types": "DDD", "bearings": [1, 2, 3], "ranges": ["near", "far", 5]}
+    errors = read(row | {"range_errors": [0.1, None, None]}).range_errors
+    assert errors is not None
+    assert errors[0] == 0.1
+    assert errors[1] > GUESS_ERROR
+    assert math.isnan(errors[2])
+    assert told(row | {"range_errors": 0.3})["range_errors"] == [0.3] * 3
+
+
+NUMBERS = st.floats(0.5, 100.0)
+ANGLES = st.integers(-360, 360)
+RANGES = st.none() | NUMBERS | st.sampled_from(["near", "middle", "far", "within 7.5 m", "?"])
+ERRORS = st.none() | st.floats(0.01, 3.0)
+CLASSES = st.sampled_from(["D", "lamp", "Bus stop", "bench", "?", "unknown"]) | st.dictionaries(
+    st.sampled_from(["D", "bench", "traffic_light", "?"]), st.floats(0.0, 0.25), max_size=4
+)
+DETECTIONS = st.lists(
+    st.fixed_dictionaries(
+        {"class": CLASSES, "bearing": ANGLES, "range": RANGES, "range_error": ERRORS}
+    ),
+    max_size=5,
+)
+PAIRS = st.lists(st.integers(0, 359), min_size=2, max_size=2, unique=True)
+LOOKS: st.SearchStrategy[dict[str, Any]] = st.one_of(
+    st.just({}),
+    st.fixed_dictionaries({"fov": st.integers(1, 360), "heading": ANGLES}),
+    st.fixed_dictionaries({"sectors": st.lists(PAIRS, max_size=3)}),
+)
+PHOTOS = st.builds(
+    lambda seen, look, error: {"detections": seen} | look | error,
+    DETECTIONS,
+    LOOKS,
+    st.sampled_from([{}, {"heading_error": 10}, {"heading_error": "unknown"}]),
+)
+
+
+@given(st.lists(PHOTOS, min_size=1, max_size=3))
+def test_what_was_read_can_be_written_and_read(photos: list[dict[str, Any]]) -> None:
+    row = {"photos": photos} if len(photos) > 1 else photos[0]
+    once = told(row)
+    assert told(json.loads(json.dumps(once))) == once
+    assert once["length"] == sum(len(photo["detections"]) for photo in photos)
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"see": "lampe at 40"}, "the nearest is 'lamp'"),
+    ({"see": "lamp at"}, "'lamp at'"),
+    ({"see": "lamp at 40, bench"}, "neither a bearing nor an offset"),
+    ({"see": "lamp at 40 soon"}, "range 'soon' cannot be read"),
+    ({"see": "lamp at 40 within 0 m"}, "'within 0 m'"),
+    ({"see": "lamp at 400"}, "bearing 400"),
+    ({"see": "lamp near"}, "'lamp near'"),
+    ({"see": "lamp 10 left, bench at 20"}, "without the heading"),
+    ({"see": "lamp 10 left", "heading_error": 5}, "without the heading"),
+    ({"see": "lamp", "types": "D"}, "see and types were given"),
+    ({"see": "lamp", "fov": 70, "heading": 0}, "needs the bearings"),
+    ({"detections": [], "ranges": [1]}, "detections and ranges were given"),
+    ({"detections": {"class": "D"}}, "detections were given as {'class': 'D'}"),
+    ({"detections": ["D"]}, "give a list"),
+    ({"detections": [{"bearing": 5}]}, "class of a detection is None"),
+    (
+        {"detections": [{"class": "D", "bearing": 5, "offset": 5}]},
+        "neither a bearing nor an offset, or both",
+    ),
+    ({"detections": [{"class": "D", "bearing": "east"}]}, "bearing was given as 'east'"),
+    ({"detections": [{"class": {"D": 0.7, "L": 0.4}, "bearing": 5}]}, "add up to at most 1"),
+    ({"detections": [{"class": {"D": -0.1}, "bearing": 5}]}, "add up to at most 1"),
+    ({"detections": [{"class": {"D": math.nan}, "bearing": 5}]}, "add up to at most 1"),
+    ({"detections": [{"class": {"D": "high"}, "bearing": 5}]}, "score of 'D'"),
+    ({"types": "D", "bearings": [1], "ranges": [1, 2]}, "2 ranges were given for 1 objects"),
+    ({"types": "D", "bearings": [1], "ranges": [-1]}, "a range is -1"),
+    ({"types": "D", "bearings": [1], "ranges": [5], "range_errors": "much"}, "'much'"),
+    ({"types": "D", "bearings": [1], "ranges": [5], "range_errors": 9}, "range error is 9"),
+    ({"types": "D", "ranges": [5]}, "needs the bearings"),
+    ({"types": "D", "bearings": [1], "scores": [{}, {}]}, "2 scores were given for 1 objects"),
+    ({"types": "D", "bearings": [1], "fov": 70}, "without the heading"),
+    ({"types": "D", "bearings": [1], "fov": 70, "sectors": "1-2", "heading": 0}, "with sectors"),
+    ({"types": "D", "bearings": [1], "fov": 0, "heading": 0}, "field of view of 0"),
+    ({"types": "D", "bearings": [1], "fov": "wide", "heading": 0}, "fov was given as 'wide'"),
+    ({"types": "D", "bearings": [1], "sectors": "20"}, "'20'"),
+    ({"types": "D", "bearings": [1], "sectors": [20, 90]}, "[20, 90]"),
+    ({"types": "D", "bearings": [1], "sectors": [[20, "x"]]}, "'x'"),
+    ({"types": "D", "bearings": [1], "sectors": "20-20"}, "sees nothing"),
+    ({"types": "D", "bearings": [1], "heading_error": "some"}, "'some'"),
+    ({"types": "D", "bearings": [1], "heading_error": 400}, "deviation of north is 400"),
+    ({"types": "D", "bearings": [1], "photos": [{}, {}]}, "give photo"),
+    ({"types": "D", "bearings": [1], "photos": [{}], "photo": [1]}, "from 0 to 0"),
+    ({"types": "D", "bearings": [1], "photo": [0.5]}, "photo was given as [0.5]"),
+    ({"types": "D", "bearings": [1], "photo": "here"}, "'here'"),
+    ({"types": "D", "bearings": [1], "photo": [0, 0]}, "2 photo were given for 1 objects"),
+    ({"photos": []}, "photos"),
+    ({"photos": [{"see": "lamp"}, {"see": "lamp at 5"}]}, "have no bearing"),
+]
+
+
+@pytest.mark.parametrize(("row", "words"), REFUSED, ids=range(len(REFUSED)))
+def test_what_cannot_be_used_is_told(row: dict[str, Any], words: str) -> None:
+    with refused(SemsigError, words):
+        read(row)

@@ -1,0 +1,108 @@
+"""Views: photos, sectors, ranges and scores."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sentences import refused
+
+from semsig_gis.core.errors import InputError
+from semsig_gis.core.signature import Signature
+from semsig_gis.observation.view import FULL_VIEW, Photo, View
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ANGLES = st.floats(-360, 720, allow_nan=False)
+
+
+def _width(low: float, high: float) -> float:
+    return high - low if 0 < high - low <= 360.0 else (high - low) % 360.0
+
+
+SECTORS = st.tuples(ANGLES, ANGLES).filter(lambda one: _width(*one) > 0)
+
+
+@given(st.lists(SECTORS, max_size=5))
+def test_a_photo_sees_what_any_of_its_sectors_sees(sectors: list[tuple[float, float]]) -> None:
+    photo = Photo(sectors=tuple(sectors))
+    bearings = np.arange(0.5, 360.0, 7.3)
+    seen = np.full(len(bearings), not sectors)
+    rounded = np.zeros(len(bearings), bool)
+    for low, high in sectors:
+        beyond = (bearings - low) % 360.0 - _width(low, high)
+        seen |= beyond <= 0
+        rounded |= np.abs(beyond) < 1e-6
+    assert (photo.sees(bearings) == seen)[~rounded].all()
+    assert 0 < photo.width <= 360.0
+
+
+def test_turning_a_view_turns_its_photos() -> None:
+    view = View.of(
+        Signature(np.array([3, 1], np.uint8), np.array([10.0, 350.0])),
+        ranges=np.array([5.0, math.nan]),
+        photos=(Photo.looking(heading=0, fov=40, north_sigma=math.inf),),
+    )
+    turned = view.turned(20.0)
+    assert turned.bearings is not None
+    assert turned.codes is not None
+    assert turned.ranges is not None
+    assert turned.bearings.tolist() == [10.0, 30.0]
+    assert turned.codes.tolist() == [1, 3]
+    assert turned.ranges.tolist()[1] == 5.0
+    assert turned.photos[0].sectors == ((0.0, 40.0),)
+    assert turned.photos[0].sees(turned.bearings).all()
+
+
+def test_joined_views_come_apart_again() -> None:
+    first = View.of(
+        Signature(np.array([3], np.uint8), np.array([10.0])),
+        photos=(Photo.looking(heading=0, fov=40, north_sigma=5.0),),
+    )
+    second = View.of(Signature(None, np.array([200.0, 210.0])), ranges=np.array([3.0, 9.0]))
+    both = View.joined([first, second])
+    assert len(both) == 3
+    parts = both.split()
+    assert [part.photos for part in parts] == [first.photos, (FULL_VIEW,)]
+    assert parts[1].codes is not None
+    assert parts[1].codes.tolist() == [0, 0]
+    assert parts[1].ranges is not None
+    assert parts[1].ranges.tolist() == [3.0, 9.0]
+    assert parts[0].class_scores()[0, 3] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"ranges": [1.0, 2.0]}, "2 ranges were given for 1 objects"),
+        ({"ranges": [-1.0]}, "a range is -1"),
+        ({"range_errors": [9.0]}, "a range error is 9"),
+        ({"scores": np.zeros((1, 256))}, "add up to 1"),
+        ({"photo": [1]}, "a photo that is not there"),
+        ({"photos": ()}, "a view of no photo"),
+    ],
+)
+def test_parts_that_do_not_fit_are_refused(more: dict[str, object], words: str) -> None:
+    lamp = Signature(np.array([3], np.uint8), np.array([80.0]))
+    with refused(InputError, words):
+        View.of(lamp, **more)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Photo(sectors=((10, 10),)), "sees nothing"),
+        (lambda: Photo(sectors=((10, 1000),)), "a sector is 1000"),
+        (lambda: Photo(north_sigma=-1), "deviation of north"),
+        (lambda: Photo.looking(heading=0, fov=0), "field of view"),
+        (lambda: Photo.looking(heading=math.nan, fov=70), "heading is nan"),
+    ],
+)
+def test_photos_out_of_range_are_refused(make: Callable[[], Photo], words: str) -> None:
+    with refused(InputError, words):
+        make()

@@ -1,0 +1,62 @@
+"""Words for classes."""
+
+from __future__ import annotations
+
+import pytest
+from sentences import refused
+
+from semsig_gis.core.errors import UnknownNameError
+from semsig_gis.core.taxonomy import WILDCARD, ObjectClass, Taxonomy
+from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources.keywords import class_code
+
+TAXONOMY = load_catalog("openstreetmap").taxonomy
+WORDS = {
+    "street_light": "D, street_light, Street light, lamp, Street Lamps, lamp-post, lampadaire, "
+    "highway=street_lamp, highway = street_lamp",
+    "bench": "L, Public bench, benches, the bench, banc, amenity=bench",
+    "alignment_tree": "B, tree, trees, Baum, natural=tree",
+    "bus_stop": "M, bus-stop, BusStop, bus stops, highway=bus_stop",
+    "indicator": "sign, traffic signs, traffic_sign=maxspeed",
+    "pedestrian_crossing": "zebra crossing, crossing=zebra",
+    "parking_meter": "vending=parking_tickets",
+    "waste_basket": "bin, litter bins, trash cans",
+}
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_a_class_goes_by_many_words(name: str) -> None:
+    for word in WORDS[name].split(", "):
+        assert class_code(word, TAXONOMY) == TAXONOMY.by_name(name).code, word
+
+
+@pytest.mark.parametrize("word", ["?", "unknown", " Unknown "])
+def test_a_class_may_be_unknown(word: str) -> None:
+    assert class_code(word, TAXONOMY) == WILDCARD
+
+
+def test_every_class_goes_by_its_own_names() -> None:
+    for item in TAXONOMY.classes:
+        for word in (item.symbol, item.name, item.title):
+            assert class_code(word, TAXONOMY) == item.code, word
+
+
+def test_a_taxonomy_of_ones_own_goes_first() -> None:
+    own = Taxonomy((ObjectClass(7, "W", "lamp", "Wall lamp"), ObjectClass(3, "D", "light", "Pole")))
+    assert [class_code(word, own) for word in ("lamp", "wall lamps", "pole")] == [7, 7, 3]
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("lampe", "the nearest is 'lamp'"),
+        ("treehouse", "B alignment tree"),
+        ("fire hydrant", "'fire hydrant' is unknown"),
+        ("highway=crossing", "D street light"),
+        ("", "give a word"),
+        ("b", "symbol 'b' is unknown; the nearest is 'B'"),
+    ],
+)
+def test_other_words_are_refused_with_the_nearest(word: str, told: str) -> None:
+    with refused(UnknownNameError, told):
+        class_code(word, paper_taxonomy())
