@@ -193,8 +193,7 @@ def _query(  # noqa: PLR0917 - a private helper of three callers
 def _turned(signature: Signature, turn: float) -> Signature:
     """Return a signature by another north, in the order of its bearings."""
     if signature.codes is None or signature.bearings is None:
-        msg = "a query without types or bearings cannot be turned."
-        raise ValueError(msg)
+        raise ValueError("a query without types or bearings cannot be turned.")
     seen = wrap_degrees(signature.bearings - turn)
     order = np.argsort(seen, kind="stable")
     return Signature(signature.codes[order], seen[order])

@@ -154,8 +154,7 @@ def _done(command: str, folder: Path) -> Ending:
     """Run a command that must go well."""
     ending = run(command, folder)
     if ending.code or ending.fault:
-        msg = f"semsig {command} ended with {ending.code}:\n{ending.err}"
-        raise RuntimeError(msg)
+        raise RuntimeError(f"semsig {command} ended with {ending.code}:\n{ending.err}")
     return ending
 
 

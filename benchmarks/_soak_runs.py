@@ -242,6 +242,5 @@ def forked(task: Callable[[], Any]) -> Any:  # noqa: ANN401 - any JSON
     with open(reading, encoding="utf-8") as file:  # noqa: PTH123 - a descriptor
         text = file.read()
     if os.waitpid(child, 0)[1]:
-        msg = "a part of the soak failed; see above."
-        raise RuntimeError(msg)
+        raise RuntimeError("a part of the soak failed; see above.")
     return json.loads(text)

@@ -167,8 +167,7 @@ class ExactPosterior:
         """Return the density of each object being each detection, 0 far beyond the noise."""
         table = self._table
         if view.bearings is None:
-            msg = "a query without bearings has no exact likelihood here"
-            raise ValueError(msg)
+            raise ValueError("a query without bearings has no exact likelihood here")
         sigma = table.sigma[kinds][:, None]
         away = signed_degrees(view.bearings - self._views.bearings[:, None])
         near = np.abs(away) < 8.0 * sigma

@@ -92,8 +92,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
             two = _build(folder, "country", scale, client, address)
             equal = _check_sample(folder, "country", scale)
             if one.manifest != two.manifest:
-                msg = "two processes have built something else than one."
-                raise ArithmeticError(msg)
+                raise ArithmeticError("two processes have built something else than one.")
             updates = list(_updates(folder, scale, address))
     what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
     print(
@@ -155,8 +154,9 @@ def _updates(folder: Path, scale: _Size, scheduler: str) -> Iterator[Comparison]
         for file in sorted((folder / "later").rglob("*.*")):
             part = file.relative_to(folder / "later")
             if file.read_bytes() != (folder / "updated" / part).read_bytes():
-                msg = f"{file.name} of the update differs from that of a fresh build."
-                raise ArithmeticError(msg)
+                raise ArithmeticError(
+                    f"{file.name} of the update differs from that of a fresh build."
+                )
         for name in ("later", "updated"):
             shutil.rmtree(folder / name)
         yield Comparison(
@@ -230,6 +230,5 @@ def _check_sample(folder: Path, name: str, scale: _Size) -> int:
         _, column, row = file.stem.split("_")
         part = build_tile(plan, (int(column), int(row)))
         if part is None or (plan.folder / part.file).read_bytes() != file.read_bytes():
-            msg = f"{file.name} differs from what this process builds."
-            raise ArithmeticError(msg)
+            raise ArithmeticError(f"{file.name} differs from what this process builds.")
     return len(chosen)

@@ -221,5 +221,4 @@ def _check_equal(
     for _ in range(2):  # the kernel takes over when a table is asked again
         (ours,) = score_cells(database, [query], Method.parse(f"{part}:edit:raw"))
         if not np.array_equal(ours, theirs):
-            msg = f"the edit distances by {part} differ from those of RapidFuzz."
-            raise ArithmeticError(msg)
+            raise ArithmeticError(f"the edit distances by {part} differ from those of RapidFuzz.")

@@ -125,6 +125,5 @@ def _settle(browser: Chrome, *, seen: bool = False) -> None:
     while not browser.execute_script(_ANSWERED, seen):
         if time.monotonic() > end:
             said = browser.find_element(By.ID, "notice").text
-            msg = f"the workbench did not answer within {_PATIENCE_S:g} s: {said}"
-            raise TimeoutError(msg)
+            raise TimeoutError(f"the workbench did not answer within {_PATIENCE_S:g} s: {said}")
         time.sleep(0.02)

@@ -49,8 +49,9 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(BROWSER_COVERAGE)
     unknown = required() - {*get_args(Part)}
     if unknown:
-        msg = f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {get_args(Part)}."
-        raise pytest.UsageError(msg)
+        raise pytest.UsageError(
+            f"SEMSIG_REQUIRE names {sorted(unknown)}; it may name {get_args(Part)}."
+        )
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -89,8 +90,9 @@ def _no_network() -> Iterator[None]:
         def call(*args: object, **options: object) -> object:
             address = pick(*args)
             if not is_local(address):
-                msg = f"a test tried to reach {address!r}; tests do not use the network"
-                raise RuntimeError(msg)
+                raise RuntimeError(
+                    f"a test tried to reach {address!r}; tests do not use the network"
+                )
             return original(*args, **options)
 
         return call

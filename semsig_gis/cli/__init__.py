@@ -121,17 +121,18 @@ def _require_place() -> None:
     try:
         os.getcwd()  # noqa: PTH109 - only whether there is one
     except OSError as error:
-        msg = "the working folder no longer exists; change to another folder."
-        raise InputError(msg) from error
+        raise InputError(
+            "the working folder no longer exists; change to another folder."
+        ) from error
     for argument in sys.argv[1:]:
         try:
             argument.encode()
         except UnicodeEncodeError as error:
-            msg = f"{argument!r} is not valid UTF-8; rename the file."
-            raise InputError(msg) from error
+            raise InputError(f"{argument!r} is not valid UTF-8; rename the file.") from error
         if "\0" in argument:
-            msg = f"{argument!r} contains a null byte, which a file name cannot have; leave it out."
-            raise InputError(msg)
+            raise InputError(
+                f"{argument!r} contains a null byte, which a file name cannot have; leave it out."
+            )
 
 
 def _pass_over(unraisable: sys.UnraisableHookArgs) -> None:

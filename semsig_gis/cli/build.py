@@ -99,8 +99,7 @@ def build(
     from semsig_gis.storage.geoparquet import NOWHERE
 
     if streets is not None and viewpoints != "streets":
-        msg = "--streets is used only with --viewpoints streets; give both or neither."
-        raise InputError(msg)
+        raise InputError("--streets is used only with --viewpoints streets; give both or neither.")
     keep_inputs(out, read=(objects, buildings, streets, area))
     specs: dict[str, Any] = {
         "grid": GridSpec(step, tuple(numbers(origin, "--origin"))),  # type: ignore[arg-type]
@@ -198,8 +197,9 @@ def update(
     had_columns = open_city(database).has_columns
     tiled = database.is_dir()
     if not tiled and (workers or scheduler):
-        msg = f"{database} is a single file, not tiles; leave out --workers and --scheduler."
-        raise InputError(msg)
+        raise InputError(
+            f"{database} is a single file, not tiles; leave out --workers and --scheduler."
+        )
     with progress("updating") as advance:
         if not tiled:
             report = update_file(database, open_objects(objects), out=out, progress=advance)

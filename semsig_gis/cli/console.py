@@ -245,8 +245,7 @@ class Commands(typer.Typer):
             @functools.wraps(function)
             def run(*, quiet: bool, verbose: bool, **values: Any) -> None:  # noqa: ANN401 - any options
                 if quiet and verbose:
-                    msg = "--quiet and --verbose were given; give one of them."
-                    raise InputError(msg)
+                    raise InputError("--quiet and --verbose were given; give one of them.")
                 before = talk.set("quiet" if quiet else "verbose" if verbose else "plain")
                 try:
                     function(**values)
@@ -328,8 +327,7 @@ Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HO
 def chosen_method(method: str | None, *, paper: bool) -> str:
     """Return the text of the method that the options name."""
     if method is not None and paper:
-        msg = f"--paper was given with --method {method}; give one of them."
-        raise InputError(msg)
+        raise InputError(f"--paper was given with --method {method}; give one of them.")
     return PAPER_METHOD if paper else method or DEFAULT_METHOD
 
 
@@ -350,11 +348,10 @@ def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> Non
         if path is None:
             continue
         if os.path.realpath(path) in taken:
-            msg = (
+            raise InputError(
                 f"{path} would be written, but this command uses it for something else as "
                 "well; give another name."
             )
-            raise InputError(msg)
         taken.add(os.path.realpath(path))
 
 
@@ -362,8 +359,7 @@ def require_suffix(suffix: str, *written: Path | None) -> None:
     """Refuse a name that says that a file is of another kind than it will be."""
     for path in written:
         if path is not None and path.suffix.lower() != suffix and not path.is_dir():
-            msg = f"{path} cannot be written; the name must end in {suffix}."
-            raise InputError(msg)
+            raise InputError(f"{path} cannot be written; the name must end in {suffix}.")
 
 
 def numbers(text: str, option: str) -> list[float]:
@@ -371,8 +367,9 @@ def numbers(text: str, option: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")] if text.strip() else []
     except ValueError as error:
-        msg = f"{option} was given as {text!r}; give numbers with commas between them."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{option} was given as {text!r}; give numbers with commas between them."
+        ) from error
 
 
 def known_identifiability(city: City) -> Identifiability | None:

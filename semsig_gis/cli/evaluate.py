@@ -99,11 +99,10 @@ def evaluate(
             "--drift-report": drift_report,
         }
         for option in (name for name, value in given.items() if value):
-            msg = (
+            raise InputError(
                 f"{option} works only with the likelihood method, not with {ranking!r}; leave it "
                 "out."
             )
-            raise InputError(msg)
     import dataclasses
 
     from semsig_gis.database.city import open_city
@@ -429,6 +428,5 @@ def _require_check(check: int | None, out: Path | None) -> None:
     if out is None:
         return
     if check is None:
-        msg = "--out was given without --check; give both or neither."
-        raise InputError(msg)
+        raise InputError("--out was given without --check; give both or neither.")
     import semsig_gis.reports.plots  # noqa: F401 - before the work, which takes long

@@ -73,8 +73,9 @@ def export(
     keep_inputs(out, read=(database, objects))
     if out.suffix.lower() == ITEM:
         if any(option is not None for option in (evaluation, layer, smooth, h3, geometry)):
-            msg = f"{out} describes the files of a database; give only --objects with it."
-            raise InputError(msg)
+            raise InputError(
+                f"{out} describes the files of a database; give only --objects with it."
+            )
         export_item(database, out, objects=objects)
         say(f"exported: {out}")
         return
@@ -121,8 +122,7 @@ def import_(
     require_suffix(".parquet", out, objects)
     contents = read_geopackage(geopackage)
     if objects is not None and contents.objects is None:
-        msg = f"{geopackage} contains no street objects; leave out --objects."
-        raise InputError(msg)
+        raise InputError(f"{geopackage} contains no street objects; leave out --objects.")
     for note in contents.notes:
         remark(note)
     if objects is not None and contents.objects is not None:

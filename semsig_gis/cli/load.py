@@ -225,8 +225,7 @@ def fetch(
     catalog = load_catalog(name)
     if server is not None:
         if not server.startswith(("http://", "https://")):
-            msg = f"--server is {server!r}; give an address that begins with https://."
-            raise InputError(msg)
+            raise InputError(f"--server is {server!r}; give an address that begins with https://.")
         catalog = replace(catalog, endpoints=(server,))
     specs = choose_layers(
         catalog,
@@ -266,8 +265,7 @@ def fetch(
 
 def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
     if all_layers and paper_classes:
-        msg = "--all-layers and --paper-classes are both given; give one of them."
-        raise InputError(msg)
+        raise InputError("--all-layers and --paper-classes are both given; give one of them.")
     return "all" if all_layers else "paper" if paper_classes else "default"
 
 

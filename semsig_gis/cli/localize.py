@@ -121,20 +121,21 @@ class LocalizeOptions(SearchOptions, RankedOptions):
         given = [f"--{name.strip('_')}" for name in single if getattr(self, name) is not None]
         given = ([] if self.seen is None else [repr(self.seen)]) + given
         if self.queries is not None and given:
-            msg = f"--queries was given with {' and '.join(given)}; give a file or one query."
-            raise InputError(msg)
+            raise InputError(
+                f"--queries was given with {' and '.join(given)}; give a file or one query."
+            )
         if self.out is None and (self.share is not None or self.within):
-            msg = "--share and --within apply to the regions of --out; give --out as well."
-            raise InputError(msg)
+            raise InputError(
+                "--share and --within apply to the regions of --out; give --out as well."
+            )
         read = (self.database, self.objects, self.area, self.popularity, self.rule, self.noise)
         keep_inputs(self.map_, self.out, read=(*read, self.drift_report))
         require_suffix(".html", self.map_)
         if self.writes_chances and (self.share is not None or self.within):
-            msg = (
+            raise InputError(
                 f"{self.out} would contain the chance of every cell, but --share and --within "
                 "apply to regions; leave them out, or write a GeoPackage."
             )
-            raise InputError(msg)
         if self.ranking != LIKELIHOOD:
             self._refuse_likelihood()
 
@@ -152,11 +153,10 @@ class LocalizeOptions(SearchOptions, RankedOptions):
             if getattr(self, name) != getattr(LocalizeOptions, name)  # the default
         ]
         if options:
-            msg = (
+            raise InputError(
                 f"{' and '.join(options)} {'works' if len(options) == 1 else 'work'} only with the "
                 f"likelihood method, not with {self.ranking!r}; leave out one or the other."
             )
-            raise InputError(msg)
 
 
 @command(LocalizeOptions)
@@ -203,11 +203,10 @@ def _beside(
         return locator
     if ranking != LIKELIHOOD:
         what = "objects without a direction beside others" if unplaced else "what is not there"
-        msg = (
+        raise InputError(
             f"the query has {what}, which the method {ranking!r} cannot take; give directions to "
             "all objects or to none, or leave out the method."
         )
-        raise InputError(msg)
     from semsig_gis.localization.suggest import with_unplaced
 
     likelihood: Any = locator
@@ -269,8 +268,7 @@ def _answer_lines(
         print_json({"id": one.name, "line": one.line, **result}, indent=None)
     if not answered:
         what = f"is answered: {first_error}" if failed else "was found; give one on each line."
-        msg = f"no query of {source} {what}"
-        raise InputError(msg)
+        raise InputError(f"no query of {source} {what}")
     if failed:
         of = f"{failed:,} of {answered + failed:,} queries of {source}"
         remark(f"{of} could not be answered; the field 'error' of each says why.")

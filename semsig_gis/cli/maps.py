@@ -69,14 +69,14 @@ def _dates(city: City, newer: City) -> dict[str, Any]:
 
 def _require_content(evaluation: Path | None, smooth: float | None, *, other: bool) -> None:
     if evaluation is None and not other:
-        msg = (
+        raise InputError(
             "there is nothing to show on the map; give --evaluation, --ambiguity, "
             "--identifiability, --drift, --location or --objects, or several of them."
         )
-        raise InputError(msg)
     if smooth is not None and evaluation is None:
-        msg = "--smooth works only with an evaluation; give --evaluation as well, or leave it out."
-        raise InputError(msg)
+        raise InputError(
+            "--smooth works only with an evaluation; give --evaluation as well, or leave it out."
+        )
 
 
 @app.command(name="map")
@@ -152,8 +152,9 @@ def map_(
     opened = city.database
     known = known_identifiability(city) if identifiability or ambiguity else None
     if identifiability and known is None:
-        msg = f"{database} has no columns of semsig identify; run semsig identify first."
-        raise InputError(msg)
+        raise InputError(
+            f"{database} has no columns of semsig identify; run semsig identify first."
+        )
     seen = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_city(drift)
     dates = {} if newer is None else _dates(city, newer)

@@ -155,14 +155,12 @@ def seen_north(city: City, north: NorthText, date: str | None) -> North:
     try:
         day = None if date is None else dt.date.fromisoformat(date)
     except ValueError as error:
-        msg = f"--date was given as {date!r}; give a day as 2024-05-31."
-        raise InputError(msg) from error
+        raise InputError(f"--date was given as {date!r}; give a day as 2024-05-31.") from error
     if day is not None and north != "magnetic":
-        msg = (
+        raise InputError(
             f"--date was given with --north {north}, but only magnetic north changes with "
             "time; leave it out."
         )
-        raise InputError(msg)
     return GRID_NORTH if north == "grid" else North.of(north, city.dataset, date=day)
 
 
@@ -222,18 +220,16 @@ class QueryOptions:
             "sectors": self.sectors,
         }
         if self.seen is None and self.types is None and self.bearings is None:
-            msg = (
+            raise InputError(
                 "nothing was asked; say what was seen, such as 'bench at 40, lamp at 80', or give "
                 f"--types, --bearings or both{others}."
             )
-            raise InputError(msg)
         if sentence := self._parts[0]:
             if self.types is not None:
-                msg = (
+                raise InputError(
                     f"{self.seen!r} was given with --types; describe what was seen in one "
                     "of these ways."
                 )
-                raise InputError(msg)
             told |= said_row(sentence, taxonomy)
         return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
 
@@ -332,20 +328,18 @@ class SearchOptions:
         from semsig_gis.observation.north import GRID_NORTH
 
         if self.on_grid and self.refine:
-            msg = (
+            raise InputError(
                 "--on-grid and --refine were given, which exclude each other; leave out one "
                 "of them."
             )
-            raise InputError(msg)
         refined = False if self.on_grid else self.refine
         needs_objects = refined is not False or explain
         if self.objects is not None and not needs_objects:
             option = "--on-grid" if self.on_grid else "--no-refine"
-            msg = (
+            raise InputError(
                 f"--objects and {option} were given, but street objects are not used then; "
                 "leave out one."
             )
-            raise InputError(msg)
         sigma = _north_sigma(self.heading)
         rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
         noise = read_noise(
@@ -428,10 +422,9 @@ def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
     if drift_report is None:
         return None
     if map_age == 0:
-        msg = (
+        raise InputError(
             "--drift-report was given without --map-age; give the age of the map in years as well."
         )
-        raise InputError(msg)
     from semsig_gis.localization.noise.age import open_drift
 
     return open_drift(drift_report)
@@ -446,11 +439,10 @@ def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectSto
 
         store = ObjectStore.of(open_objects(objects))
         if store.objects.crs != city.database.crs:
-            msg = (
+            raise CrsError(
                 f"{objects} is in {store.objects.crs.to_string()} and the database in "
                 f"{city.database.crs.to_string()}; give the objects that it was built from."
             )
-            raise CrsError(msg)
         return store
     try:
         return city.store if objects is None else open_store(city.path, objects)
@@ -470,6 +462,7 @@ def _north_sigma(heading: str) -> float:
     except ValueError:
         sigma = -1.0
     if sigma and not 0.001 <= sigma <= 360:  # noqa: PLR2004 - as `check_north` has it
-        msg = f"--heading was given as {heading!r}; give known, unknown, or 0.001 to 360 degrees."
-        raise InputError(msg)
+        raise InputError(
+            f"--heading was given as {heading!r}; give known, unknown, or 0.001 to 360 degrees."
+        )
     return sigma

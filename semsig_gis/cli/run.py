@@ -34,8 +34,7 @@ def run() -> int:
         context = getattr(error, "ctx", None)
         command = "semsig" if context is None else context.command_path
         fault = error.format_message().rstrip(".?").replace(". ", "; ")
-        msg = _out_of_range(error) or f"{fault}; see {command} --help."
-        raise InputError(msg) from error
+        raise InputError(_out_of_range(error) or f"{fault}; see {command} --help.") from error
     except SystemExit as end:
         if end.code:  # so typer ends where nobody reads the output any more
             raise BrokenPipeError from end

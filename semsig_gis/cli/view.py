@@ -127,11 +127,10 @@ def view(
     keep_inputs(out, read=(*files, *(labels or ()), database, photos))
     require_suffix(".jsonl", out)
     if images is not None and not images.is_dir():
-        msg = (
+        raise InputError(
             f"--images was given as {images}, which is not a folder; give the folder of the "
             "pictures."
         )
-        raise InputError(msg)
     taxonomy = _taxonomy(database)
     known = Shot(
         camera=camera,
@@ -187,8 +186,9 @@ def _size(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     if not (match := re.fullmatch(r"(\d{1,7})[xX](\d{1,7})", text)):
-        msg = f"--size was given as {text!r}; give width and height in pixels, as 1920x1080."
-        raise InputError(msg)
+        raise InputError(
+            f"--size was given as {text!r}; give width and height in pixels, as 1920x1080."
+        )
     return int(match[1]), int(match[2])
 
 

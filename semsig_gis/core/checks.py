@@ -22,5 +22,6 @@ def require_number(what: str, value: float, *, least: float, most: float, unit: 
     semsig_gis.core.errors.InputError: a radius is 1e+308; give a number from 0 to 1,000,000 metres.
     """
     if not least <= value <= most:
-        msg = f"{what} is {value}; give a number from {least:,} to {most:,} {unit}".rstrip() + "."
-        raise InputError(msg)
+        raise InputError(
+            f"{what} is {value}; give a number from {least:,} to {most:,} {unit}".rstrip() + "."
+        )

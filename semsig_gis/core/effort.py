@@ -38,11 +38,10 @@ def require_memory(needed: float, what: str, *, advice: str) -> None:
     """Raise InputError where work would take more bytes of memory than are free."""
     free = free_memory()
     if needed > free:
-        msg = (
+        raise InputError(
             f"{what} would take about {needed / GB:,.1f} GB of memory, and {free / GB:,.1f} GB are "
             f"free; {advice}."
         )
-        raise InputError(msg)
 
 
 def announce(seconds: float, what: str) -> None:

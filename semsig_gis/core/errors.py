@@ -71,8 +71,7 @@ def extra(name: str, what: str) -> Iterator[None]:
         package = str(error.name).partition(".")[0]
         if package == __name__.partition(".")[0]:
             raise
-        msg = (
+        raise InputError(
             f"{what} needs {package}, which is not installed; install it with pip install "
             f"'semsig_gis[{name}]'."
-        )
-        raise InputError(msg) from error
+        ) from error

@@ -69,17 +69,14 @@ def require_metric_crs(crs: CRS | str | int | None) -> CRS:
         "give a projected CRS in metres, such as 'EPSG:2154' for France or the UTM zone of the city"
     )
     if crs is None:
-        msg = f"no coordinate reference system was given; {advice}."
-        raise CrsError(msg)
+        raise CrsError(f"no coordinate reference system was given; {advice}.")
     try:
         system = CRS.from_user_input(crs).to_2d()
     except CRSError as error:
-        msg = f"coordinate reference system {crs!r} is unknown; {advice}."
-        raise CrsError(msg) from error
+        raise CrsError(f"coordinate reference system {crs!r} is unknown; {advice}.") from error
     fault = _fault(system)
     if fault:
-        msg = f"{system.name} {fault}; {advice}."
-        raise CrsError(msg)
+        raise CrsError(f"{system.name} {fault}; {advice}.")
     return system
 
 
@@ -287,8 +284,9 @@ class GridSpec:
     def __post_init__(self) -> None:  # noqa: D105
         require_number("grid step", self.step, least=LEAST_STEP, most=MOST_STEP, unit="metres")
         if np.shape(self.origin) != (2,) or not np.isfinite(self.origin).all():
-            msg = f"grid origin is {self.origin}; give two finite coordinates in metres."
-            raise InputError(msg)
+            raise InputError(
+                f"grid origin is {self.origin}; give two finite coordinates in metres."
+            )
 
     def viewpoints(self, columns: ArrayLike, rows: ArrayLike) -> NDArray[np.float64]:
         """Return the centres of n cells in metres, shape (n, 2)."""
@@ -308,11 +306,10 @@ class GridSpec:
         """
         cells = np.floor((np.asarray(xy, dtype=np.float64) - self.origin) / self.step)
         if not (np.abs(cells) <= MAX_CELL).all():
-            msg = (
+            raise InputError(
                 f"a point lies more than {MAX_CELL:,} cells from the grid origin; make the step "
                 f"({self.step:g} m) larger, or put the origin {self.origin} nearer."
             )
-            raise InputError(msg)
         return cells[:, 0].astype(np.int64), cells[:, 1].astype(np.int64)
 
 
@@ -364,11 +361,10 @@ def cells_near(
 def require_step(grid: GridSpec, radius: float) -> None:
     """Raise InputError if the step is so small that a range would hold too many cells."""
     if radius > (MAX_REACH - 1) * grid.step:
-        msg = (
+        raise InputError(
             f"a step of {grid.step:g} m is too small for a range of {radius:g} m; make the step "
             f"larger, at least {radius / (MAX_REACH - 1):.3g} m."
         )
-        raise InputError(msg)
 
 
 def _widened(ids: NDArray[np.int64], reach: int) -> NDArray[np.int64]:

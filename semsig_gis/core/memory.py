@@ -36,7 +36,6 @@ def require_address_space(size: int, what: str) -> None:
     """Raise MemoryError where a limit leaves fewer bytes to this process."""
     left = address_space_left()
     if left is not None and left < size:
-        msg = (
+        raise MemoryError(
             f"{what} takes {size / 1e6:,.0f} MB, and the limit leaves {max(left, 0) / 1e6:,.0f} MB"
         )
-        raise MemoryError(msg)

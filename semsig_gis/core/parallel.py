@@ -48,11 +48,10 @@ class Outcome(Generic[_Task, _Value]):
 def check_workers(workers: int, scheduler: str | None) -> None:
     """Refuse a number of workers out of range, an empty scheduler address, or both at once."""
     if workers < 0 or (workers and scheduler is not None) or scheduler == "":
-        msg = (
+        raise InputError(
             f"{workers} workers and the scheduler {scheduler!r} were given; give a number of "
             "workers from 0 up, or the address of a scheduler."
         )
-        raise InputError(msg)
     require_number("number of workers", workers, least=0, most=MOST_WORKERS)
 
 
@@ -142,11 +141,10 @@ def _answering(scheduler: str | None) -> Iterator[None]:
         yield
     except (TimeoutError, OSError) as error:
         whose = "the processes" if scheduler is None else f"the scheduler {scheduler}"
-        msg = (
+        raise InputError(
             f"{whose} did not answer in time ({type(error).__name__}); run the same command again, "
             "with fewer workers or when the machine is less busy."
-        )
-        raise InputError(msg) from error
+        ) from error
 
 
 @contextlib.contextmanager
@@ -174,13 +172,12 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             if client is None:
                 gc.collect()
         if client is None:
-            msg = (
+            raise InputError(
                 f"{workers} processes could not be started; ask for fewer, or try again."
                 if scheduler is None
                 else f"the scheduler {scheduler} cannot be reached; give the address that `dask "
                 "scheduler` printed, such as tcp://10.0.0.5:8786."
             )
-            raise InputError(msg)
         try:
             yield stack.enter_context(client)
         finally:
@@ -245,22 +242,22 @@ def _require_same_view(client: Client, files: Sequence[Path]) -> None:
     ours = _view(files)
     views = client.run(_view, files, on_error="return")
     if not views:
-        msg = "the scheduler has no workers; start some with `dask worker ADDRESS`."
-        raise InputError(msg)
+        raise InputError("the scheduler has no workers; start some with `dask worker ADDRESS`.")
     for worker, view in views.items():
         if isinstance(view, BaseException):
-            msg = f"the worker {worker} cannot run semsig_gis ({view}); install it there."
-            raise InputError(msg) from view
+            raise InputError(
+                f"the worker {worker} cannot run semsig_gis ({view}); install it there."
+            ) from view
         if view[0] != ours[0]:
-            msg = f"the worker {worker} has semsig_gis {view[0]}; install {ours[0]} there."
-            raise InputError(msg)
+            raise InputError(
+                f"the worker {worker} has semsig_gis {view[0]}; install {ours[0]} there."
+            )
         for path, here, there in zip(files, ours[1:], view[1:], strict=True):
             if here != there:
-                msg = (
+                raise InputError(
                     f"the worker {worker} does not see {path} as it is here; give paths on a file "
                     "system that all machines share."
                 )
-                raise InputError(msg)
 
 
 def _view(paths: Sequence[Path]) -> tuple[str | int | None, ...]:

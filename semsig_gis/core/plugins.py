@@ -54,11 +54,10 @@ def _installed(
     for entry in _announced(group, tuple(sys.path)):
         if entry.name in taken or entry.name in entries:
             other = _package(entries[entry.name]) if entry.name in entries else "semsig_gis itself"
-            msg = (
+            raise fault(
                 f"{entry.name!r} of {group} is provided by {other} and by {_package(entry)}; "
                 "uninstall one of the two packages or rename its entry."
             )
-            raise fault(msg)
         entries[entry.name] = entry
     found = {}
     for name, entry in entries.items():
@@ -89,19 +88,16 @@ def _toml_path(value: object) -> Path:
     """Return the path that an entry gives, or raise what is wrong with it."""
     given = value() if callable(value) else value
     if not isinstance(given, str | os.PathLike):
-        msg = f"it gives {given!r}, not the path of a .toml file"
-        raise TypeError(msg)
+        raise TypeError(f"it gives {given!r}, not the path of a .toml file")
     path = Path(given)
     if path.suffix != ".toml" or not path.is_file():
         what = "does not exist" if path.suffix == ".toml" else "is not a .toml file"
-        msg = f"{path} {what}"
-        raise FileNotFoundError(msg)
+        raise FileNotFoundError(f"{path} {what}")
     return path
 
 
 def _function(value: object) -> object:
     """Return the function that an entry gives, or raise what is wrong with it."""
     if not callable(value):
-        msg = f"it gives {value!r}, not a function"
-        raise TypeError(msg)
+        raise TypeError(f"it gives {value!r}, not a function")
     return value

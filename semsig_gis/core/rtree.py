@@ -93,8 +93,7 @@ def checked_points(xy: ArrayLike) -> NDArray[np.float64]:
     """Return a C-ordered copy of points, shape (n, 2); refuse none, or one that is not finite."""
     points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
     if len(points) == 0 or not np.isfinite(points).all():
-        msg = "an R-tree needs at least one point, and finite coordinates."
-        raise InputError(msg)
+        raise InputError("an R-tree needs at least one point, and finite coordinates.")
     return points
 
 

@@ -55,14 +55,14 @@ class SignatureSpec:
 
     def __post_init__(self) -> None:  # noqa: D105
         if not (math.isfinite(self.radius) and 0 < self.radius <= MAX_RANGE_M):
-            msg = (
+            raise InputError(
                 f"visibility range is {self.radius} m; "
                 f"give a number of metres above 0 and up to {MAX_RANGE_M:.0f}."
             )
-            raise InputError(msg)
         if self.levels not in range(1, MAX_LEVELS + 1):
-            msg = f"{self.levels} angle levels were asked for; give a whole number from 1 to 255."
-            raise InputError(msg)
+            raise InputError(
+                f"{self.levels} angle levels were asked for; give a whole number from 1 to 255."
+            )
 
 
 def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
@@ -85,12 +85,14 @@ def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray
     try:
         angles = np.asarray(bearings, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        msg = f"bearings {bearings!r} are not all numbers; give degrees clockwise from north."
-        raise InputError(msg) from error
+        raise InputError(
+            f"bearings {bearings!r} are not all numbers; give degrees clockwise from north."
+        ) from error
     wrong = angles[~(np.abs(angles) <= FULL_TURN)]  # NaN too
     if len(wrong):
-        msg = f"bearing {wrong[0]:g} is not usable; give degrees clockwise from north, 0 to 360."
-        raise InputError(msg)
+        raise InputError(
+            f"bearing {wrong[0]:g} is not usable; give degrees clockwise from north, 0 to 360."
+        )
     return wrap_degrees(angles)
 
 
@@ -126,8 +128,9 @@ class Signature(Displayed):
 
     def __post_init__(self) -> None:  # noqa: D105
         if self.codes is None and self.bearings is None:
-            msg = "a signature needs types, bearings or both; give at least one of them."
-            raise InputError(msg)
+            raise InputError(
+                "a signature needs types, bearings or both; give at least one of them."
+            )
         if self.codes is not None:
             object.__setattr__(self, "codes", np.asarray(self.codes, dtype=np.uint8))
         if self.bearings is not None:
@@ -135,21 +138,20 @@ class Signature(Displayed):
             # Others would get a wrong angle level without an error.
             wrong = bearings[~((bearings >= 0.0) & (bearings < FULL_TURN))]
             if len(wrong):
-                msg = f"bearing {wrong[0]:g} is not in [0, 360); wrap bearings onto one turn first."
-                raise InputError(msg)
+                raise InputError(
+                    f"bearing {wrong[0]:g} is not in [0, 360); wrap bearings onto one turn first."
+                )
             object.__setattr__(self, "bearings", bearings)
         parts = [part for part in (self.codes, self.bearings) if part is not None]
         if any(part.ndim != 1 for part in parts):
-            msg = (
+            raise InputError(
                 "a signature is one row of types and one of bearings; give lists of one dimension."
             )
-            raise InputError(msg)
         if len(set(map(len, parts))) > 1:
-            msg = (
+            raise InputError(
                 f"{len(parts[0])} types and {len(parts[1])} bearings were given; "
                 "give one bearing for each type, or leave one of the two out."
             )
-            raise InputError(msg)
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -197,8 +199,7 @@ class Signature(Displayed):
     def levels(self, levels: int) -> NDArray[np.uint8]:
         """Return the angle level of each bearing, shape (n,); InputError where they are unknown."""
         if self.bearings is None:
-            msg = "the query has no bearings; give them, or use a method on types."
-            raise InputError(msg)
+            raise InputError("the query has no bearings; give them, or use a method on types.")
         return quantize(self.bearings, levels)
 
     @classmethod

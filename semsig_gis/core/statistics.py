@@ -99,8 +99,9 @@ def binomial_tail(hits: int, trials: int, chance: float) -> float:
 def _deviations(percent: float) -> float:
     """Return how many standard deviations an interval reaches each way."""
     if not 0.0 < percent < 100.0:  # noqa: PLR2004
-        msg = f"an interval of {percent} % was asked for; give a number between 0 and 100."
-        raise InputError(msg)
+        raise InputError(
+            f"an interval of {percent} % was asked for; give a number between 0 and 100."
+        )
     return NormalDist().inv_cdf(0.5 + percent / 200.0)
 
 
@@ -144,11 +145,13 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
     given = np.asarray(features, dtype=np.float64)
     targets = np.asarray(shares, dtype=np.float64)
     if given.ndim != 2 or len(given) != len(targets) or not len(targets):  # noqa: PLR2004
-        msg = f"{given.shape} features and {targets.shape} shares were given; give a row for each."
-        raise InputError(msg)
+        raise InputError(
+            f"{given.shape} features and {targets.shape} shares were given; give a row for each."
+        )
     if not (np.isfinite(given).all() and ((targets >= 0) & (targets <= 1)).all()):
-        msg = "a feature is not finite or a share is not from 0 to 1; leave such examples out."
-        raise InputError(msg)
+        raise InputError(
+            "a feature is not finite or a share is not from 0 to 1; leave such examples out."
+        )
     kinds = given.shape[1]
     powers = np.array(
         [one for one in itertools.product(range(DEGREE + 1), repeat=kinds) if sum(one) <= DEGREE]

@@ -68,26 +68,24 @@ class ObjectClass:
     def __post_init__(self) -> None:  # noqa: D105
         # The type exactly: True is an int to Python, never a code.
         if type(self.code) is not int or not 1 <= self.code <= MAX_CODE:
-            msg = f"class {self.name!r} has code {self.code!r}; codes are whole numbers 1 to 255."
-            raise CatalogError(msg)
+            raise CatalogError(
+                f"class {self.name!r} has code {self.code!r}; codes are whole numbers 1 to 255."
+            )
         if type(self.symbol) is not str or not re.fullmatch(r"[A-Za-z0-9]", self.symbol):
-            msg = (
+            raise CatalogError(
                 f"class {self.name!r} has symbol {self.symbol!r}; "
                 "a symbol is one ASCII letter or digit."
             )
-            raise CatalogError(msg)
         if type(self.name) is not str or not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
-            msg = (
+            raise CatalogError(
                 f"class name {self.name!r} is not usable; "
                 "write lower-case letters, digits and underscores."
             )
-            raise CatalogError(msg)
         if self.range_m is not None and not 0 < self.range_m <= MAX_RANGE_M:  # false for NaN too
-            msg = (
+            raise CatalogError(
                 f"class {self.name!r} is seen from {self.range_m!r} m; give a number of metres "
                 f"above 0 and up to {MAX_RANGE_M:.0f}."
             )
-            raise CatalogError(msg)
         check_height(self.height_m, self.height_sigma, f"class {self.name!r}")
 
 
@@ -99,11 +97,10 @@ def check_height(height: float | None, sigma: float | None, what: str) -> None:
     if height is None and sigma is None:
         return
     if height is None or sigma is None or not 0 < sigma <= height <= MAX_HEIGHT_M:
-        msg = (
+        raise CatalogError(
             f"{what} has a height of {height} m and a height_sigma of {sigma} m; give height_m "
             f"above 0 and up to {MAX_HEIGHT_M:.0f}, and height_sigma above 0 and at most height_m."
         )
-        raise CatalogError(msg)
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,11 +134,10 @@ class Taxonomy(Displayed):
             for item in self.classes:
                 value = getattr(item, attribute)
                 if value in seen:
-                    msg = (
+                    raise CatalogError(
                         f"{attribute} {value!r} is given to both {seen[value]!r} and "
                         f"{item.name!r}; give each class a {attribute} of its own."
                     )
-                    raise CatalogError(msg)
                 seen[value] = item.name
 
     def _facts(self) -> dict[str, object]:
@@ -183,18 +179,18 @@ class Taxonomy(Displayed):
         if item := next((one for one in self.classes if one.name == name), None):
             return item
         known = [item.name for item in self.classes]
-        msg = (
+        raise UnknownNameError(
             f"class {name!r} is unknown{nearest_name(name, known)}; "
             f"the classes are {', '.join(known)}."
         )
-        raise UnknownNameError(msg)
 
     def by_code(self, code: int) -> ObjectClass:
         """Return the class of a code; UnknownNameError where there is none."""
         if item := next((one for one in self.classes if one.code == code), None):
             return item
-        msg = f"class code {code} is unknown; the codes are {[c.code for c in self.classes]}."
-        raise UnknownNameError(msg)
+        raise UnknownNameError(
+            f"class code {code} is unknown; the codes are {[c.code for c in self.classes]}."
+        )
 
     def by_symbol(self, symbol: str) -> ObjectClass:
         """Return the class of a symbol; UnknownNameError where there is none."""

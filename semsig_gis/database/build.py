@@ -117,12 +117,11 @@ def build_database(
         progress=progress,
     )
     if len(database) == 0:
-        msg = (
+        raise EmptyResultError(
             f"no cell sees any of the {len(objects):,} objects; make the step ({grid.step:g} m) "
             f"smaller or the visibility range ({spec.radius:g} m) larger, or check the area, "
             "the streets and the buildings."
         )
-        raise EmptyResultError(msg)
     return database
 
 
@@ -240,8 +239,9 @@ def require_room(pairs: float, *, cells: int, objects: int, processes: int = 1) 
     what = f"{objects:,} objects seen from {cells:,} cells (about {pairs:,.0f} sightings)"
     advice = "make the step larger, the visibility range smaller, or build in smaller tiles"
     if pairs > MOST_PAIRS:
-        msg = f"{what} are more than the {MOST_PAIRS:,} that one file can contain; {advice}."
-        raise InputError(msg)
+        raise InputError(
+            f"{what} are more than the {MOST_PAIRS:,} that one file can contain; {advice}."
+        )
     needed = BLOCK_BYTES + CELL_BYTES * cells + PAIR_BYTES * pairs
     if processes > 1:
         what += f" by each of {processes} processes"
@@ -262,8 +262,7 @@ def elements_of(
 def moved(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:
     """Return buildings or streets in a CRS; raise CrsError if theirs is not known."""
     if table.crs is None:
-        msg = "buildings or streets have no coordinate reference system; state their crs."
-        raise CrsError(msg)
+        raise CrsError("buildings or streets have no coordinate reference system; state their crs.")
     return table.to_crs(crs)
 
 

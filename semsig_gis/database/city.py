@@ -138,11 +138,10 @@ class City(Displayed):
         before = self._read_state or file_state(self.path)
         value = part(self.path)
         if file_state(self.path) != before:
-            msg = (
+            raise DatabaseError(
                 f"another program has changed {self.path} in the meantime; run the same command "
                 "again."
             )
-            raise DatabaseError(msg)
         self._read_state = before
         return value
 
@@ -174,8 +173,9 @@ class City(Displayed):
         if not any(entries):
             return None
         if any(entry != entries[0] for entry in entries):
-            msg = f"the parts of {self.path} do not agree on their {name}; compute it again."
-            raise DatabaseError(msg)
+            raise DatabaseError(
+                f"the parts of {self.path} do not agree on their {name}; compute it again."
+            )
         names = ["cell_id", *entries[0]["columns"]]
         tables = [read_geoparquet(file, kind=KIND, columns=names)[0] for file in files]
         return pa.concat_tables(tables).sort_by("cell_id"), dict(entries[0]["facts"])
@@ -248,8 +248,9 @@ def _extend(
     cells = table["cell_id"].to_numpy()
     rows = np.minimum(np.searchsorted(cell_ids, cells), len(cell_ids) - 1)
     if not np.array_equal(cell_ids[rows], cells):
-        msg = f"the cells of {path} have changed since it was opened; open the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"the cells of {path} have changed since it was opened; open the database again."
+        )
     before = specs.get(ADDED, {})
     replaced = [name for one in before.keys() & added for name in before[one]["columns"]]
     # The geometry stays the last column.

@@ -82,8 +82,9 @@ def remove_companions(
             try:
                 _remove(one)
             except OSError as error:
-                msg = f"{one.path} cannot be removed ({reason(error)}); ask its owner for access."
-                raise InputError(msg) from error
+                raise InputError(
+                    f"{one.path} cannot be removed ({reason(error)}); ask its owner for access."
+                ) from error
     return removed
 
 

@@ -274,16 +274,16 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
     appear once.
     """
     if not parts:
-        msg = "there is no database to join; give at least one."
-        raise DatabaseError(msg)
+        raise DatabaseError("there is no database to join; give at least one.")
     first = parts[0]
     for part in parts[1:]:
         require_same(first, part)
     ids = np.concatenate([part.cell_ids for part in parts])
     order = np.argsort(ids, kind="stable")
     if (np.diff(ids[order]) == 0).any():
-        msg = "two of the databases contain the same cell; join databases of different cells."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            "two of the databases contain the same cell; join databases of different cells."
+        )
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in ("lengths", *CELL_ARRAYS, *ENTRY_ARRAYS)
@@ -308,11 +308,10 @@ def require_same(
     for name, title in MADE.items():
         ours, theirs = getattr(first, name), getattr(other, name)
         if ours != theirs and (classes or name != "taxonomy"):
-            msg = (
+            raise DatabaseError(
                 f"the databases differ in their {title} ({_brief(ours)} and {_brief(theirs)}); "
                 "build both in the same way."
             )
-            raise DatabaseError(msg)
 
 
 def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], what: str) -> None:
@@ -324,8 +323,9 @@ def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], wha
     low = database.xy.min(axis=0) - database.reach
     high = database.xy.max(axis=0) + database.reach
     if len(xy) and not ((low <= xy) & (xy <= high)).all(axis=1).any():
-        msg = f"none of the {len(xy):,} {what} is where the cells are; give those of the same city."
-        raise InputError(msg)
+        raise InputError(
+            f"none of the {len(xy):,} {what} is where the cells are; give those of the same city."
+        )
 
 
 def rows_of_result(
@@ -343,11 +343,10 @@ def rows_of_result(
         and all(map(operator.eq, types, map(database.types, rows.tolist())))
     )
     if not same:
-        msg = (
+        raise InputError(
             f"This {what} was not made with this database; give the database that it was made "
             f"with, or make the {what} again."
         )
-        raise InputError(msg)
     return rows
 
 
@@ -383,12 +382,11 @@ class SequenceTable:
         whole = ends.ndim == 1 and len(ends) > 0 and ends[0] == 0 and ends[-1] == len(flat)
         # Arrow trusts the offsets: decreasing ones would read outside the values.
         if not whole or bool((np.diff(ends) < 0).any()):
-            msg = (
+            raise InputError(
                 f"the offsets of the sequences do not divide their {len(flat)} values; give one "
                 "offset more than there are sequences, from 0 up to the number of values, none "
                 "smaller than the one before."
             )
-            raise InputError(msg)
         rows = pa.LargeBinaryArray.from_buffers(
             pa.large_binary(), len(ends) - 1, [None, pa.py_buffer(ends), pa.py_buffer(flat)]
         )
@@ -492,11 +490,10 @@ def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return a sequence as it is, or raise InputError if it is not a flat uint8 array."""
     array = np.asarray(values)
     if array.dtype != np.uint8 or array.ndim != 1:
-        msg = (
+        raise InputError(
             f"a sequence contains {array.dtype} values in {array.ndim} dimensions; give its "
             "class codes or angle levels (0 to 255) as a one-dimensional uint8 array."
         )
-        raise InputError(msg)
     return array
 
 

@@ -151,11 +151,10 @@ def database_of(
     Raise DatabaseError, which names `path`, if they are damaged or from another version.
     """
     if specs.get("format") != FORMAT:
-        msg = (
+        raise DatabaseError(
             f"{path} was written by another version of semsig ({specs.get('version')}); "
             "build the database again."
         )
-        raise DatabaseError(msg)
     try:
         taxonomy = Taxonomy.from_list(specs["taxonomy"])
         codes_of = np.zeros(256, np.uint8)
@@ -184,8 +183,7 @@ def database_of(
             notes=tuple(map(str, specs.get(NOTES, ()))),
         )
     except (KeyError, TypeError, ValueError, SemsigError) as error:
-        msg = f"{path} is damaged ({error}); build the database again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(f"{path} is damaged ({error}); build the database again.") from error
     # What every signature keeps to; a sum of bytes would not find columns that were swapped.
     follows = np.ones(len(symbols), bool)
     follows[offsets[:-1]] = False
@@ -199,8 +197,9 @@ def database_of(
         and not (follows[1:] & (bearing_units[1:] < bearing_units[:-1])).any()
     )
     if not consistent:
-        msg = f"{path} is damaged (its columns do not match each other); build the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{path} is damaged (its columns do not match each other); build the database again."
+        )
     return database
 
 
@@ -221,10 +220,9 @@ def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], 
 def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
     """Return a column of some type as one array without missing values."""
     if column.null_count or column.type != kind or not len(column):
-        msg = (
+        raise ValueError(
             f"a column contains {len(column)} values of {column.type}, {column.null_count} missing"
         )
-        raise ValueError(msg)
     return column.combine_chunks()
 
 
@@ -273,8 +271,7 @@ def is_folder(path: str | Path) -> bool:
 def require_file(path: str | Path) -> None:
     """Raise DatabaseError if a path is not that of a file."""
     if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
-        msg = f"{path} does not exist; give a signature database file."
-        raise DatabaseError(msg)
+        raise DatabaseError(f"{path} does not exist; give a signature database file.")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -358,20 +355,19 @@ def read_manifest(folder: str | Path) -> Manifest:
         recipe = dict(content["recipe"])
         kind = content["kind"]
     except (FileNotFoundError, NotADirectoryError) as error:
-        msg = (
+        raise DatabaseError(
             f"{folder} is not a signature database in parts (it has no {MANIFEST}); give a "
             "folder that `semsig build --tile` wrote."
-        )
-        raise DatabaseError(msg) from error
+        ) from error
     except (OSError, ValueError, LookupError, TypeError) as error:
-        msg = f"{path} is damaged or cannot be read; build the database again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(
+            f"{path} is damaged or cannot be read; build the database again."
+        ) from error
     if kind != PARTS_KIND:
-        msg = (
+        raise DatabaseError(
             f"{path} does not belong to a signature database; give a folder that `semsig build "
             "--tile` wrote."
         )
-        raise DatabaseError(msg)
     return Manifest(recipe, parts)
 
 
@@ -382,18 +378,20 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
     for part in manifest.parts:
         path = folder / part.file
         if not path.is_file():
-            msg = f"{path} is missing; put the part back or build the database again."
-            raise DatabaseError(msg)
+            raise DatabaseError(
+                f"{path} is missing; put the part back or build the database again."
+            )
         if path.stat().st_size != part.bytes or digest(path) != part.sha256:
-            msg = f"{path} is not the part that was built; put it back or build the database again."
-            raise DatabaseError(msg)
+            raise DatabaseError(
+                f"{path} is not the part that was built; put it back or build the database again."
+            )
     others = {path.name for path in folder.glob("*.parquet")} - {p.file for p in manifest.parts}
     if others:
-        msg = f"{folder / min(others)} is not part of the database in {folder}; move it elsewhere."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{folder / min(others)} is not part of the database in {folder}; move it elsewhere."
+        )
     if not manifest.parts:
-        msg = f"{folder / MANIFEST} lists no parts; build the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(f"{folder / MANIFEST} lists no parts; build the database again.")
     return tuple(folder / part.file for part in manifest.parts)
 
 

@@ -111,11 +111,10 @@ def merge_databases(
         if (store.footprints is None and one.occlusion is not None) or (
             store.streets is None and along
         ):
-            msg = (
+            raise DatabaseError(
                 f"{city.path} lacks the buildings or streets that it was built with; build the "
                 "database again."
             )
-            raise DatabaseError(msg)
     store, shared = _merged_store(*stores)
     facts: dict[str, Any] = {
         "licenses": (

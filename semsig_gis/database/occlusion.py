@@ -62,14 +62,12 @@ class Footprints(Displayed):
         tolerance: float = TOLERANCE_M,
     ) -> None:
         if not (math.isfinite(tolerance) and tolerance >= 0):
-            msg = f"tolerance is {tolerance} m; give a number of metres from 0 up."
-            raise InputError(msg)
+            raise InputError(f"tolerance is {tolerance} m; give a number of metres from 0 up.")
         self.tolerance = float(tolerance)
         self._cores: dict[int, NDArray[np.object_]] = {}
         self._polygons, self.repaired = _usable(np.asarray(polygons, dtype=object).reshape(-1))
         if len(self._polygons) == 0:
-            msg = "no building footprint encloses an area; give polygons."
-            raise InputError(msg)
+            raise InputError("no building footprint encloses an area; give polygons.")
 
     def __len__(self) -> int:  # noqa: D105
         return len(self._polygons)
@@ -194,16 +192,16 @@ def _usable(given: NDArray[np.object_]) -> tuple[NDArray[np.object_], int]:
     )
     if len(wrong):
         kind = polygons[wrong[0]].geom_type
-        msg = f"{len(wrong)} building footprints are not polygons (one is a {kind}); give polygons."
-        raise InputError(msg)
+        raise InputError(
+            f"{len(wrong)} building footprints are not polygons (one is a {kind}); give polygons."
+        )
     coordinates, row = shapely.get_coordinates(polygons, return_index=True)
     endless = np.unique(row[~np.isfinite(coordinates).all(axis=1)])
     if len(endless):
-        msg = (
+        raise InputError(
             f"{len(endless)} building footprints have coordinates that are not finite (the first "
             f"is number {endless[0] + 1}); remove them or choose another CRS."
         )
-        raise InputError(msg)
     invalid = ~shapely.is_valid(polygons)
     polygons[invalid] = shapely.make_valid(polygons[invalid])
     # A repaired polygon may be a collection of polygons and lines, even one within another.

@@ -209,8 +209,7 @@ class ViewpointSpec:
         if self.mode not in get_args(Mode):
             known = ", ".join(get_args(Mode))
             near = nearest_name(str(self.mode), get_args(Mode))
-            msg = f"viewpoints {self.mode!r} are unknown{near}; give one of {known}."
-            raise InputError(msg)
+            raise InputError(f"viewpoints {self.mode!r} are unknown{near}; give one of {known}.")
         require_number(
             "street half-width", self.width, least=LEAST_WIDTH_M, most=MOST_WIDTH_M, unit="metres"
         )

@@ -235,8 +235,9 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     """
     if is_folder(database):
         if folder is not None:
-            msg = f"{database} is a folder with an object store in it; give no other store."
-            raise DatabaseError(msg)
+            raise DatabaseError(
+                f"{database} is a folder with an object store in it; give no other store."
+            )
         return _read_inputs(Path(database))
     require_file(database)
     file = Path(database)
@@ -261,11 +262,10 @@ def store_path(database: str | Path) -> Path:
     """
     file = Path(os.path.realpath(database))
     if file.suffix == STORE_SUFFIX:
-        msg = (
+        raise InputError(
             f"{database} is the name of an object store; give the database a name with another "
             "suffix."
         )
-        raise InputError(msg)
     return file.with_suffix(STORE_SUFFIX)
 
 
@@ -294,31 +294,32 @@ def _manifest(folder: Path) -> dict[str, Any]:
         known: bool = manifest["format"] == FORMAT
         version, _ = manifest["version"], manifest["database"]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        msg = f"{path} is missing or damaged; build the database again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(f"{path} is missing or damaged; build the database again.") from error
     if not known:
-        msg = (
+        raise DatabaseError(
             f"{folder} was written by another version of semsig ({version}); build the database "
             "again."
         )
-        raise DatabaseError(msg)
     return dict(manifest)
 
 
 def _read(folder: Path, database: Path) -> ObjectStore:
     if not is_folder(folder):
-        msg = f"{database} has no object store ({folder.name} beside it); build the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{database} has no object store ({folder.name} beside it); build the database again."
+        )
     manifest = _manifest(folder)
     if manifest["database"] != built_digest(database):
-        msg = f"{folder} belongs to another database than {database}; build the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{folder} belongs to another database than {database}; build the database again."
+        )
     # Stores of before hold an R-tree as well, which nobody reads: damage to it ends the program.
     names = [name for name in (OBJECTS, FOOTPRINTS, STREETS) if name in manifest["files"]]
     damaged = damaged_files(folder, {name: manifest["files"][name] for name in names})
     if damaged or OBJECTS not in names:
-        msg = f"{folder / min(damaged, default=OBJECTS)} is damaged; build the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{folder / min(damaged, default=OBJECTS)} is damaged; build the database again."
+        )
     return ObjectStore(
         objects=open_objects(folder / OBJECTS),
         footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
@@ -334,8 +335,9 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
     files = {path.stem: path for path in sorted((folder / INPUTS).glob("*.parquet"))}
     if "objects" not in files:
         read_manifest(folder)  # another folder is told as such
-        msg = f"{folder} has no street objects in {INPUTS}; build the database again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{folder} has no street objects in {INPUTS}; build the database again."
+        )
     return files
 
 
@@ -359,8 +361,7 @@ def _table(path: Path) -> gpd.GeoDataFrame:
     try:
         return gpd.read_parquet(path)
     except (*UNREADABLE, shapely.errors.ShapelyError) as error:
-        msg = f"{path} is damaged ({error}); build the database again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(f"{path} is damaged ({error}); build the database again.") from error
 
 
 def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:

@@ -31,8 +31,7 @@ class CellTable:
         if geometry not in get_args(CellGeometry):
             names = " or ".join(repr(name) for name in get_args(CellGeometry))
             hint = nearest_name(str(geometry), get_args(CellGeometry))
-            msg = f"{geometry!r} is not a way to draw a cell; give {names}{hint}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(f"{geometry!r} is not a way to draw a cell; give {names}{hint}.")
         self._database, self._geometry = database, geometry
         self._symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
         degrees = (unit * 360 / BEARING_UNITS for unit in range(BEARING_UNITS))

@@ -75,8 +75,7 @@ def fingerprint(path: Path) -> str:
     try:
         return digest(*files)
     except OSError as error:
-        msg = f"{path} does not exist or cannot be read; give another file."
-        raise SourceError(msg) from error
+        raise SourceError(f"{path} does not exist or cannot be read; give another file.") from error
 
 
 def copy_by_box(

@@ -276,21 +276,19 @@ def build_parts(
     if failed:
         first = min(failed)
         others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        msg = (
+        raise DatabaseError(
             f"{part_name(first)}{others} could not be built ({failed[first]}); the {len(done):,} "
             f"tiles that are done are kept in {plan.folder}, so fix the cause and run the "
             "same command again."
         )
-        raise DatabaseError(msg)
     parts = sorted(part for part in done.values() if part is not None)
     if not parts:
         shutil.rmtree(plan.folder, ignore_errors=True)
-        msg = (
+        raise EmptyResultError(
             f"no cell sees an object of {objects}; make the step ({plan.grid.step:g} m) smaller or "
             f"the visibility range ({plan.spec.radius:g} m) larger, or check the area, the "
             "streets and the buildings."
         )
-        raise EmptyResultError(msg)
     return parts
 
 
@@ -411,11 +409,10 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
     """
     metres = side * grid.step
     if reach > MOST_REACHED * metres:
-        msg = (
+        raise InputError(
             f"a tile of {metres:g} m is too small for a visibility range of {reach:g} m; make it "
             f"at least {reach / MOST_REACHED:g} m."
         )
-        raise InputError(msg)
     objects: Counter[int] = Counter()
     for bounds in each_bounds(path):
         widened = bounds + np.array([-reach, -reach, reach, reach])
@@ -431,8 +428,9 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
         total = np.bincount(number, weights=count[box]).astype(np.int64)
         objects.update(dict(zip(distinct.tolist(), total.tolist(), strict=True)))
         if len(objects) > MOST_TILES:
-            msg = f"tiles of {metres:g} m would be more than {MOST_TILES:,}; make them larger."
-            raise InputError(msg)
+            raise InputError(
+                f"tiles of {metres:g} m would be more than {MOST_TILES:,}; make them larger."
+            )
     ordered = sorted(objects, key=lambda number: (-objects[number], number))
     columns, rows = split_ids(np.array(ordered, np.int64))
     return list(zip(columns.tolist(), rows.tolist(), strict=True))
@@ -453,8 +451,7 @@ def tile_cells(
     are the same as when everything is.
     """
     if not plan.folder.is_dir():
-        msg = f"{plan.folder} no longer exists; run the same command again."
-        raise InputError(msg)
+        raise InputError(f"{plan.folder} no longer exists; run the same command again.")
     around = plan.box(tile, plan.reach + MARGIN_M)
     objects = open_objects(plan.objects, box=around)
     if not len(objects):
@@ -523,18 +520,16 @@ def _require_replaceable(target: Path) -> None:
     """Refuse to put a database in the place of anything but a database."""
     if not target.is_dir():
         if target.exists() and not target.is_file():
-            msg = f"{target} is a device or a pipe; give the name of a folder to write."
-            raise InputError(msg)
+            raise InputError(f"{target} is a device or a pipe; give the name of a folder to write.")
         return
     others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
     if MANIFEST in others:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:
-        msg = (
+        raise InputError(
             f"{target} contains {min(others)!r}, which is not part of a signature database; give "
             "the name of a new folder, or move that file elsewhere."
         )
-        raise InputError(msg)
 
 
 def describe(tile: Tile, database: SignatureDatabase, path: Path) -> Part:

@@ -242,11 +242,10 @@ def update_database(
     if store.streets is None and database.viewpoints.mode == "streets":
         lacking.append("streets")
     if lacking:
-        msg = (
+        raise DatabaseError(
             f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
             "build the database again."
         )
-        raise DatabaseError(msg)
     merged, kept, notes = replace_layers(store.objects, objects)
     along = store.streets if database.viewpoints.mode == "streets" else None
     licenses = (*map(str, merged.licenses), *licenses_of(store.footprints, along))
@@ -259,11 +258,10 @@ def update_database(
     )
     if new.reach > database.reach:  # the unit in which all distances are stored
         furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
-        msg = (
+        raise InputError(
             f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
             f"database ({database.reach:g} m), which affects every cell; build the database again."
         )
-        raise InputError(msg)
     changes = compare_objects(store.objects, merged)
     places, codes = _changed_places(store.objects, merged, changes)
     cells = _cells_in_range(new, places, codes)
@@ -272,8 +270,9 @@ def update_database(
     fresh = _recomputed(new, after, places, cells, progress=progress)
     updated = join_databases([new.select(~stale), fresh])
     if len(updated) == 0:
-        msg = f"no cell would see any of the {len(merged):,} objects; check the new objects."
-        raise EmptyResultError(msg)
+        raise EmptyResultError(
+            f"no cell would see any of the {len(merged):,} objects; check the new objects."
+        )
     layers = _layers(store.objects) | _layers(merged)
     drifted = compare_cells(database.select(stale), fresh)
     report = UpdateReport(
@@ -361,11 +360,10 @@ def update_tiles(
     }
     after = replace(first, **facts)
     if after.reach != first.reach:  # the unit in which all distances are stored
-        msg = (
+        raise InputError(
             f"the longest visibility range of {objects} is {after.reach:g} m and that of {path} "
             f"{first.reach:g} m, which affects every cell; build the database again."
         )
-        raise InputError(msg)
     changes = compare_objects(old, joined)
     places, codes = _changed_places(old, joined, changes)
     cells = _cells_in_range(replace(after, taxonomy=joined.taxonomy), places, codes)

@@ -27,8 +27,7 @@ def checked_area(area: object) -> shapely.Polygon | shapely.MultiPolygon:
     """Return the area of viewpoints, made valid; InputError if it encloses nothing."""
     shape = shapely.make_valid(area) if isinstance(area, BaseGeometry) else area
     if not isinstance(shape, shapely.Polygon | shapely.MultiPolygon) or not shape.area > 0:
-        msg = f"the area of the viewpoints is {_brief(area)}; give a polygon."
-        raise InputError(msg)
+        raise InputError(f"the area of the viewpoints is {_brief(area)}; give a polygon.")
     return shape
 
 
@@ -37,8 +36,9 @@ def read_area(text: str) -> shapely.Geometry:
     try:
         return shapely.from_wkt(text)
     except shapely.errors.GEOSException as error:
-        msg = f"the area of the viewpoints is not WKT ({error}); write a polygon."
-        raise InputError(msg) from error
+        raise InputError(
+            f"the area of the viewpoints is not WKT ({error}); write a polygon."
+        ) from error
 
 
 def _brief(shape: object) -> str:
@@ -80,11 +80,9 @@ def choose_viewpoints(
 def require_surroundings(spec: ViewpointSpec, footprints: object, streets: object) -> None:
     """Raise InputError if what viewpoints are chosen by is missing, which is None then."""
     if spec.mode == "outdoor" and footprints is None:
-        msg = "viewpoints 'outdoor' need the buildings; give their footprints."
-        raise InputError(msg)
+        raise InputError("viewpoints 'outdoor' need the buildings; give their footprints.")
     if spec.mode == "streets" and streets is None:
-        msg = "viewpoints 'streets' need the streets; give their centre lines."
-        raise InputError(msg)
+        raise InputError("viewpoints 'streets' need the streets; give their centre lines.")
 
 
 def _lines(
@@ -101,16 +99,16 @@ def _lines(
         except (TypeError, ValueError):
             own = np.zeros(0)
         if own.shape != given.shape or (own <= 0).any():
-            msg = "the half-widths of streets are not all above 0; give metres for each street."
-            raise InputError(msg)
+            raise InputError(
+                "the half-widths of streets are not all above 0; give metres for each street."
+            )
         reaches = np.where(np.isfinite(own), own, width)
     drawn = ~(shapely.is_missing(given) | shapely.is_empty(given))
     lines = given[drawn]
     if len(lines) == 0 or not (shapely.get_dimensions(lines) == CURVES).all():
         others = lines[shapely.get_dimensions(lines) != CURVES]
         what = f"the streets contain {_brief(others[0])}" if len(others) else "there is no street"
-        msg = f"{what}; give the centre lines of streets."
-        raise InputError(msg)
+        raise InputError(f"{what}; give the centre lines of streets.")
     return lines, reaches[drawn]
 
 

@@ -124,11 +124,10 @@ def common_cases(
         return {name or other_name: (one, other)}
     common = {name: (first[name], second[name]) for name in first if name in second}
     if not common:
-        msg = (
+        raise InputError(
             f"the first results have {_listed(first)} and the second {_listed(second)}, none in "
             "common; give two with results in common, or the folders of two evaluations."
         )
-        raise InputError(msg)
     return common
 
 
@@ -145,11 +144,10 @@ def _require_pairs(first: Evaluation, second: Evaluation) -> None:
         places = [np.column_stack([one.geometry.x, one.geometry.y]) for one in tables]
         same = np.array_equal(places[0], places[1])
     if not same:
-        msg = (
+        raise InputError(
             f"the two evaluations have different queries ({len(tables[0])} and {len(tables[1])}); "
             "compare evaluations with the same places, seeds and number of queries."
         )
-        raise InputError(msg)
 
 
 def _turned(evaluation: Evaluation) -> bool:

@@ -141,11 +141,10 @@ def error_field(
     across = math.sqrt(float(np.ptp(xy, axis=0).prod()))
     least = max(2.0 * across / MOST_PIXELS, database.grid.step)
     if radius is not None and not (math.isfinite(radius) and radius >= least):
-        msg = (
+        raise InputError(
             f"a smoothing radius of {radius:g} m was given; give {least:,.0f} m or more in this "
             "city."
         )
-        raise InputError(msg)
     errors = np.minimum(queries["error_m"].to_numpy(np.float64), guess_error(database))
     values = np.stack([~evaluation.successful, errors], axis=1)
     for some in RADII if radius is None else (radius,):

@@ -146,10 +146,9 @@ def evaluate(
         used = LikelihoodMethod(noise=method.noise, on_grid=True)
         locator = LikelihoodLocator(index=method)
     else:
-        msg = (
+        raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."
         )
-        raise InputError(msg)
     announce(queries * (QUERY_S + PAIR_S * len(database)), "evaluating")
     drawn = draw_queries(database, spec)
     outcomes = score_queries(database, locator, drawn, tops=(top,), progress=progress)

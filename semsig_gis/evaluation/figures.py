@@ -108,8 +108,7 @@ def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name
     """
     if name not in districts:
         columns = ", ".join(str(one) for one in districts if one != "geometry")
-        msg = f"the districts have no column {name!r}; give one of {columns}."
-        raise InputError(msg)
+        raise InputError(f"the districts have no column {name!r}; give one of {columns}.")
     polygons = districts.to_crs(queries.crs)
     point, polygon = polygons.sindex.query(queries.geometry, predicate="intersects")
     labels = [ELSEWHERE] * len(queries)

@@ -130,8 +130,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
             machine=timing.get("machine", {}),
         )
     except (AttributeError, LookupError, TypeError, ValueError) as error:
-        msg = f"{file} is damaged ({error}); evaluate again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(f"{file} is damaged ({error}); evaluate again.") from error
 
 
 def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
@@ -173,9 +172,11 @@ def used_noises(
     models += [one.noise for one in distortions if isinstance(one, Detector)]
     for noise in models:
         if set(noise.name) & set(",:/="):
-            msg = f"a noise model is called {noise.name!r}; give it a name without , : / and =."
-            raise InputError(msg)
+            raise InputError(
+                f"a noise model is called {noise.name!r}; give it a name without , : / and =."
+            )
         if noises.setdefault(noise.name, noise) != noise:
-            msg = f"two noise models are called {noise.name!r}; give each a name of its own."
-            raise InputError(msg)
+            raise InputError(
+                f"two noise models are called {noise.name!r}; give each a name of its own."
+            )
     return noises

@@ -207,11 +207,10 @@ class Evaluation(Displayed):
         Raises InputError if another database was searched.
         """
         if len(database) != self.database["cells"]:
-            msg = (
+            raise InputError(
                 f"This evaluation searched {self.database['cells']:,} cells, but the database has "
                 f"{len(database):,}; give the database that it was made with, or evaluate again."
             )
-            raise InputError(msg)
         inside = self.queries["cell"].to_numpy() >= 0
         rows = np.full(len(inside), -1)
         rows[inside] = rows_of_result(
@@ -230,8 +229,9 @@ class Evaluation(Displayed):
         for value in thresholds:
             if value not in THRESHOLDS:
                 kept = ", ".join(str(one) for one in THRESHOLDS)
-                msg = f"No probability is stored for an error of {value} m; choose from {kept} m."
-                raise InputError(msg)
+                raise InputError(
+                    f"No probability is stored for an error of {value} m; choose from {kept} m."
+                )
         columns = [f"p{int(value)}" for value in thresholds]
         return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))
 

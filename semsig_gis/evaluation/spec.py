@@ -123,15 +123,14 @@ class ExperimentSpec:
     def __post_init__(self) -> None:  # noqa: D105
         for what, named in (("methods", self.methods), ("distortions", self.distortions)):
             if not named:
-                msg = f"the experiment has no {what}; name at least one."
-                raise InputError(msg)
+                raise InputError(f"the experiment has no {what}; name at least one.")
             for name in named:
                 if not re.fullmatch("[A-Za-z0-9_-]+", name):
-                    msg = f"{name!r} cannot be a name in {what}; use only letters, digits, _ and -."
-                    raise InputError(msg)
+                    raise InputError(
+                        f"{name!r} cannot be a name in {what}; use only letters, digits, _ and -."
+                    )
         if not self.top or len(set(self.top)) < len(self.top) or min(self.top) < 1:
-            msg = f"top is {list(self.top)}; give different whole numbers from 1."
-            raise InputError(msg)
+            raise InputError(f"top is {list(self.top)}; give different whole numbers from 1.")
         for name in self.distortions:
             self.asked(name)
         self.noises  # noqa: B018 - looks at their names
@@ -263,8 +262,9 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
         text = read_text(file)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
-        msg = f"experiment {file} cannot be read ({reason}); give a TOML file."
-        raise InputError(msg) from error
+        raise InputError(
+            f"experiment {file} cannot be read ({reason}); give a TOML file."
+        ) from error
     return parse_experiment(text, where=str(file), folder=file.parent)
 
 
@@ -275,22 +275,23 @@ def _noise(name: str, noise: object, where: str, folder: Path) -> Noise:
     elif isinstance(noise, dict):
         values = noise
     else:
-        msg = f"{where} has {name} = {noise!r} in noises; write a table or the name of a file."
-        raise InputError(msg)
+        raise InputError(
+            f"{where} has {name} = {noise!r} in noises; write a table or the name of a file."
+        )
     return noise_from_dict({**values, "name": name})
 
 
 def _chain(chain: object, name: str, where: str) -> str:
     texts: list[Any] = chain if isinstance(chain, list) else [chain]
     if not all(isinstance(text, str) for text in texts):
-        msg = f"{where} has {name} = {chain!r} in distortions; write a text or a list of texts."
-        raise InputError(msg)
+        raise InputError(
+            f"{where} has {name} = {chain!r} in distortions; write a text or a list of texts."
+        )
     return ", ".join(texts)
 
 
 def _whole_numbers(items: list[object], key: str, where: str) -> tuple[int, ...]:
     # bool is an int to Python, never to a person
     if not all(type(item) is int for item in items):
-        msg = f"{where} has {key} = {items!r}; write a list of whole numbers."
-        raise InputError(msg)
+        raise InputError(f"{where} has {key} = {items!r}; write a list of whole numbers.")
     return tuple(item for item in items if isinstance(item, int))

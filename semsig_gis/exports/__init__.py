@@ -269,14 +269,12 @@ def _require_one_city(
     """Refuse what is empty, and what is of another city."""
     if len(database) == 0 or (objects is not None and len(objects) == 0):
         what = "object" if len(database) else "cell"
-        msg = f"there is no {what} to write to {path}; give at least one."
-        raise EmptyResultError(msg)
+        raise EmptyResultError(f"there is no {what} to write to {path}; give at least one.")
     if objects is not None and objects.crs != database.crs:
-        msg = (
+        raise InputError(
             f"the street objects are in {objects.crs.name} and the cells in {database.crs.name}; "
             "give the objects that the database was built from."
         )
-        raise InputError(msg)
     if objects is not None:
         require_same_place(database, objects.xy, "street objects")
     if evaluation is not None:
@@ -289,34 +287,34 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
     for name in names:
         if name not in accepted:
             hint = nearest_name(name, accepted)
-            msg = f"{path} cannot contain {name!r}; give one of {', '.join(accepted)}{hint}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"{path} cannot contain {name!r}; give one of {', '.join(accepted)}{hint}."
+            )
     many = suffix in _MANY_LAYERS
     if len(names) > 1 and not many:
-        msg = (
+        raise InputError(
             f"{path} can contain only one layer, but {' and '.join(names)} were given; give one of "
             "them, or write a GeoPackage."
         )
-        raise InputError(msg)
     possible = [name for name in accepted if _NEEDS.get(name) in {None, *given}]
     # Who gives the resolution of hexagons wants them.
     default = [name for name in accepted if _NEEDS.get(name) == "resolution" and name in possible]
     content = list(dict.fromkeys(names)) or (possible if many else [*default, accepted[0]][:1])
     for name in content:
         if name not in possible:
-            msg = f"layer {name!r} was chosen for {path} with no {_NEEDS[name]}; give that as well."
-            raise InputError(msg)
+            raise InputError(
+                f"layer {name!r} was chosen for {path} with no {_NEEDS[name]}; give that as well."
+            )
     # Identifiability is part of a database, wherever it is not asked for.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
     used.update(*(_USES.get(name, ()) for name in content))
     used -= {"geometry"} if suffix == _TILES else set()
     unused = sorted(given - used)
     if unused:
-        msg = (
+        raise InputError(
             f"{path} contains only the {' and '.join(content)}, not the {' or '.join(unused)}; "
             f"leave that out or choose another layer{'' if many else ', or write a GeoPackage'}."
         )
-        raise InputError(msg)
     return content
 
 
@@ -419,11 +417,10 @@ def export_answer(
     """
     suffix = _suffix(path, [*dict.fromkeys((*_ANSWER, *_ONE_LAYER)), *sorted(_RASTER)])
     if suffix in _RASTER and answer.chances is None:
-        msg = (
+        raise InputError(
             f"{path} would contain the chance of every cell, which this method does not compute; "
             "use the likelihood method, or write a GeoPackage."
         )
-        raise InputError(msg)
     from semsig_gis.localization.regions import search_regions  # noqa: PLC0415 - only where it is used
 
     regions = search_regions(answer, database, share=share, within=within)
@@ -445,6 +442,7 @@ def _suffix(path: str | Path, accepted: Collection[str]) -> str:
         # One of each format.
         *names, last = [name for name in accepted if name != ".tiff"]
         listed = f"{', '.join(names)} or {last}" if names else last
-        msg = f"{path} does not end in {listed}; give a name with one of these suffixes."
-        raise InputError(msg)
+        raise InputError(
+            f"{path} does not end in {listed}; give a name with one of these suffixes."
+        )
     return suffix

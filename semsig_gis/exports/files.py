@@ -189,8 +189,7 @@ def _write_features(
             **options,
         )
         if pyogrio.read_info(partial, force_feature_count=True)["features"] != layer.rows:
-            msg = "some features are not in the file"
-            raise DataSourceError(msg)
+            raise DataSourceError("some features are not in the file")
 
 
 def feature_stream(
@@ -216,8 +215,7 @@ def whole_by_gdal(path: str | Path) -> Iterator[None]:
     try:
         yield
     except (DataSourceError, DataLayerError, FeatureError) as error:
-        msg = (
+        raise InputError(
             f"{path} could not be written whole, so what was there before is unchanged; free "
             "some space or choose another folder."
-        )
-        raise InputError(msg) from error
+        ) from error

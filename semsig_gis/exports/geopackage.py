@@ -178,14 +178,14 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     """
     if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
         what = "is a folder" if os.path.isdir(path) else "does not exist"  # noqa: PTH112
-        msg = f"{path} {what}; give a GeoPackage that semsig export wrote."
-        raise DatabaseError(msg)
+        raise DatabaseError(f"{path} {what}; give a GeoPackage that semsig export wrote.")
     notes: list[str] = []
     try:
         names = pyogrio.list_layers(path)[:, 0].tolist()
         if CELLS not in names:
-            msg = f"{path} has no layer {CELLS!r}; give a GeoPackage with the cells of a database."
-            raise DatabaseError(msg)
+            raise DatabaseError(
+                f"{path} has no layer {CELLS!r}; give a GeoPackage with the cells of a database."
+            )
         specs, crs, fields = _facts(path, CELLS)
         more = [name for name in fields if name.startswith(IDENTIFIABILITY_COLUMNS)]
         columns = [*CELL_COLUMNS, *(more if specs["identifiability"] else [])]
@@ -217,8 +217,9 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         *(DataSourceError, DataLayerError, CRSError, pa.ArrowException),
         *(OSError, ValueError, LookupError, TypeError),
     ) as error:
-        msg = f"{path} is damaged, or was not written by semsig export; export the database again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(
+            f"{path} is damaged, or was not written by semsig export; export the database again."
+        ) from error
     return GeopackageContents(
         database=database, objects=objects, identifiability=identifiability, notes=tuple(notes)
     )
@@ -236,8 +237,7 @@ def _objects(path: str | Path) -> StreetObjects:
     unknown: dict[str, str | int] = {SOURCE: "", SOURCE_ID: "", COUNT: 1}
     columns |= {name: pc.fill_null(columns[name], value) for name, value in unknown.items()}
     if pc.min(columns[COUNT]).as_py() < 1:
-        msg = "an object stands for fewer than one"
-        raise ValueError(msg)
+        raise ValueError("an object stands for fewer than one")
     return objects_of(pa.table(columns), specs, crs, path=path)
 
 
@@ -275,8 +275,7 @@ def _units(texts: pa.ChunkedArray, units: float, kind: DTypeLike) -> pa.ChunkedA
         parts = pc.split_pattern(chunk, " ")
         values = np.rint(parts.flatten().cast(pa.float64()).to_numpy() * units)
         if not ((values >= 0) & (values <= np.iinfo(kind).max)).all():
-            msg = f"a number is out of range among {len(values)}"
-            raise ValueError(msg)
+            raise ValueError(f"a number is out of range among {len(values)}")
         starts = parts.offsets.to_numpy()
         units_of_cells = pa.array(values.astype(kind))
         lists.append(pa.ListArray.from_arrays(pa.array(starts - starts[0]), units_of_cells))
@@ -308,11 +307,10 @@ def write_layers(
             _check_indexes(layers, partial)
         except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
             # GDAL's own words are pages of SQL; they stay with the cause.
-            msg = (
+            raise InputError(
                 f"{target} could not be written whole, so what was there before is unchanged; "
                 "free some space or choose another folder."
-            )
-            raise InputError(msg) from error
+            ) from error
         _require_closed(target)
 
 
@@ -379,8 +377,7 @@ def _check_indexes(layers: Sequence[Layer], path: Path) -> None:
         for layer in (one for one in layers if one.geometry in GEOMETRY_TYPES):
             count = f"SELECT count(*) FROM rtree_{layer.name}_geom"  # noqa: S608 - our own names
             if connection.execute(count).fetchone()[0] != layer.rows:
-                msg = "the spatial indexes are not complete"
-                raise sqlite3.DatabaseError(msg)
+                raise sqlite3.DatabaseError("the spatial indexes are not complete")
 
 
 def _require_closed(path: Path) -> None:
@@ -392,11 +389,10 @@ def _require_closed(path: Path) -> None:
     logs = [real.with_name(f"{real.name}-{kind}") for kind in ("wal", "journal")]
     # os.path answers where Path raises.
     if any(map(os.path.exists, logs)) or (os.path.isfile(real) and _is_locked(real)):  # noqa: PTH113
-        msg = (
+        raise InputError(
             f"{path} is open in another program, such as QGIS, or was left half-written by one; "
             "close it there, or give another name."
         )
-        raise InputError(msg)
 
 
 def _is_locked(path: Path) -> bool:

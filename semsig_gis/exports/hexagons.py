@@ -42,8 +42,9 @@ def hexagons_layer(
     ``queries`` those of the evaluation and ``found`` is the share of these that succeeded.
     """
     if not 0 <= resolution <= FINEST:
-        msg = f"resolution {resolution} was given for hexagons; give 0 to {FINEST} (finest)."
-        raise InputError(msg)
+        raise InputError(
+            f"resolution {resolution} was given for hexagons; give 0 to {FINEST} (finest)."
+        )
     to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
 
     def hexagons(xy: NDArray[np.float64]) -> NDArray[np.uint64]:

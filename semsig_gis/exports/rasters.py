@@ -113,8 +113,9 @@ def export_geotiff(
     """
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.shape != (len(database),):
-        msg = f"{numbers.size} numbers were given for {len(database)} cells; give one for each."
-        raise InputError(msg)
+        raise InputError(
+            f"{numbers.size} numbers were given for {len(database)} cells; give one for each."
+        )
     from semsig_gis.storage.raster import write_cells  # noqa: PLC0415 - an extra
 
     write_cells(

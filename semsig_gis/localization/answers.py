@@ -202,8 +202,7 @@ class Locator(Protocol[_Answer_co]):
 def check_top(top: int) -> None:
     """Refuse a list of no candidates."""
     if top < 1:
-        msg = f"{top} candidates were asked for; give a whole number from 1."
-        raise InputError(msg)
+        raise InputError(f"{top} candidates were asked for; give a whole number from 1.")
 
 
 def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tuple[str, ...]:
@@ -269,11 +268,10 @@ class Requirement:
             low, high = limits.get(code, (0, math.inf))
             limits[code] = low, high = max(low, least), min(high, most)
             if low > high:
-                msg = (
+                raise InputError(
                     f"requirement {text!r} wants at least {low} and at most {high} of "
                     f"{symbol!r}; give numbers that a cell can meet."
                 )
-                raise InputError(msg)
         return cls(tuple((code, low, high) for code, (low, high) in limits.items()))
 
     def met(self, sequences: SequenceTable) -> NDArray[np.bool_]:
@@ -299,8 +297,7 @@ def _read(part: str, text: str) -> tuple[str, int, float]:
     if found := _AMOUNT.fullmatch(part):
         digits, symbol = found.groups()
         return symbol, int(digits or 1), math.inf
-    msg = (
+    raise InputError(
         f"{part!r} in requirement {text!r} cannot be read; give parts such as 'M', '2B', 'B>=2', "
         "'B<=5' or 'B=3' with commas between them, '?' for all objects."
     )
-    raise InputError(msg)

@@ -109,11 +109,11 @@ def search_regions(
     5
     """
     if not 0 < share <= 1:
-        msg = f"a share of {share} was given for regions; give a number above 0 and at most 1."
-        raise InputError(msg)
+        raise InputError(
+            f"a share of {share} was given for regions; give a number above 0 and at most 1."
+        )
     if not (math.isfinite(within) and within >= 0):
-        msg = f"a margin of {within} m was given for regions; give metres, 0 or more."
-        raise InputError(msg)
+        raise InputError(f"a margin of {within} m was given for regions; give metres, 0 or more.")
     chances, cells = answer.chances, answer.region_cells(database, share)
     if within > 0:
         cells = np.concatenate([cells, _around(database, cells, within)])

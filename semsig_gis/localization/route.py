@@ -80,11 +80,10 @@ def route_posteriors(
     (l_(k+1) * b_(k+1))``; the chances are proportional to ``a_k * b_k``.
     """
     if not logliks or len(legs) != len(logliks) - 1:
-        msg = (
+        raise InputError(
             f"{len(logliks)} views and {len(legs)} legs were given; give at least one view, and "
             "one leg between each view and the next."
         )
-        raise InputError(msg)
     first = posterior(database, logliks[0], log_prior=log_prior)
     likely = [first.chances, *(posterior(database, part).chances for part in logliks[1:])]
     size = len(database)

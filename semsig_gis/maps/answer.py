@@ -83,12 +83,14 @@ def _shapes(path: Path, database: SignatureDatabase) -> gpd.GeoDataFrame:
     try:
         tables = _tables(path)
     except (OSError, ValueError, pyogrio.errors.DataSourceError) as error:
-        msg = f"{path} cannot be read ({error}); give a file that semsig localize --out wrote."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{path} cannot be read ({error}); give a file that semsig localize --out wrote."
+        ) from error
     ranked = [table for table in tables if "rank" in table]
     if not any("best_cell_id" in table for table in ranked):
-        msg = f"{path} contains no answer; give a file that semsig localize --out wrote."
-        raise InputError(msg)
+        raise InputError(
+            f"{path} contains no answer; give a file that semsig localize --out wrote."
+        )
     known = [
         table.set_crs(database.crs) if table.crs is None else table.to_crs(database.crs)
         for table in ranked

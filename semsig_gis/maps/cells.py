@@ -138,8 +138,7 @@ def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[Cel
 def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
     """Return the latitudes and longitudes of the corners of all cells."""
     if len(database) == 0:
-        msg = "the database has no cells to show; give one with at least one cell."
-        raise InputError(msg)
+        raise InputError("the database has no cells to show; give one with at least one cell.")
     return corners_of(database)
 
 

@@ -109,8 +109,9 @@ def city_map(
         cells = None if parts else database
         parts.append(partial(objects_map, objects, database=cells))
     if not parts:
-        msg = "there is nothing to show of the city; give an evaluation, or ambiguity=True."
-        raise InputError(msg)
+        raise InputError(
+            "there is nothing to show of the city; give an evaluation, or ambiguity=True."
+        )
     drawn = parts[0](tiles=tiles)
     _keep_colour(drawn, parts[1:])
     return drawn

@@ -130,11 +130,10 @@ def drift_map(
     if objects_before is not None and objects_after is not None:
         for some in (objects_before, objects_after):
             if some.crs != city.crs:
-                msg = (
+                raise CrsError(
                     f"the objects are in {some.crs.to_string()} and the database is in "
                     f"{city.crs.to_string()}; give the objects that it was built from."
                 )
-                raise CrsError(msg)
         objects = compare_objects(objects_before, objects_after)
         for name, drawings in _object_drawings(objects_before, objects_after, objects):
             draw(page, name, "drawings", drawings, group="objects")

@@ -96,8 +96,7 @@ def ground_map(
     systems = [table.crs for table in tables.values()]
     if None in systems or len(set(systems)) > 1:
         names = " and ".join("no CRS" if crs is None else crs.name for crs in systems)
-        msg = f"the streets and buildings have {names}; give both in one CRS."
-        raise CrsError(msg)
+        raise CrsError(f"the streets and buildings have {names}; give both in one CRS.")
     arrays, about, bounds = packed_ground(tables, box)
     page = prepared_map(map_, None, title="Streets and buildings")
     draw(page, "Streets and buildings", "ground", arrays, about, group="ground")
@@ -119,8 +118,9 @@ def packed_ground(
     simple = {kind: _simple(table, box) for kind, table in tables.items()}
     shapes = {kind: parts for kind, (parts, _) in simple.items() if len(parts)}
     if not shapes:
-        msg = "there are no streets or buildings to show; give some that are in the city."
-        raise EmptyResultError(msg)
+        raise EmptyResultError(
+            "there are no streets or buildings to show; give some that are in the city."
+        )
     arrays, about = _ground(shapes, next(iter(tables.values())).crs)
     if "streets" in shapes and NAME in tables["streets"]:
         arrays["streets"] |= _named(tables["streets"][NAME].iloc[simple["streets"][1]])
@@ -226,8 +226,7 @@ def objects_map(
     20
     """
     if len(objects) == 0:
-        msg = "there is no street object to show; look at what was loaded."
-        raise EmptyResultError(msg)
+        raise EmptyResultError("there is no street object to show; look at what was loaded.")
     page = prepared_map(map_, tiles, title="Street objects")
     if database is not None:
         add_city(page, database, show=False)

@@ -92,8 +92,7 @@ def asset_text(name: str) -> str:
     """
     files = {asset.name: asset for asset in assets().values() if asset.stands_for}
     if name not in files:
-        msg = f"{name!r} is not a map file{nearest_name(name, files)}."
-        raise UnknownNameError(msg)
+        raise UnknownNameError(f"{name!r} is not a map file{nearest_name(name, files)}.")
     text = _required(files[name]).decode("utf-8")
     if name.endswith(".css"):
         text = _CSS_IMAGE.sub(lambda match: f"url({_data_uri(match['name'])})", text)
@@ -121,18 +120,18 @@ def inline_assets(page: str) -> str:
         file: asset.name for asset in assets().values() for file in asset.stands_for
     } | dict.fromkeys(UNUSED)
     if "L.AwesomeMarkers." in page:
-        msg = "A self-contained map cannot show folium.Icon markers; use CircleMarker or DivIcon."
-        raise InputError(msg)
+        raise InputError(
+            "A self-contained map cannot show folium.Icon markers; use CircleMarker or DivIcon."
+        )
 
     def replace(match: re.Match[str]) -> str:
         address = match["script"] or match["link"]
         file = PurePosixPath(urlsplit(address).path).name
         if file not in replacements:
-            msg = (
+            raise InputError(
                 f"A self-contained map cannot use {address}; the files it may use are "
                 f"{', '.join(sorted(replacements.keys() - UNUSED))}."
             )
-            raise InputError(msg)
         name = replacements[file]
         if name is None:
             return ""
@@ -157,11 +156,10 @@ def _content(asset: Asset) -> bytes | None:
 def _required(asset: Asset) -> bytes:
     content = _content(asset)
     if content is None:
-        msg = (
+        raise InputError(
             f"This installation does not contain {asset.name} of {asset.package} {asset.version}; "
             "make a map that links it, or install semsig_gis again where npm is available."
         )
-        raise InputError(msg)
     return content
 
 

@@ -164,8 +164,9 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
     """Return the map to draw on."""
     if map_ is not None:
         if tiles is not None:
-            msg = f"Tiles {tiles!r} were given with a map of your own; add them to that map."
-            raise InputError(msg)
+            raise InputError(
+                f"Tiles {tiles!r} were given with a map of your own; add them to that map."
+            )
         return map_
     provider = None if tiles is None else _tile_provider(tiles)
     made = folium.Map(tiles=provider, prefer_canvas=True, control_scale=True)
@@ -183,14 +184,12 @@ def _tile_provider(name: str) -> xyzservices.TileProvider:
     try:
         provider = known.query_name("OpenStreetMap.Mapnik" if plain else name)
     except ValueError as error:
-        msg = (
+        raise InputError(
             f"Tiles {name!r} are not known to xyzservices{nearest_name(name, known.flatten())}; "
             f"give {WITHOUT_KEY}."
-        )
-        raise InputError(msg) from error
+        ) from error
     if provider.requires_token():
-        msg = f"Tiles {name!r} need a key from their provider; give {WITHOUT_KEY}."
-        raise InputError(msg)
+        raise InputError(f"Tiles {name!r} need a key from their provider; give {WITHOUT_KEY}.")
     return provider
 
 

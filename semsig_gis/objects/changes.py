@@ -189,11 +189,10 @@ def replace_layers(
     """
     if new.crs != old.crs:
         own = old.crs.to_string()
-        msg = (
+        raise CrsError(
             f"the new objects are in {new.crs.to_string()} and those of the database in {own}; "
             f"load the new ones with --metric-crs {own}."
         )
-        raise CrsError(msg)
     taxonomy = joined_taxonomy(old.taxonomy, new.taxonomy)
     renewed = set(new.table[SOURCE].unique()).union(*(licence.layers for licence in new.licenses))
     stays = ~old.table[SOURCE].isin(renewed).to_numpy()
@@ -238,22 +237,20 @@ def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
     for item in old.classes:
         other = theirs.get(item.code)
         if other is not None and replace(other, title=item.title) != item:
-            msg = (
+            raise InputError(
                 f"class code {item.code} means {_brief(item)} before and {_brief(other)} after; "
                 "load both with the same catalogue, or build the database again."
             )
-            raise InputError(msg)
     codes = {item.code for item in old.classes}
     if codes <= set(theirs):
         return new
     try:
         return old.extended(item for item in new.classes if item.code not in codes)
     except CatalogError as error:
-        msg = (
+        raise InputError(
             f"the new classes do not match the old ones ({str(error)[:-1]}); load both with the "
             "same catalogue, or build the database again."
-        )
-        raise InputError(msg) from error
+        ) from error
 
 
 def _brief(item: ObjectClass) -> str:

@@ -106,13 +106,15 @@ def conflate(
     """
     table = objects.table
     if MERGED in table.columns:
-        msg = "the objects are conflated already; conflate all sources at once, before saving."
-        raise InputError(msg)
+        raise InputError(
+            "the objects are conflated already; conflate all sources at once, before saving."
+        )
     codes = {name: objects.taxonomy.by_name(name).code for name in radii}
     for name, radius in radii.items():
         if not 0 < radius < RADIUS_LIMIT_M:
-            msg = f"class {name!r} has the radius {radius!r}; give metres above 0 and below 100."
-            raise InputError(msg)
+            raise InputError(
+                f"class {name!r} has the radius {radius!r}; give metres above 0 and below 100."
+            )
     view = _view(objects)
     matches = [
         _Match(name, kept, merged, metres)

@@ -126,8 +126,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     items = samples_of(path)
     layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
     if not layers:
-        msg = f"{path} has no layer with positions; give a file that has one."
-        raise SourceError(msg)
+        raise SourceError(f"{path} has no layer with positions; give a file that has one.")
     drafts = [_draft(path, item, crs) for item in layers]
     lines = [
         f"# Draft of a catalogue for {_text(path.name)}, from its names, fields and values.",
@@ -163,11 +162,13 @@ def _require_loads(text: str, path: Path) -> None:
             if any(layer.spec.role == "objects" for layer in layers):
                 assemble(layers, catalog)
         except EmptyResultError as error:
-            msg = f"{path} has no layer with positions; give a file that has one."
-            raise SourceError(msg) from error
+            raise SourceError(
+                f"{path} has no layer with positions; give a file that has one."
+            ) from error
         except SemsigError as error:
-            msg = f"no catalogue can be drafted for {path}: {str(error).rstrip('.')}."
-            raise SourceError(msg) from error
+            raise SourceError(
+                f"no catalogue can be drafted for {path}: {str(error).rstrip('.')}."
+            ) from error
 
 
 def _draft(path: Path, sample: Sample, crs: str | None) -> _Draft:
@@ -176,11 +177,10 @@ def _draft(path: Path, sample: Sample, crs: str | None) -> _Draft:
     position = sample.coordinates if sample.placed else guess_position(sample, columns)
     if not sample.placed and not position:
         fields = ", ".join(column.name for column in columns)
-        msg = (
+        raise SourceError(
             f"{path} has no field that looks like a position, only {fields}; "
             "give a file with coordinates."
         )
-        raise SourceError(msg)
     names = f"{path.stem} / {sample.info.name}"
     guess = guess_class(names, columns, geometry=geometry, rows=len(sample.rows))
     if not guess.name:
@@ -222,11 +222,10 @@ def _crs(
     xy = shapely.get_coordinates(layer.table.geometry.dropna().array)
     if 2 * np.count_nonzero(off_the_globe(xy, WGS84)) <= len(xy):
         return "EPSG:4326", "the file does not say; its coordinates could be degrees"
-    msg = (
+    raise CrsError(
         f"{path} has coordinates such as ({xy[0][0]:.12g}, {xy[0][1]:.12g}) and does not say in "
         "which CRS; state it with --crs, such as --crs EPSG:2154."
     )
-    raise CrsError(msg)
 
 
 def _metric_crs(layers: Sequence[Sample]) -> str:

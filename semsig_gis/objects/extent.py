@@ -182,11 +182,10 @@ def settle_extent(
         If the distortion is no number above 0.
     """
     if not max_distortion > 0:
-        msg = (
+        raise InputError(
             f"the largest distortion is {max_distortion:g}; give a number above 0, in degrees "
             "for bearings and in percent for lengths."
         )
-        raise InputError(msg)
     metric = None if crs is None else require_metric_crs(crs)
     located = [_located(layer) for layer in layers]
     placed = [one for one in located if len(one.coordinates)]
@@ -200,8 +199,9 @@ def settle_extent(
     places = _distinct(np.concatenate([np.empty((0, 2)), *_deciding(placed)]))
     if not len(places):
         if metric is None:
-            msg = "no layer has a feature with a position; look at the filters and the area."
-            raise EmptyResultError(msg)
+            raise EmptyResultError(
+                "no layer has a feature with a position; look at the filters and the area."
+            )
         return tuple(layers), metric, ()
     towns = _Towns(places)
     for one in placed:
@@ -222,11 +222,10 @@ def _deciding(placed: Sequence[_Located]) -> list[NDArray[np.float64]]:
 def _located(layer: RawLayer) -> _Located:
     crs = layer.table.crs
     if crs is None:
-        msg = (
+        raise CrsError(
             f"layer {layer.spec.name!r} has no coordinate reference system; "
             "state its crs in the catalogue."
         )
-        raise CrsError(msg)
     geometry = layer.table.geometry.to_numpy()
     coordinates, row = shapely.get_coordinates(geometry, return_index=True)
     first = np.flatnonzero(np.diff(row, prepend=-1))
@@ -278,11 +277,10 @@ def _require_area(one: _Located, metric: CRS | None) -> None:
     elif wrong is metric:
         remedy = f"give another metric CRS, such as {_zone_label(centre)}, or correct the layer's"
     kind = "the metric CRS" if wrong is metric else "its CRS"
-    msg = (
+    raise CrsError(
         f"layer {one.layer.spec.name!r} {where}, outside of where {kind}, {crs_label(wrong)}, is "
         f"used{used}; {remedy}."
     )
-    raise CrsError(msg)
 
 
 @lru_cache(maxsize=64)  # looking for the code takes 0.2 s
@@ -316,20 +314,18 @@ def _require_company(one: _Located, towns: _Towns) -> None:
     if one.swapped is not None and towns.of(np.array([one.swapped]))[0] == 0:
         remedy = f"with x and y exchanged it would lie there, so correct the wrong ones: {EXCHANGE}"
     here, there = _Towns(one.places).bounds(0), towns.bounds(0)
-    msg = (
+    raise CrsError(
         f"layer {one.layer.spec.name!r} lies at {_box(here)} in degrees, far from most of the data "
         f"at {_box(there)}; {remedy}."
     )
-    raise CrsError(msg)
 
 
 def _utm_zone(longitude: float, latitude: float) -> CRS:
     if not -80 <= latitude <= 84:  # noqa: PLR2004 - the ends of UTM
-        msg = (
+        raise CrsError(
             f"the data lies near {_place((longitude, latitude))}, where there is no UTM zone; give "
             "a projected CRS in metres as metric CRS."
         )
-        raise CrsError(msg)
     # PROJ would look through all zones for a tenth of a second.
     zone = int((longitude + HALF_TURN) // 6) % 60 + 1
     return CRS.from_epsg((32600 if latitude >= 0 else 32700) + zone)
@@ -356,12 +352,11 @@ def _require_plane(
     )
     if distortion.turn > most or 100 * distortion.stretch > most:
         what = f"lies in {len(extents)} places far apart" if len(extents) > 1 else "is too wide"
-        msg = (
+        raise CrsError(
             f"the data {what} ({listed} in degrees), over which {off}; at most {most:g} is "
             "allowed, so load part of it, for example with --clip and one of these boxes, or give "
             "a larger --max-distortion."
         )
-        raise CrsError(msg)
     notes = []
     if len(extents) > 1:
         notes.append(

@@ -91,10 +91,9 @@ def fetch_layers(
     `semsig load` on files.
     """
     if not catalog.endpoints or catalog.reader not in {*SERVICES, *TILED}:
-        msg = (
+        raise InputError(
             f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
         )
-        raise InputError(msg)
     layers: list[RawLayer] = []
     if catalog.token is not None and not http.offline:
         http = replace(http, secret=Secret.of_environment(catalog.token))
@@ -197,9 +196,8 @@ def find_area(
     if not isinstance(text, str) or not names_place(text):
         return parse_area(text)
     if catalog.geocoder is None:
-        msg = (
+        raise InputError(
             f"catalogue {catalog.name!r} names no geocoder, so {text!r} cannot be looked up; give "
             "west,south,east,north in degrees or a polygon file."
         )
-        raise InputError(msg)
     return find_place(text, endpoint=catalog.geocoder, cache=cache, spec=http)

@@ -89,8 +89,9 @@ def objects_from_frame(
     """
     _require_frame(frame)
     if tags and (class_column is not None or catalog is not None):
-        msg = "tags were given together with a column of classes or a catalogue; give one of them."
-        raise InputError(msg)
+        raise InputError(
+            "tags were given together with a column of classes or a catalogue; give one of them."
+        )
     known = load_catalog(catalog) if isinstance(catalog, str | Path) else catalog
     if class_column is not None:
         return _by_column(frame, class_column, known, metric_crs=metric_crs)
@@ -105,28 +106,24 @@ def objects_from_frame(
     else:
         raw = (_by_fields(frame, specs, known),)
     if not any(len(layer.table) for layer in raw):
-        msg = (
+        raise EmptyResultError(
             f"none of the {len(frame):,} rows of the table is a street object of catalogue "
             f"{known.name!r}; check their tags or fields (`semsig sources` lists what is read)."
         )
-        raise EmptyResultError(msg)
     return assemble(raw, known, metric_crs=metric_crs).objects
 
 
 def _require_frame(frame: object) -> None:
     """Refuse what is no table of places."""
     if not isinstance(frame, gpd.GeoDataFrame):
-        msg = (
+        raise InputError(
             f"a {type(frame).__name__} was given; give a GeoDataFrame, or street objects such as "
             "open_objects returns."
         )
-        raise InputError(msg)
     if frame.active_geometry_name is None:
-        msg = "the table has no geometry; state it with set_geometry."
-        raise InputError(msg)
+        raise InputError("the table has no geometry; state it with set_geometry.")
     if frame.crs is None:
-        msg = "the table has no coordinate reference system; state it with set_crs."
-        raise CrsError(msg)
+        raise CrsError("the table has no coordinate reference system; state it with set_crs.")
 
 
 def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
@@ -164,12 +161,11 @@ def _by_column(
     layer = _by_rules(frame, spec)
     unknown = next((str(v) for v in frame[column].dropna().unique() if v not in names), None)
     if unknown is not None:
-        msg = (
+        raise InputError(
             f"column {column!r} contains {unknown!r}, which is not a "
             f"class{nearest_name(unknown, names)}; the classes are {', '.join(names)}, and rows "
             "without one are left out."
         )
-        raise InputError(msg)
     layer = replace(layer, notes=())  # that rows have no class is meant
     known = catalog or Catalog(name="frame", title="Table", taxonomy=taxonomy, layers=(spec,))
     objects = assemble([layer], replace(known, layers=(spec,)), metric_crs=metric_crs).objects
@@ -184,11 +180,10 @@ def _by_fields(frame: gpd.GeoDataFrame, specs: Sequence[LayerSpec], catalog: Cat
     if len(fitting) != 1:
         what = "several of them" if fitting else "none of them"
         named = ", ".join(spec.name for spec in (fitting or specs))
-        msg = (
+        raise InputError(
             f"the table fits {what} of the layers of catalogue {catalog.name!r} ({named}); give "
             "the right one as layers, or the column of its classes as class_column."
         )
-        raise InputError(msg)
     return _by_rules(frame, fitting[0])
 
 

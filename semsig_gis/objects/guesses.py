@@ -60,8 +60,9 @@ def samples_of(path: Path) -> tuple[Sample, ...]:
     """Return the layers of a file that may hold positions; SourceError for one not to describe."""
     suffix = path.suffix.lower()
     if path.name.lower().endswith(tuple(FORMATS)):
-        msg = f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
-        raise SourceError(msg)
+        raise SourceError(
+            f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
+        )
     layers: tuple[Sample, ...] = ()
     try:
         if suffix != ".parquet":

@@ -145,12 +145,11 @@ def build_objects(
     layers = tuple(layers)
     parts = [_positions(layer, taxonomy, system) for layer in layers]
     if not any(len(part) for part, _, _ in parts):
-        msg = (
+        raise EmptyResultError(
             f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
             f"{len(layers)} layers; look at the filters, the area, the geometries and the "
             "coordinate systems."
         )
-        raise EmptyResultError(msg)
     everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
     # By number, because two layers may bear one name.
     owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
@@ -207,11 +206,10 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
     """Return the usable rows of a layer, and how many are missing and misplaced."""
     table = layer.table
     if table.crs is None:
-        msg = (
+        raise CrsError(
             f"layer {layer.spec.name!r} has no coordinate reference system; "
             "state its crs in the catalogue."
         )
-        raise CrsError(msg)
     geometry = table.geometry
     usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
     shapes = geometry[usable]
@@ -360,11 +358,10 @@ def choose_layers(
     alone = {catalog.layer(name).name for name in names if not name.startswith("+")}
     added = {catalog.layer(name[1:]).name for name in names if name.startswith("+")}
     if alone and selection != "default":
-        msg = (
+        raise InputError(
             f"layer {min(alone)!r} was given without a plus sign together with {selection} layers; "
             f"write '+{min(alone)}' to read it as well, or give only the layers to read."
         )
-        raise InputError(msg)
     chosen: list[LayerSpec | None] = []
     for spec in catalog.layers:
         if spec.name in alone | added or (spec.role != "objects" and surroundings):

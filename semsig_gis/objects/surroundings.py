@@ -135,8 +135,7 @@ def elements_in(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) 
         return table
     (layer,) = frame_layers(table, [load_catalog("openstreetmap").layer(role)])
     if layer.table.empty:
-        msg = f"the table of OpenStreetMap's elements has no {role}; give one that has."
-        raise InputError(msg)
+        raise InputError(f"the table of OpenStreetMap's elements has no {role}; give one that has.")
     return _with_licences(layer)
 
 
@@ -161,8 +160,7 @@ def read_area(
         shapes = _read(area, "area", crs).geometry
     joined = join_areas(shapes.to_numpy())
     if joined is None:
-        msg = f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}."
-        raise InputError(msg)
+        raise InputError(f"{_named(area)} encloses no area; give {_of_kind(area, 'polygon')}.")
     return joined
 
 
@@ -185,16 +183,14 @@ def _read(
         for note in notes:
             tell(f"{where}: {note}")
     if table.crs is None:
-        msg = f"{where} states no coordinate reference system; write it with one."
-        raise SourceError(msg)
+        raise SourceError(f"{where} states no coordinate reference system; write it with one.")
     geometry = table.geometry
     table = table[~(geometry.isna() | geometry.is_empty)].reset_index(drop=True)
     dimensions = shapely.get_dimensions(table.geometry.to_numpy())
     others = table.geometry[dimensions != DIMENSIONS[kind]]
     if (len(table) == 0 and box is None) or len(others):
         content = f"contains a {others.iloc[0].geom_type}" if len(others) else f"contains no {kind}"
-        msg = f"{where} {content}; give {_of_kind(path, kind)}."
-        raise InputError(msg)
+        raise InputError(f"{where} {content}; give {_of_kind(path, kind)}.")
     return table.to_crs(crs)
 
 
@@ -221,9 +217,8 @@ def _read_file(
         return read_parquet(path, kind=f"{kind}s", box=box), ()
     layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
     if layer.errors:
-        msg = (
+        raise SourceError(
             f"{path} has {layer.counts.unreadable} features that cannot be read "
             f"({layer.errors[0]}); correct the file."
         )
-        raise SourceError(msg)
     return layer.table, layer.notes

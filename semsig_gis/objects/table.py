@@ -288,8 +288,7 @@ def _licences(specs: Mapping[str, Any], sources: Iterable[str]) -> tuple[Licence
     for line, names in zip(lines, specs[LICENSE_LAYERS], strict=True):
         end = f"{BEFORE_LAYERS}{BETWEEN_LAYERS.join(names)}" if names else ""
         if not line.endswith(end):
-            msg = f"licence {line!r} is not that of {names}"
-            raise ValueError(msg)
+            raise ValueError(f"licence {line!r} is not that of {names}")
         licences.append(Licence(line.removesuffix(end), tuple(names)))
     return tuple(licences)
 
@@ -373,12 +372,14 @@ def objects_of(
         notes = tuple(map(str, specs.get(NOTES, ())))
         xy = wkb_to_points(arrow[GEOMETRY])
     except (TypeError, ValueError, LookupError, pa.ArrowException) as error:
-        msg = f"{path} is damaged ({error}); load the street objects again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(
+            f"{path} is damaged ({error}); load the street objects again."
+        ) from error
     some = len(arrow) > 0 or box is not None
     if not (some and len(xy) == len(arrow) and np.isfinite(xy).all()):
-        msg = f"{path} is damaged (it has rows without a position); load the street objects again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{path} is damaged (it has rows without a position); load the street objects again."
+        )
     if box is not None:
         inside = ((xy >= box[:2]) & (xy <= box[2:])).all(axis=1)
         arrow, codes, xy = arrow.filter(pa.array(inside)), codes[inside], xy[inside]
@@ -406,5 +407,4 @@ def _require_columns(arrow: pa.Table) -> None:
         if (field.name in NUMBERS and not pa.types.is_integer(kind)) or (
             field.name in TEXTS and kind not in {pa.string(), pa.large_string(), pa.null()}
         ):
-            msg = f"its column {field.name} contains {kind}"
-            raise TypeError(msg)
+            raise TypeError(f"its column {field.name} contains {kind}")

@@ -167,8 +167,7 @@ def _leg(row: Row, north: North, sigma: float) -> Leg | None:
         return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
     if values.keys() == set(TOWARDS):
         return Leg.towards(values["bearing"] + north.turn, values["distance"], sigma=sigma)
-    msg = "its step from the line before needs dx and dy, or distance and bearing"
-    raise InputError(msg)
+    raise InputError("its step from the line before needs dx and dy, or distance and bearing")
 
 
 def _route(rows: list[tuple[int, _Stop]], source: str, track: Track | None) -> Route:
@@ -181,8 +180,7 @@ def _route(rows: list[tuple[int, _Stop]], source: str, track: Track | None) -> R
         if (stop.leg is None) != (number == 0 or track is not None):
             gives = number == 0 or track
             fault = "gives a step" if gives else "does not give the step from the line before"
-            msg = f"line {line} of {source} {fault}; {advice}."
-            raise InputError(msg)
+            raise InputError(f"line {line} of {source} {fault}; {advice}.")
     if track is None:
         return views, [stop.leg for stop in stops if stop.leg is not None]
     steps = np.diff(track.places([stop.time for stop in stops]), axis=0).tolist()

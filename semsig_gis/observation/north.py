@@ -68,14 +68,14 @@ class North:
         no such north; InputError if a date is given for another, or lies outside `MODELLED`.
         """
         if name not in NORTHS:
-            msg = f"north {name!r} is unknown{nearest_name(name, NORTHS)}; give one of {NORTHS}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"north {name!r} is unknown{nearest_name(name, NORTHS)}; give one of {NORTHS}."
+            )
         if date is not None and name != "magnetic":
-            msg = (
+            raise InputError(
                 f"a date was given for {name} north, but only magnetic north changes with "
                 "time; leave it out."
             )
-            raise InputError(msg)
         if name == "grid":
             return cls()
         places = _places(database)
@@ -133,8 +133,9 @@ def declination(
 
     first, last = MODELLED
     if not first <= date <= last:
-        msg = f"the date {date} was given for magnetic north; give one from {first} to {last}."
-        raise InputError(msg)
+        raise InputError(
+            f"the date {date} was given for magnetic north; give one from {first} to {last}."
+        )
     day = dt.datetime.combine(date, dt.time())
     east, north, _ = ppigrf.igrf(lon, lat, 0.0, day)
     return np.asarray(np.degrees(np.arctan2(east, north))).reshape(-1)

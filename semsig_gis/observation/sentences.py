@@ -111,11 +111,10 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
     columns = [name for name in COLUMNS if name in told]
     photos = ["photos"] if "photos" in told else []
     if len(lists) > 1 or (lists and columns + photos):
-        msg = (
+        raise InputError(
             f"{' and '.join(lists + photos + columns)} were given; describe what was seen "
             "in one of these ways."
         )
-        raise InputError(msg)
     if photos and not columns:
         return _joined_view(told, taxonomy, radius)
     if lists:
@@ -146,11 +145,10 @@ def require_seen(row: Row) -> None:
     """Refuse a row that does not say what was seen, not even that it was nothing."""
     # Without their names, an empty row would be one that saw nothing, whatever it was meant for.
     if all(row.get(name) is None for name in SEEN):
-        msg = (
+        raise InputError(
             "it needs types, bearings or both, or detections, see or photos, which may be empty "
             "where nothing was seen"
         )
-        raise InputError(msg)
 
 
 def _joined_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
@@ -163,11 +161,10 @@ def _joined_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
     if len(views) == 1:
         return views[0]
     if not views or any(view.bearings is None for view in views):
-        msg = (
+        raise InputError(
             "there are no photos, or objects in them have no bearing; give at least one photo, "
             "and a bearing for each object."
         )
-        raise InputError(msg)
     return View.joined(views).turned(0.0)
 
 
@@ -191,11 +188,13 @@ def _column_view(told: Row, taxonomy: Taxonomy, radius: float) -> View:
     photos = [_photo(look | one) for one in _mappings(told, "photos")] or [_photo(look)]
     owners = [_number("photo", one) for one in _values(told.get("photo", []))]
     if any(one not in range(len(photos)) for one in owners):
-        msg = f"photo was given as {told['photo']!r}; give numbers from 0 to {len(photos) - 1}."
-        raise InputError(msg)
+        raise InputError(
+            f"photo was given as {told['photo']!r}; give numbers from 0 to {len(photos) - 1}."
+        )
     if len(photos) > 1 and "photo" not in told:
-        msg = "several photos were given, but not which one each object is in; give photo as well."
-        raise InputError(msg)
+        raise InputError(
+            "several photos were given, but not which one each object is in; give photo as well."
+        )
     known = np.full(len(plain), WILDCARD) if codes is None else codes
     ranges, errors = _ranges(told, taxonomy.ranges(radius)[known])
     return View.of(
@@ -222,16 +221,16 @@ def _columns(items: Sequence[Row], told: Row, taxonomy: Taxonomy) -> Row:
     if not ways and items:
         return columns
     if any((one.get("bearing") is None) == (one.get("offset") is None) for one in items):
-        msg = "a detection has neither a bearing nor an offset, or both; give it one of them."
-        raise InputError(msg)
+        raise InputError(
+            "a detection has neither a bearing nor an offset, or both; give it one of them."
+        )
     heading = told.get("heading")
     if "offset" in ways and heading is None:
         if "bearing" in ways or told.get("heading_error", "unknown") != "unknown":
-            msg = (
+            raise InputError(
                 "offsets were given with bearings or an error of the heading, but without the "
                 "heading that they are measured from; give it as well."
             )
-            raise InputError(msg)
         heading = 0.0
         columns |= {"heading": heading, "heading_error": "unknown"}
     columns["bearings"] = [
@@ -299,8 +298,9 @@ def _class(told: object, taxonomy: Taxonomy) -> str | Row:
     if isinstance(told, dict):
         return told
     if not isinstance(told, str):
-        msg = f"the class of a detection is {told!r}; give a symbol, a word or scores by word."
-        raise InputError(msg)
+        raise InputError(
+            f"the class of a detection is {told!r}; give a symbol, a word or scores by word."
+        )
     from semsig_gis.sources.keywords import class_code  # noqa: PLC0415 - it loads slowly
 
     return taxonomy.decode([class_code(told, taxonomy)])
@@ -315,8 +315,9 @@ def _scores(told: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
         scores[class_code(word, taxonomy)] += _number(f"the score of {word!r}", chance)
     rest = 1.0 - scores.sum()
     if not ((scores >= 0).all() and rest >= -ROUNDING):  # false for NaN too
-        msg = f"scores {told!r} are not chances; give numbers from 0 that add up to at most 1."
-        raise InputError(msg)
+        raise InputError(
+            f"scores {told!r} are not chances; give numbers from 0 that add up to at most 1."
+        )
     scores[WILDCARD] += rest if rest > ROUNDING else 0.0
     return scores
 
@@ -339,8 +340,9 @@ def _ranges(
         values = _values(values) if isinstance(values, (str, list)) else [values] * len(furthest)
         if len(values) != len(furthest):
             what = name.replace("_", " ")
-            msg = f"{len(values)} {what} were given for {len(furthest)} objects; give one for each."
-            raise InputError(msg)
+            raise InputError(
+                f"{len(values)} {what} were given for {len(furthest)} objects; give one for each."
+            )
         columns.append(values)
     pairs = [_range(word, far) for word, far in zip(columns[0], furthest.tolist(), strict=True)]
     ranges, guessed = np.array(pairs).reshape(-1, 2).T
@@ -365,11 +367,10 @@ def _range(told: object, furthest: float) -> tuple[float, float]:
     match = _METRES.fullmatch(text)
     metres = float(match["metres"]) if match else 0.0
     if match is None or not 0 < metres <= MAX_RANGE_M:
-        msg = (
+        raise InputError(
             f"range {told!r} cannot be read; give metres, 'within 12 m', 'near', 'middle' or "
             "'far', or '?' if it is not known."
         )
-        raise InputError(msg)
     return _spread(0.0, metres) if match["within"] else (metres, math.nan)
 
 
@@ -394,14 +395,12 @@ def _photo(look: Row) -> Photo:
     if fov is None:
         return Photo(sectors=_sectors(look.get("sectors", [])), north_sigma=sigma)
     if "sectors" in look:
-        msg = "a field of view was given with sectors; give one of the two."
-        raise InputError(msg)
+        raise InputError("a field of view was given with sectors; give one of the two.")
     if heading is None:
-        msg = (
+        raise InputError(
             "a field of view was given without the heading of the camera (--look); give the "
             "heading as well, or give sectors instead."
         )
-        raise InputError(msg)
     heading, fov = _number("heading", heading), _number("fov", fov)
     return Photo.looking(heading=heading, fov=fov, north_sigma=sigma)
 
@@ -417,11 +416,10 @@ def _sectors(told: object) -> tuple[tuple[float, float], ...]:
         isinstance(pair, list) and len(pair) == PAIR for pair in told
     ):
         return tuple((_number("a sector", start), _number("a sector", end)) for start, end in told)
-    msg = (
+    raise InputError(
         f"sectors were given as {told!r}; give bearings clockwise from one to the other, such as "
         "20-90,180-250 or [[20, 90], [180, 250]]."
     )
-    raise InputError(msg)
 
 
 def _spaced(text: str) -> str:
@@ -441,8 +439,9 @@ def _mappings(told: Row, name: str) -> list[Row]:
     """Return a list of mappings of names to values."""
     values = told.get(name, [])
     if not (isinstance(values, list) and all(isinstance(one, dict) for one in values)):
-        msg = f"{name} were given as {values!r}; give a list of mappings of names to values."
-        raise InputError(msg)
+        raise InputError(
+            f"{name} were given as {values!r}; give a list of mappings of names to values."
+        )
     return values
 
 
@@ -450,5 +449,4 @@ def _number(what: str, told: Any) -> float:  # noqa: ANN401 - any value of JSON
     try:
         return float(told)
     except (TypeError, ValueError) as error:
-        msg = f"{what} was given as {told!r}; give a number."
-        raise InputError(msg) from error
+        raise InputError(f"{what} was given as {told!r}; give a number.") from error

@@ -48,32 +48,30 @@ class Track:
         known = [one.timestamp() for one in times if one is not None]
         if not known:
             if len(times) != len(self.xy):
-                msg = (
+                raise InputError(
                     f"{self.source} has {len(self.xy):,} points for {len(times):,} views without a "
                     "time; give each view its time, or a track with one point for each view."
                 )
-                raise InputError(msg)
             return self.xy
         if len(known) < len(times):
             number = times.index(None) + 1
-            msg = f"view {number} of the route has no time as others have; give all views theirs."
-            raise InputError(msg)
+            raise InputError(
+                f"view {number} of the route has no time as others have; give all views theirs."
+            )
         if self.times is None:
-            msg = (
+            raise InputError(
                 f"{self.source} has no times; leave out the times of the views, and give one point "
                 "for each."
             )
-            raise InputError(msg)
         asked = np.array(known)
         outside = np.flatnonzero((asked < self.times[0]) | (asked > self.times[-1]))
         if len(outside):
             first, last = (_said(float(one)) for one in self.times[[0, -1]])
-            msg = (
+            raise InputError(
                 f"view {outside[0] + 1} of the route is from {_said(known[outside[0]])}, and "
                 f"{self.source} from {first} to {last}; give the track of that walk, or times "
                 "with their zone."
             )
-            raise InputError(msg)
         return np.column_stack([np.interp(asked, self.times, axis) for axis in self.xy.T])
 
 
@@ -86,25 +84,23 @@ def read_track(path: str | Path, *, crs: CRS) -> Track:
     try:
         text = read_text(path)
         if "<!DOCTYPE" in text:  # which may define texts that swell
-            msg = "it defines its own document type"
-            raise ValueError(msg)  # noqa: TRY301 - as others below
+            raise ValueError("it defines its own document type")  # noqa: TRY301 - as others below
         root = ET.fromstring(text)  # noqa: S314 - without a document type
         kinds = {name: [one for one in root.iter() if _name(one) == name] for name in POINTS}
         points = next(filter(None, kinds.values()), [])
         if not points:
-            msg = "it has no points"
-            raise ValueError(msg)  # noqa: TRY301 - as others below
+            raise ValueError("it has no points")  # noqa: TRY301 - as others below
         degrees = np.array([[float(one.attrib[key]) for key in ("lon", "lat")] for one in points])
         times = [_time(one) for one in points]
     except (OSError, ET.ParseError, KeyError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        msg = f"track {path} cannot be read ({reason}); give a GPX file."
-        raise InputError(msg) from error
+        raise InputError(f"track {path} cannot be read ({reason}); give a GPX file.") from error
     x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(*degrees.T)
     xy = np.column_stack([x, y])
     if not np.isfinite(xy).all():
-        msg = f"track {path} has points that are not on the globe; give latitudes and longitudes."
-        raise InputError(msg)
+        raise InputError(
+            f"track {path} has points that are not on the globe; give latitudes and longitudes."
+        )
     known = [one.timestamp() for one in times if one is not None]
     if len(known) < len(points):
         return Track(source=str(path), xy=xy, times=None)
@@ -117,8 +113,9 @@ def parse_time(text: object) -> dt.datetime:
     try:
         time = dt.datetime.fromisoformat(str(text).strip())
     except ValueError as error:
-        msg = f"time {text!r} cannot be read; give one as 2024-05-31T14:05:09Z"
-        raise InputError(msg) from error
+        raise InputError(
+            f"time {text!r} cannot be read; give one as 2024-05-31T14:05:09Z"
+        ) from error
     return time if time.tzinfo else time.replace(tzinfo=dt.UTC)
 
 

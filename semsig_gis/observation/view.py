@@ -60,8 +60,9 @@ def _joined(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
         if width < 0 or width > FULL_TURN:
             width %= FULL_TURN
         if width == 0:
-            msg = f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
-            raise InputError(msg)
+            raise InputError(
+                f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
+            )
         low = float(wrap_degrees(start))
         spans.append((low, low + width))
     merged: list[Sector] = []
@@ -117,8 +118,9 @@ class Photo:
         """Return the photo of a camera that looks at a bearing and sees `fov` degrees around it."""
         require_number("heading", heading, least=-FULL_TURN, most=FULL_TURN, unit="degrees")
         if not 0 < fov <= FULL_TURN:
-            msg = f"a field of view of {fov} degrees was given; give degrees above 0, at most 360."
-            raise InputError(msg)
+            raise InputError(
+                f"a field of view of {fov} degrees was given; give degrees above 0, at most 360."
+            )
         start = float(wrap_degrees(heading - fov / 2.0))
         sector = start, start + fov
         return cls(sectors=() if fov == FULL_TURN else (sector,), north_sigma=north_sigma)
@@ -216,38 +218,40 @@ class View(Signature):
         """Refuse parts that do not fit each other, or numbers out of range."""
         plain = self.photos == (FULL_VIEW,) and self.ranges is None
         if self.bearings is None and not plain:
-            msg = "a view with ranges or sectors needs the bearings of its objects; give them."
-            raise InputError(msg)
+            raise InputError(
+                "a view with ranges or sectors needs the bearings of its objects; give them."
+            )
         shapes = {"ranges": (), "range_errors": (), "photo": (), "scores": (CLASSES,)}
         for name, rest in shapes.items():
             value = getattr(self, name)
             if value is not None and value.shape != (len(self), *rest):
-                msg = (
+                raise InputError(
                     f"{len(value)} {name.replace('_', ' ')} were given for {len(self)} objects; "
                     "give one for each."
                 )
-                raise InputError(msg)
         for name, most in (("ranges", MAX_RANGE_M), ("range_errors", MOST_RANGE_ERROR)):
             value = getattr(self, name)
             if value is not None and len(
                 bad := value[~(np.isnan(value) | (value > 0)) | (value > most)]
             ):
                 what = name.replace("_", " ").removesuffix("s")
-                msg = f"a {what} is {bad[0]:g}; give a number above 0 and up to {most:,.0f}."
-                raise InputError(msg)
+                raise InputError(
+                    f"a {what} is {bad[0]:g}; give a number above 0 and up to {most:,.0f}."
+                )
         if self.scores is not None and len(self):
             sums = self.scores.sum(axis=1)
             if not ((self.scores >= 0).all() and np.allclose(sums, 1.0, atol=ROUNDING)):
-                msg = (
+                raise InputError(
                     "the scores of an object are not chances; give numbers from 0 that add up to 1."
                 )
-                raise InputError(msg)
         if not self.photos:
-            msg = "a view of no photo was given; give at least one, or leave photos out."
-            raise InputError(msg)
+            raise InputError(
+                "a view of no photo was given; give at least one, or leave photos out."
+            )
         if len(self) and not 0 <= self.photo_rows.min() <= self.photo_rows.max() < len(self.photos):
-            msg = f"an object is from a photo that is not there; the view has {len(self.photos)}."
-            raise InputError(msg)
+            raise InputError(
+                f"an object is from a photo that is not there; the view has {len(self.photos)}."
+            )
 
     @classmethod
     def of(cls, signature: Signature, **more: Any) -> View:  # noqa: ANN401 - any field

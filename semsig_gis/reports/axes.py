@@ -134,11 +134,10 @@ def plot_database(
     if column is None or isinstance(column, str):
         name = column or "length"
         if name not in COLUMNS:
-            msg = (
+            raise UnknownNameError(
                 f"{name!r} is not a column of the cells; give {', '.join(COLUMNS)} or a number for "
                 f"each cell{nearest_name(name, COLUMNS)}."
             )
-            raise UnknownNameError(msg)
         title, values = COLUMNS[name].title, _column(database, name)
         if not COLOUR_OPTIONS & look.keys():
             axes = map_axes(ax)
@@ -149,8 +148,9 @@ def plot_database(
     else:
         values, title = np.asarray(column, np.float64), str(getattr(column, "name", None) or "")
         if values.shape != (len(database),):
-            msg = f"{values.size} numbers were given for {len(database)} cells; give one for each."
-            raise InputError(msg)
+            raise InputError(
+                f"{values.size} numbers were given for {len(database)} cells; give one for each."
+            )
     axes = map_axes(ax)
     image = _draw_cells(axes, database, values, **look)
     if legend:
@@ -234,8 +234,7 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     'B Alignment tree (120)'
     """
     if not len(objects):
-        msg = "there is no street object to show; look at what was loaded."
-        raise EmptyResultError(msg)
+        raise EmptyResultError("there is no street object to show; look at what was loaded.")
     axes = map_axes(ax)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     smaller = min(max(CROWD / len(objects), 1 / 16), 1.0) ** 0.5
@@ -352,8 +351,9 @@ def plot_evaluation(
     """
     if kind not in get_args(PlotKind):
         kinds = ", ".join(get_args(PlotKind))
-        msg = f"{kind!r} is not a plot of an evaluation; give {kinds}{nearest_name(kind, CURVES)}."
-        raise UnknownNameError(msg)
+        raise UnknownNameError(
+            f"{kind!r} is not a plot of an evaluation; give {kinds}{nearest_name(kind, CURVES)}."
+        )
     if kind == "map":
         return _draw_outcomes(evaluation, map_axes(ax))
     axes = new_axes(CURVE_SIZE) if ax is None else ax
@@ -474,8 +474,9 @@ def _draw_cells(
 ) -> AxesImage:
     """Draw numbers of cells as an image; of cells that share a pixel in a large city, one."""
     if not len(database):
-        msg = "the database has no cells to show; give one with at least one cell."
-        raise EmptyResultError(msg)
+        raise EmptyResultError(
+            "the database has no cells to show; give one with at least one cell."
+        )
     image, side = cell_pixels(database, values, most=MOST_PIXELS)
     west, south = (database.xy.min(axis=0) - database.grid.step / 2).tolist()
     box = (west, west + side * image.shape[1], south, south + side * image.shape[0])

@@ -192,11 +192,11 @@ def _require_names(names: Sequence[str]) -> None:
     seen = set()
     for name in names:
         if not re.fullmatch(r"[A-Za-z0-9-]+", name):
-            msg = f"{name!r} cannot be a name in a report; write letters, digits and hyphens."
-            raise InputError(msg)
+            raise InputError(
+                f"{name!r} cannot be a name in a report; write letters, digits and hyphens."
+            )
         if name.lower() in seen:
-            msg = f"{name!r} is in the report twice; give each part a name of its own."
-            raise InputError(msg)
+            raise InputError(f"{name!r} is in the report twice; give each part a name of its own.")
         seen.add(name.lower())
 
 

@@ -260,8 +260,7 @@ def draw_scenes(scenes: Sequence[Scene]) -> Picture:
     2
     """
     if not scenes:
-        msg = "there is no scene to draw; give at least one."
-        raise InputError(msg)
+        raise InputError("there is no scene to draw; give at least one.")
     columns = [_Column.of(scene) for scene in scenes]
     above, below = (max(sizes) for sizes in zip(*(one.sizes for one in columns), strict=True))
     width, height = WIDTH * len(columns), above + MAP + below

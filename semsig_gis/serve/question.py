@@ -79,16 +79,14 @@ class Question:
             places[-1] += _photos(row, number, taxonomy, radius)
             own.append(len(places) - 1)
         if not any(places):
-            msg = "nothing is marked yet; mark an object that you see."
-            raise InputError(msg)
+            raise InputError("nothing is marked yet; mark an object that you see.")
         views, marks = zip(*(_joined(photos) for photos in places if photos), strict=True)
         legs, kept = _kept(places, ways)
         last = len(rows) - 1
         shown = _whole(body.get("view", last), "view", most=last)
         seen_from = body.get("seen_from", "anywhere")
         if seen_from not in get_args(SeenFrom):
-            msg = f"seen_from was given as {seen_from!r}; give cells or anywhere."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(f"seen_from was given as {seen_from!r}; give cells or anywhere.")
         truth = body.get("truth")
         return cls(
             views=views,
@@ -130,8 +128,7 @@ class Question:
 def degrees(told: object) -> tuple[float, float]:
     """Return a latitude and a longitude."""
     if not (isinstance(told, list) and len(told) == POINT):
-        msg = f"a place was given as {told!r}; give latitude and longitude."
-        raise InputError(msg)
+        raise InputError(f"a place was given as {told!r}; give latitude and longitude.")
     return number(told[0], "a latitude", most=90.0), number(told[1], "a longitude", most=360.0)
 
 
@@ -140,8 +137,7 @@ def _near(told: object) -> str | None:
     if told is None:
         return None
     if not (isinstance(told, list) and len(told) == POINT + 1):
-        msg = f"near was given as {told!r}; give latitude, longitude and metres."
-        raise InputError(msg)
+        raise InputError(f"near was given as {told!r}; give latitude, longitude and metres.")
     lat, lon = degrees(told[:POINT])
     metres = number(told[POINT], "the deviation of a place")
     return (
@@ -155,8 +151,7 @@ def number(told: object, what: str, *, most: float = math.inf) -> float:
     plain = isinstance(told, int | float) and not isinstance(told, bool)
     if not plain or not math.isfinite(value := float(told)) or abs(value) > most:  # type: ignore[arg-type]
         limit = "" if math.isinf(most) else f" from {-most:g} to {most:g}"
-        msg = f"{what} was given as {told!r}; give a number{limit}."
-        raise InputError(msg)
+        raise InputError(f"{what} was given as {told!r}; give a number{limit}.")
     return value
 
 
@@ -223,8 +218,9 @@ def _detections(
         if box is None:
             box = [mark.get("x"), mark.get("y")] * 2
         if not (isinstance(box, list) and len(box) == BOX):
-            msg = f"a box was given as {box!r}; give left, top, right and bottom in pixels."
-            raise InputError(msg)
+            raise InputError(
+                f"a box was given as {box!r}; give left, top, right and bottom in pixels."
+            )
         corners.append([number(side, "a mark", most=1e6) for side in box])
         heights.append(_height(mark, taxonomy))
     edges = np.array(corners).reshape(-1, BOX)
@@ -323,32 +319,37 @@ def _codes(told: object, taxonomy: Taxonomy) -> tuple[int, ...]:
     """Return the codes of some classes, by name."""
     codes = {item.name: item.code for item in taxonomy.classes}
     if not isinstance(told, list) or not all(isinstance(name, str) for name in told):
-        msg = f"absent was given as {str(told)[:60]!r}; give a list of names of classes."
-        raise InputError(msg)
+        raise InputError(
+            f"absent was given as {str(told)[:60]!r}; give a list of names of classes."
+        )
     for name in told:
         if name not in codes:
-            msg = f"{name!r} is not a class of this city{nearest_name(name, codes)}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"{name!r} is not a class of this city{nearest_name(name, codes)}."
+            )
     return tuple(dict.fromkeys(codes[name] for name in told))
 
 
 def _mapping(told: object, what: str) -> Mapping[str, Any]:
     if not isinstance(told, dict):
-        msg = f"{what} was given as {str(told)[:60]!r}; give a mapping of names to values."
-        raise InputError(msg)
+        raise InputError(
+            f"{what} was given as {str(told)[:60]!r}; give a mapping of names to values."
+        )
     return told
 
 
 def _mappings(told: Mapping[str, Any], name: str, *, most: int) -> list[Mapping[str, Any]]:
     values = told.get(name)
     if not isinstance(values, list) or len(values) > most:
-        msg = f"{name} were given as {str(values)[:60]!r}; give a list of at most {most}."
-        raise InputError(msg)
+        raise InputError(
+            f"{name} were given as {str(values)[:60]!r}; give a list of at most {most}."
+        )
     return [_mapping(one, f"one of the {name}") for one in values]
 
 
 def _whole(told: object, what: str, *, least: int = 0, most: int) -> int:
     if not isinstance(told, int) or isinstance(told, bool) or not least <= told <= most:
-        msg = f"{what} was given as {told!r}; give a whole number from {least} to {most:,}."
-        raise InputError(msg)
+        raise InputError(
+            f"{what} was given as {told!r}; give a whole number from {least} to {most:,}."
+        )
     return told

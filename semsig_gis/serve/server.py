@@ -172,11 +172,11 @@ async def _json(request: Request) -> Mapping[str, Any]:
     try:
         told = parse_json(await _body(request), finite=True)
     except ValueError as error:
-        msg = f"the request is not JSON ({error}); send a mapping of names to values."
-        raise InputError(msg) from error
+        raise InputError(
+            f"the request is not JSON ({error}); send a mapping of names to values."
+        ) from error
     if not isinstance(told, dict):
-        msg = "the request is not a mapping of names to values; send one as JSON."
-        raise InputError(msg)
+        raise InputError("the request is not a mapping of names to values; send one as JSON.")
     return told
 
 
@@ -231,11 +231,10 @@ def listening(port: int) -> socket.socket:
         listener.listen()
     except OSError as error:
         listener.close()
-        msg = (
+        raise InputError(
             f"port {port} of this machine is not available ({error.strerror}); give another "
             "--port, or leave it out to use any that is free."
-        )
-        raise InputError(msg) from error
+        ) from error
     return listener
 
 

@@ -244,11 +244,10 @@ class Workbench:
                 found.setdefault(key, []).extend(self._marks(detector, picture, tally))
         if not found:
             listed = ", ".join(sorted({picture.name for picture in pictures})[:3]) or "no picture"
-            msg = (
+            raise InputError(
                 f"{name} has boxes of {listed}, and none of these photos is open here; open them "
                 "first."
             )
-            raise InputError(msg)
         return {"photos": found, "notes": _left_out(tally)}
 
     def _marks(self, detector: Detector, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
@@ -296,8 +295,9 @@ class Workbench:
     def export(self, told: object, suffix: str) -> bytes:
         """Return the answer to a question as a file."""
         if suffix not in FORMATS:
-            msg = f"the format {suffix!r} is unknown; give one of {', '.join(FORMATS)}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"the format {suffix!r} is unknown; give one of {', '.join(FORMATS)}."
+            )
         _, location = self._located(told)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, f"answer.{suffix}")
@@ -312,8 +312,9 @@ class Workbench:
     def _known_noise(self, name: object) -> str:
         if not (isinstance(name, str) and name in self.noises):
             hint = nearest_name(str(name), self.noises)
-            msg = f"{name!r} is not a noise model here; give one of {', '.join(self.noises)}{hint}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"{name!r} is not a noise model here; give one of {', '.join(self.noises)}{hint}."
+            )
         return name
 
     def _index(self, question: Question) -> LikelihoodIndex:
@@ -404,8 +405,7 @@ class Workbench:
         place = to_metres((lat, lon), self.database.crs)
         cell = int(self.database.cells_at(place)[0])
         if cell < 0:
-            msg = "there is no cell at that place; choose one that is shaded."
-            raise InputError(msg)
+            raise InputError("there is no cell at that place; choose one that is shaded.")
         return [lat, lon], place, cell
 
     def simulate(self, told: Mapping[str, Any]) -> dict[str, Any]:
@@ -427,8 +427,7 @@ class Workbench:
             chain.append(FailingDetector(noise=self.noises[self._known_noise(noise)]))
         seed = told.get("seed", 0)
         if not isinstance(seed, int) or not 0 <= seed <= 10**18:
-            msg = f"a seed was given as {seed!r}; give a whole number from 0 to 10**18."
-            raise InputError(msg)
+            raise InputError(f"a seed was given as {seed!r}; give a whole number from 0 to 10**18.")
         seen = ready_chain(chain, CitySights.of(database))(sight, seed, 0)
         return {
             "view": {

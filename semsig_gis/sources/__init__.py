@@ -160,19 +160,17 @@ def reader(name: str) -> Reader:
     if name in others:
         return others[name]
     names = sorted({*READERS, *others})
-    msg = (
+    raise UnknownNameError(
         f"reader {name!r} is unknown{nearest_name(name, names)}; "
         f"the readers are {', '.join(names)}."
     )
-    raise UnknownNameError(msg)
 
 
 def require_file(path: Path, kind: str) -> None:
     """Refuse a path that is not a file, with a SourceError that says which kind is needed."""
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist"
-        msg = f"{path} {what}; give {kind}."
-        raise SourceError(msg)
+        raise SourceError(f"{path} {what}; give {kind}.")
 
 
 def file_reader(path: Path, *, sure: bool = False) -> str | None:
@@ -233,8 +231,7 @@ def find_files(
             candidates = [*candidates, *tagged]
         if len(candidates) > 1 and not (spec.unique_id or merging):
             names = " and ".join(str(path) for path in candidates)
-            msg = f"layer {spec.name!r} is matched by {names}; give one of them."
-            raise SourceError(msg)
+            raise SourceError(f"layer {spec.name!r} is matched by {names}; give one of them.")
         pairs.extend((spec, path) for path in candidates)
         if not candidates:
             missing.append(spec)
@@ -250,8 +247,7 @@ def _sorted_out(
     tagged: list[Path] = []
     for path in dict.fromkeys(Path(item) for item in paths):
         if not path.exists():
-            msg = f"{path} does not exist; give a file or a folder of files."
-            raise SourceError(msg)
+            raise SourceError(f"{path} does not exist; give a file or a folder of files.")
         inside = files_in(path) if path.is_dir() else [path]
         if any(_matches(file, spec.files) for file in inside for spec in specs):
             (in_folders if path.is_dir() else files).extend(inside)
@@ -299,5 +295,4 @@ def _refuse(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
     verb = "contains no file of" if path.is_dir() else "is not the file of"
     tags = any(spec.reader == TAGS_READER for spec in specs)
     more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
-    msg = f"{path} {verb} any layer; the layers and their files are {known}{more}."
-    raise SourceError(msg)
+    raise SourceError(f"{path} {verb} any layer; the layers and their files are {known}{more}.")

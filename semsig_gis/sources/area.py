@@ -86,18 +86,16 @@ class Tile:
 def tiles_of(area: Area, tile_deg: float, *, remedy: str) -> list[Tile]:
     """Return tiles of at most so many degrees that touch an area; InputError for too many."""
     if not tile_deg > 0:
-        msg = f"tile_deg is {tile_deg}; give degrees above 0."
-        raise InputError(msg)
+        raise InputError(f"tile_deg is {tile_deg}; give degrees above 0.")
     shapely.prepare(area.polygon)
     tiles: list[Tile] = []
     for west, south, east, north in area.boxes:
         columns, rows = (math.ceil(side / tile_deg - 1e-9) for side in (east - west, north - south))
         if columns * rows > MOST_TILES:
-            msg = (
+            raise InputError(
                 f"the area takes {columns * rows:,} requests, and at most {MOST_TILES:,} are sent; "
                 f"{remedy}."
             )
-            raise InputError(msg)
         grid = Tile((west, south, east, north)).parts(max(1, columns), max(1, rows), splits=0)
         tiles.extend(_touching(area, grid))
     return tiles
@@ -114,11 +112,10 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     if NUMBERS.fullmatch(text):
         return _box(text)
     if names_place(text):
-        msg = (
+        raise InputError(
             f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
             "degrees, or the path of a file with polygons."
         )
-        raise InputError(msg)
     return _outline(Path(text))
 
 
@@ -159,11 +156,10 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
         boxes = [layer.extent.polygon for layer in layers if layer.extent is not None]
         polygon = join_areas(np.array(boxes, dtype=object))
         if polygon is None:
-            msg = (
+            raise InputError(
                 f"none of the files states the area that it covers, so there is no {BOX!r} to clip "
                 "to; write west,south,east,north in degrees, or the path of a file with polygons."
             )
-            raise InputError(msg)
         area = Area(polygon, BOX)
     return tuple(clip_layer(layer, area) for layer in layers)
 
@@ -223,20 +219,20 @@ def _box(text: str) -> Area:
     try:
         west, south, east, north = (float(number) for number in text.split(","))
     except ValueError as error:
-        msg = f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
-        raise InputError(msg) from error
+        raise InputError(
+            f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
+        ) from error
     # What seems to go round more than half of the Earth is a slip.
     across = east < west and east + FULL_TURN - west < HALF_TURN
     on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
     if not (on_earth and (west < east or across)) or not (
         -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
     ):
-        msg = (
+        raise InputError(
             f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
             "west below east within -180 to 180, or above it across 180 degrees, and south below "
             "north within -90 to 90."
         )
-        raise InputError(msg)
     spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
     boxes = [shapely.box(left, south, right, north) for left, right in spans if left < right]
     return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
@@ -246,24 +242,23 @@ def _outline(path: Path) -> Area:
     polygons = LayerSpec(name="area", class_name="", geometry="polygon")
     layer = vector_file.read_layer(path, polygons)
     if layer.errors:
-        msg = f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
-        raise InputError(msg)
+        raise InputError(
+            f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
+        )
     return _joined(layer.table.geometry, str(path), name=path.stem, kind="file")
 
 
 def _joined(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
     """Return the area of polygons, which are all that there may be."""
     if shapes.crs is None:
-        msg = f"{where} has no coordinate reference system; state it with set_crs."
-        raise CrsError(msg)
+        raise CrsError(f"{where} has no coordinate reference system; state it with set_crs.")
     geometry = shapes.dropna()
     others = sorted(set(geometry.geom_type) - POLYGONAL)
     polygon = None if others else join_areas(geometry.to_crs(WGS84).to_numpy())
     if polygon is None:
         kinds = ", ".join(others) or "nothing"
         what = "encloses no area" if len(geometry) and not others else f"contains {kinds}"
-        msg = f"{where} {what}; give a {kind} of polygons."
-        raise InputError(msg)
+        raise InputError(f"{where} {what}; give a {kind} of polygons.")
     return Area(polygon, name)
 
 

@@ -135,11 +135,10 @@ class Catalog(Displayed):
             if spec.name == name:
                 return spec
         names = [spec.name for spec in self.layers]
-        msg = (
+        raise UnknownNameError(
             f"catalogue {self.name!r} has no layer {name!r}{nearest_name(name, names)}; "
             f"its layers are {', '.join(names)}."
         )
-        raise UnknownNameError(msg)
 
 
 def paper_taxonomy() -> Taxonomy:
@@ -213,26 +212,28 @@ def load_catalog(name: str | Path) -> Catalog:
     if text.endswith(".toml"):
         source = Path(text)
         if not source.is_file():
-            msg = f"catalogue {text} does not exist; give a TOML file or one of {_known()}."
-            raise CatalogError(msg)
+            raise CatalogError(
+                f"catalogue {text} does not exist; give a TOML file or one of {_known()}."
+            )
     else:
         sources = _sources()
         if text not in sources:
-            msg = (
+            raise UnknownNameError(
                 f"catalogue {text!r} is unknown{nearest_name(text, sources)}; "
                 f"give one of {_known()}, or the path of a .toml file."
             )
-            raise UnknownNameError(msg)
         source = sources[text]
     try:
         # A package may lie in an archive, whose members are no files.
         content = read_text(source) if isinstance(source, Path) else source.read_text("utf-8")
     except UnicodeDecodeError as error:
-        msg = f"catalogue {text} is not UTF-8 text ({error}); save it as UTF-8."
-        raise CatalogError(msg) from error
+        raise CatalogError(
+            f"catalogue {text} is not UTF-8 text ({error}); save it as UTF-8."
+        ) from error
     except OSError as error:
-        msg = f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
-        raise CatalogError(msg) from error
+        raise CatalogError(
+            f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
+        ) from error
     return _parsed(content, text)
 
 
@@ -262,8 +263,7 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     """
     names = [catalog.name for catalog in catalogs]
     if not names or len(set(names)) < len(names):
-        msg = f"the catalogues given are {names}; give one or more, each once."
-        raise InputError(msg)
+        raise InputError(f"the catalogues given are {names}; give one or more, each once.")
     if len(catalogs) == 1:
         return catalogs[0]
     classes = [item for catalog in catalogs for item in catalog.taxonomy.classes]
@@ -278,8 +278,9 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
             tuple(dataclasses.replace(kind, **said) for kind, said in measures.items())
         )
     except CatalogError as error:
-        msg = f"catalogues {' and '.join(names)} do not go together: {error}"
-        raise CatalogError(msg) from error
+        raise CatalogError(
+            f"catalogues {' and '.join(names)} do not go together: {error}"
+        ) from error
     return Catalog(
         name="+".join(names),
         title=" and ".join(catalog.title for catalog in catalogs),
@@ -322,8 +323,7 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
         if "metric_crs" in content:
             require_metric_crs(content["metric_crs"])
     except (CatalogError, CrsError) as error:
-        msg = f"{where}: {error}"
-        raise CatalogError(msg) from error
+        raise CatalogError(f"{where}: {error}") from error
     taxonomy = taxonomy.with_ranges(_ranges(content.get("ranges", {}), taxonomy, where))
     plain = {key: value for key, value in content.items() if CATALOG_KEYS[key] is str}
     shared: dict[str, Any] = {
@@ -338,8 +338,7 @@ def _catalog(content: dict[str, Any], where: str) -> Catalog:
     double = next((name for name in names if names.count(name) > 1), None)
     if double is not None or not names:
         what = f"two layers named {double!r}; rename one" if names else "no layer; add [[layers]]"
-        msg = f"{where} has {what}."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} has {what}.")
     radii = _metres_by_class(
         content.get("conflate", {}), taxonomy, f"{where}, conflate", most=MAX_MERGING_M
     )
@@ -357,8 +356,7 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
     for number, item in enumerate(items, start=1):
         place = f"{where}, class {number}"
         if not isinstance(item, dict):
-            msg = f"{place} is {item!r}; write a [[classes]] table."
-            raise CatalogError(msg)
+            raise CatalogError(f"{place} is {item!r}; write a [[classes]] table.")
         check_keys(item, {**CLASS_KEYS, **dict.fromkeys(MEASURES, object)}, place, CLASS_KEYS)
         lengths = {
             key: metres(item[key], key, place, most=most)
@@ -368,8 +366,7 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
         try:
             classes.append(ObjectClass(**{**item, **lengths}))
         except CatalogError as error:
-            msg = f"{place}: {error}"
-            raise CatalogError(msg) from error
+            raise CatalogError(f"{place}: {error}") from error
     return tuple(classes)
 
 
@@ -378,8 +375,9 @@ def _ranges(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> dict[str, f
     ranges = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
     double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
     if double is not None:
-        msg = f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
-        raise CatalogError(msg)
+        raise CatalogError(
+            f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
+        )
     return ranges
 
 

@@ -113,8 +113,9 @@ def open_csv(open_: Callable[[], IO[bytes]], what: str) -> CsvFile:
         names = next(file._values(separator), [])  # noqa: SLF001 - of this very class
         layouts[separator] = () if isinstance(names, str) else tuple(map(str.strip, names))
     if not any(name for names in layouts.values() for name in names):
-        msg = f"{what} is empty; give a file that begins with the names of its columns."
-        raise SourceError(msg)
+        raise SourceError(
+            f"{what} is empty; give a file that begins with the names of its columns."
+        )
     return CsvFile(open_, what, encoding, errors, layouts, notes)
 
 

@@ -84,8 +84,9 @@ class CsvTable:
         try:
             return usable_crs(CRS.from_epsg(self.srid).to_wkt())
         except CRSError as error:
-            msg = f"{self.file.what} states SRID={self.srid}, which is unknown; correct it."
-            raise SourceError(msg) from error
+            raise SourceError(
+                f"{self.file.what} states SRID={self.srid}, which is unknown; correct it."
+            ) from error
 
     def survey(self) -> tuple[int, str]:
         """Read all rows; return their number and what they are, in the words of GDAL."""
@@ -119,8 +120,7 @@ class CsvTable:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            msg = f"{name} {text!r} is not a number"
-            raise BadFeatureError(msg)
+            raise BadFeatureError(f"{name} {text!r} is not a number")
         return value
 
     def _shape(self, text: str) -> Position:
@@ -133,12 +133,14 @@ class CsvTable:
                     stated, plain = WELL_KNOWN.fullmatch(text).groups()  # type: ignore[union-attr]
                     shape, srid = shapely.from_wkt(plain), int(stated or 0)
         except (AttributeError, shapely.errors.ShapelyError) as error:
-            msg = f"{self.shape} {text[:LONGEST_SHOWN]!r} is not well-known text"
-            raise BadFeatureError(msg) from error
+            raise BadFeatureError(
+                f"{self.shape} {text[:LONGEST_SHOWN]!r} is not well-known text"
+            ) from error
         self.srid = self.srid or srid
         if srid not in {0, self.srid}:
-            msg = f"{self.shape} has SRID={srid}, and rows before it have {self.srid}"
-            raise BadFeatureError(msg)
+            raise BadFeatureError(
+                f"{self.shape} has SRID={srid}, and rows before it have {self.srid}"
+            )
         if isinstance(shape, shapely.Point) and not shape.is_empty:
             return shape.x, shape.y
         return shape
@@ -162,18 +164,18 @@ def csv_table(
             return CsvTable(file, separator, shape=shape)
     if spec is None:
         return CsvTable(file, file.separator)
-    msg = (
+    raise SourceError(
         f"{where} has no coordinate columns lon and lat, or x and y; name them in x_field and "
         f"y_field; its columns are {', '.join(file.layouts[file.separator])}."
     )
-    raise SourceError(msg)
 
 
 def _stated_table(file: CsvFile, x: str | None, y: str | None, *, where: str) -> CsvTable:
     """Return the table by the columns that the catalogue names."""
     if not (x and y):
-        msg = f"{where} has only one of x_field and y_field in the catalogue; state both."
-        raise CatalogError(msg)
+        raise CatalogError(
+            f"{where} has only one of x_field and y_field in the catalogue; state both."
+        )
     for separator, names in file.layouts.items():
         if x in names and y in names:
             return CsvTable(file, separator, x, y)

@@ -36,11 +36,10 @@ def told_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[s
         files = files_in(path) if path.is_dir() else [path]
         silent = next((file for file in files if _reader(file) is None), None if files else path)
         if silent is not None:
-            msg = (
+            raise InputError(
                 f"{silent} does not say what it contains; name its catalogue with --catalog "
                 "(`semsig sources` lists them), or draft one with `semsig draft`."
             )
-            raise InputError(msg)
         for file in files:
             name, what = TOLD[str(_reader(file))]
             names.append(name)

@@ -58,11 +58,10 @@ class Condition:
             if comparison:
                 comparisons.append((comparison[1], float(comparison[2])))
             elif COMPARES.match(text):
-                msg = (
+                raise CatalogError(
                     f"{text!r} is not a comparison; write one such as '>=0' or '>=0 or none', or "
                     f"'/{re.escape(text)}/' for that very text."
                 )
-                raise CatalogError(msg)
             elif part != NO_VALUE:
                 pattern_of(text)  # which refuses one that is none
                 values.append(part)
@@ -159,5 +158,6 @@ def pattern_of(accepted: str) -> re.Pattern[str] | None:
     try:
         return re.compile(inner[1]) if inner else None
     except re.error as error:
-        msg = f"pattern {accepted} is not a regular expression ({error}); correct it."
-        raise CatalogError(msg) from error
+        raise CatalogError(
+            f"pattern {accepted} is not a regular expression ({error}); correct it."
+        ) from error

@@ -168,8 +168,9 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     if found is None:
         near = nearest_name(text, (said for _, said in known.values()))
         legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in taxonomy.classes)
-        msg = f"class {word!r} is unknown{near}; give a word for one of these: {legend}."
-        raise UnknownNameError(msg)
+        raise UnknownNameError(
+            f"class {word!r} is unknown{near}; give a word for one of these: {legend}."
+        )
     return found
 
 

@@ -216,8 +216,7 @@ def layer_of(
     otherwise; surroundings have no exclusions but their own.
     """
     if not isinstance(item, dict):
-        msg = f"{where} has the layer {item!r}; write a [[layers]] table."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} has the layer {item!r}; write a [[layers]] table.")
     where = f"{where}, layer {item.get('name', '?')!r}"
     check_keys(item, LAYER_KEYS, where, ("name",))
     role = one_of(item.get("role", "objects"), "role", get_args(Role), where)
@@ -229,21 +228,21 @@ def layer_of(
         try:
             CRS.from_user_input(item["crs"])
         except CRSError as error:
-            msg = (
+            raise CatalogError(
                 f"{where} has crs = {item['crs']!r}, which is unknown; "
                 "write a code such as 'EPSG:4326'."
-            )
-            raise CatalogError(msg) from error
+            ) from error
     if role != "streets" and (of_streets := {"width_by", "width_field", "name_field"} & set(item)):
-        msg = f"{where} has {min(of_streets)}, which only streets have; remove it or add its role."
-        raise CatalogError(msg)
+        raise CatalogError(
+            f"{where} has {min(of_streets)}, which only streets have; remove it or add its role."
+        )
     if item.get("unique_id", False) and "id_field" not in item:
-        msg = f"{where} has unique_id = true without an id_field; name the field of the ids."
-        raise CatalogError(msg)
+        raise CatalogError(
+            f"{where} has unique_id = true without an id_field; name the field of the ids."
+        )
     files = texts(item.get("files", list(shared["files"])), "files", where)
     if not files and ("files" in item or "dataset" not in item):
-        msg = f"{where} has files = []; write a list of file names or patterns."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} has files = []; write a list of file names or patterns.")
     kinds = texts(item.get("elements", list(get_args(ElementKind))), "elements", where)
     exclusions = shared["exclusions"] if role == "objects" else ()
     if "not" in item:
@@ -278,17 +277,14 @@ def _require_classes(
     """Refuse objects without a class, and surroundings with one."""
     given = "class" in item
     if role == "objects" and not given and (class_by is None or class_by.otherwise):
-        msg = f"{where} lacks the key 'class'; add it."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} lacks the key 'class'; add it.")
     if role != "objects" and given:
-        msg = f"{where} needs no class; remove it."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} needs no class; remove it.")
 
 
 def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
     if not isinstance(item, dict) or not item:
-        msg = f"{where} has the tags {item!r}; write a table of keys and values."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} has the tags {item!r}; write a table of keys and values.")
     tags = tuple(
         (key, texts(value if isinstance(value, list) else [value], f"tag {key!r}", where))
         for key, value in item.items()
@@ -296,11 +292,10 @@ def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
     for key, values in tags:
         comparison = next(filter(COMPARES.match, values), None)
         if comparison is not None:
-            msg = (
+            raise CatalogError(
                 f"{where} has the tag {key!r} = {comparison!r}, and tags are exact; compare in "
                 f"where = {{ {key} = {comparison!r} }}."
             )
-            raise CatalogError(msg)
     return tags
 
 
@@ -309,23 +304,20 @@ def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
     try:
         taxonomy.by_name(name)
     except UnknownNameError as error:
-        msg = f"{where}: {error}"
-        raise CatalogError(msg) from error
+        raise CatalogError(f"{where}: {error}") from error
 
 
 def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
     where = f"{where}, class_by"
     check_keys(item, {**CLASS_BY_KEYS, "otherwise": str}, where, CLASS_BY_KEYS)
     if item.get("otherwise", OTHERWISE) != OTHERWISE:
-        msg = (
+        raise CatalogError(
             f"{where} has otherwise = {item['otherwise']!r}; write {OTHERWISE!r}, which gives "
             "other values the layer's class, or remove it, so that they are left out."
         )
-        raise CatalogError(msg)
     for value, name in item["values"].items():
         if not isinstance(name, str):
-            msg = f"{where} has {value!r} = {name!r}; write the name of a class."
-            raise CatalogError(msg)
+            raise CatalogError(f"{where} has {value!r} = {name!r}; write the name of a class.")
         require_class(name, taxonomy, where)
     return ClassBy(item["field"], tuple(item["values"].items()), "otherwise" in item)
 
@@ -352,16 +344,14 @@ def conditions_of(item: dict[str, Any], key: str, where: str) -> Rules:
 def _values(accepted: object, key: str, field: str, where: str) -> tuple[Value, ...]:
     values: list[Any] = accepted if isinstance(accepted, list) else [accepted]
     if not values or not all(isinstance(value, Value) for value in values):
-        msg = (
+        raise CatalogError(
             f"{where} filters {field!r} by {accepted!r}; "
             "write the accepted value, or a list of accepted values."
         )
-        raise CatalogError(msg)
     try:
         Condition.parse(values)
     except CatalogError as error:
-        msg = f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}"
-        raise CatalogError(msg) from error
+        raise CatalogError(f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}") from error
     return tuple(values)
 
 
@@ -370,5 +360,4 @@ def _rows(item: list[Any], where: str) -> tuple[int, int]:
         # bool is an int to Python, never to a catalogue
         case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
             return least, most
-    msg = f"{where} has rows = {item!r}; write [least, most]."
-    raise CatalogError(msg)
+    raise CatalogError(f"{where} has rows = {item!r}; write [least, most].")

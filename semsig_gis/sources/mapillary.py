@@ -93,8 +93,9 @@ def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:
             return features
     except (AttributeError, KeyError, OSError, TypeError, ValueError):
         pass
-    msg = f"{where or path} is not an answer of Mapillary about map features; download it again."
-    raise SourceError(msg)
+    raise SourceError(
+        f"{where or path} is not an answer of Mapillary about map features; download it again."
+    )
 
 
 def fetch_layers(
@@ -136,14 +137,17 @@ def fetch_layers(
             full = len(load_features(path)) >= MOST_FEATURES
         except HttpError as error:
             if error.status in UNAUTHORIZED:
-                msg = f"{error}".rstrip(".") + "; check whether the access token is still valid."
-                raise HttpError(msg, error.status) from error
+                raise HttpError(
+                    f"{error}".rstrip(".") + "; check whether the access token is still valid.",
+                    error.status,
+                ) from error
             if error.status != TOO_MUCH or last:
                 raise
             full = True
         if full and last:
-            msg = f"{host} sends no more than {MOST_FEATURES:,} features of even the smallest box."
-            raise SourceError(msg)
+            raise SourceError(
+                f"{host} sends no more than {MOST_FEATURES:,} features of even the smallest box."
+            )
         if full:
             waiting.extendleft(reversed(tile.quarters(area)))
             continue

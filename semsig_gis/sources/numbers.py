@@ -29,6 +29,5 @@ def decimal(text: str, *, english: bool = False) -> float:
     if ((commas and points) or max(commas, points) > 1) and GROUPED[mark].match(plain):
         plain = plain.replace(mark, "")
     if english and THOUSANDS_OR_NOT.fullmatch(plain):
-        msg = f"{text!r} is a decimal or a thousand"
-        raise ValueError(msg)
+        raise ValueError(f"{text!r} is a decimal or a thousand")
     return float(plain.replace(",", "."))

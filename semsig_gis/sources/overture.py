@@ -177,19 +177,19 @@ def _slices(
                 mask = pc.and_(_in_boxes(table, boxes), _may_have_tags(table, specs))
                 yield table.filter(mask)
     except (OSError, pa.ArrowException) as error:
-        msg = f"{path} cannot be read as GeoParquet ({_cause(error)}); download it again."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{path} cannot be read as GeoParquet ({_cause(error)}); download it again."
+        ) from error
 
 
 def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> list[str]:
     """Return the columns to read; SourceError if the file is none of Overture Maps."""
     keys = {key for spec in specs for tags in spec.tags for key, _ in tags}
     if not {"id", GEOMETRY} <= {*schema.names} or keys.isdisjoint(schema.names):
-        msg = (
+        raise SourceError(
             f"{where} is not a file of Overture Maps, which would have the columns id, geometry "
             f"and class; its columns are {', '.join(schema.names) or 'none at all'}."
         )
-        raise SourceError(msg)
     keys |= {field for spec in specs for _, field in spec.fields}
     own = {key for key in keys if {key, key.partition(".")[0]} & {*schema.names}}
     also = {SOURCE_TAGS} if keys - own else set()
@@ -317,21 +317,19 @@ def _open_store(address: str, spec: HttpSpec) -> tuple[fs.FileSystem, str]:
     parts = urlsplit(address)
     if parts.scheme != STORE:
         if "://" in address:
-            msg = (
+            raise CatalogError(
                 f"{address!r} is not a store; write s3://bucket/folder, or a folder of this "
                 "machine."
             )
-            raise CatalogError(msg)
         return fs.LocalFileSystem(), str(Path(address))
     options = dict(parse_qsl(parts.query))
     unknown = sorted(options.keys() - {*STORE_OPTIONS})
     if unknown or not parts.netloc:
         what = f"the unknown option {unknown[0]!r}" if unknown else "no bucket"
-        msg = (
+        raise CatalogError(
             f"{address!r} has {what}; write s3://bucket/folder?region=REGION, and perhaps "
             f"{' and '.join(STORE_OPTIONS[1:])}."
         )
-        raise CatalogError(msg)
     connect, read = spec.timeout
     system = fs.S3FileSystem(
         anonymous=True,
@@ -373,14 +371,14 @@ def _listing(
             if info.path.endswith(".parquet")
         ]
     except OSError as error:
-        msg = (
+        raise SourceError(
             f"{address} cannot be listed ({_cause(error)}); check the address, or load files of "
             "Overture Maps instead."
-        )
-        raise SourceError(msg) from error
+        ) from error
     if not files:
-        msg = f"{release} contains no files of {', '.join(kinds)}; name another store in endpoints."
-        raise SourceError(msg)
+        raise SourceError(
+            f"{release} contains no files of {', '.join(kinds)}; name another store in endpoints."
+        )
     with cache.locked(key) as entry:
         body = entry.scratch(".json")
         body.write_text(json.dumps({"release": Path(release).name, "files": files}), "utf-8")
@@ -392,8 +390,7 @@ def _latest(system: fs.FileSystem, folder: str) -> str:
     """Return the folder of the latest release, which is the folder itself if it has themes."""
     names = sorted(info.path for info in system.get_file_info(fs.FileSelector(folder)))
     if not names:
-        msg = "it contains nothing"
-        raise FileNotFoundError(msg)
+        raise FileNotFoundError("it contains nothing")
     return folder if any(PARTITION.search(Path(name).name) for name in names) else names[-1]
 
 

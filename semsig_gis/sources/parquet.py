@@ -25,8 +25,9 @@ def column_names(path: Path) -> list[str]:
     try:
         names: list[str] = pq.read_schema(path).names
     except UNREADABLE as error:
-        msg = f"{path} is damaged or is not a Parquet file; download it again."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{path} is damaged or is not a Parquet file; download it again."
+        ) from error
     return names
 
 
@@ -54,8 +55,10 @@ def read_parquet(
         )
     except shapely.errors.ShapelyError as error:
         cause = str(error).partition(": ")[2] or str(error)
-        msg = f"{path} has shapes that cannot be read ({cause.rstrip('.')}); correct the file."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{path} has shapes that cannot be read ({cause.rstrip('.')}); correct the file."
+        ) from error
     except UNREADABLE as error:
-        msg = f"{path} is damaged or is not GeoParquet; give a file of {kind}."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{path} is damaged or is not GeoParquet; give a file of {kind}."
+        ) from error

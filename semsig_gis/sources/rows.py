@@ -45,12 +45,12 @@ def parse_crs(text: str) -> CRS:
     try:
         crs = CRS.from_user_input(text)
     except CRSError as error:
-        msg = f"CRS {text!r} is unknown; {advice}."
-        raise CrsError(msg) from error
+        raise CrsError(f"CRS {text!r} is unknown; {advice}.") from error
     if crs.is_geocentric or crs.is_vertical:
         kind = crs.type_name.removesuffix(" CRS").lower()
-        msg = f"CRS {text!r} is {kind}, in which two coordinates do not give a place; {advice}."
-        raise CrsError(msg)
+        raise CrsError(
+            f"CRS {text!r} is {kind}, in which two coordinates do not give a place; {advice}."
+        )
     return crs
 
 
@@ -97,11 +97,10 @@ def settle_crs(
         return parse_crs(stated), ()
     if own is not None:
         return own, ()
-    msg = (
+    raise CrsError(
         f"{where} does not say which CRS its coordinates are in; "
         "state its crs, such as 'EPSG:2154' or 'EPSG:4326'."
     )
-    raise CrsError(msg)
 
 
 def off_the_globe(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.bool_]:
@@ -250,11 +249,10 @@ def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> di
                 "with x and y exchanged they would be, so exchange x_field and y_field in the "
                 "catalogue, or the axes in the file"
             )
-        msg = (
+        raise CrsError(
             f"{file} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
             f"{crs_label(crs)} means; {remedy}."
         )
-        raise CrsError(msg)
     return _refused(table.index[owner[wrong]], xy[wrong], f"are not in {crs_label(crs)}")
 
 
@@ -339,8 +337,7 @@ class RowRules:
             for value, _ in listed:
                 pattern_of(str(value))
         except CatalogError as error:
-            msg = f"{where}: {error}"
-            raise CatalogError(msg) from error
+            raise CatalogError(f"{where}: {error}") from error
         uses = [use for use in spec.fields if filters or use[0] not in {"where", "not"}]
         for key, column in uses:
             require_field(column, fields, where=where, key=key)
@@ -452,8 +449,7 @@ def _metres(value: object) -> float:
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:
     """Refuse a field that a file does not have; CatalogError lists the fields and the nearest."""
     if field not in fields:
-        msg = (
+        raise CatalogError(
             f"{where} has no field {field!r}, which the catalogue names in {key}"
             f"{nearest_name(field, fields)}; its fields are {', '.join(fields) or 'none at all'}."
         )
-        raise CatalogError(msg)

@@ -174,8 +174,7 @@ def whole_numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
     """
     array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     if array.null_count or not pa.types.is_integer(array.type):
-        msg = f"a column contains {array.type}, {array.null_count} missing"
-        raise ValueError(msg)
+        raise ValueError(f"a column contains {array.type}, {array.null_count} missing")
     kind = np.dtype(str(array.type))
     content = array.buffers()[1] if len(array) else b""
     return np.frombuffer(content, kind, count=len(array), offset=array.offset * kind.itemsize)
@@ -297,8 +296,7 @@ def require_intact(path: Path) -> None:
         start, footer = _footer(file)
         file.seek(max(start - len(SEAL) - SUM_BYTES, 0))
         if file.read(len(SEAL)) == SEAL and file.read(SUM_BYTES) != _sum(footer):
-            msg = "the checksum of its footer does not match"
-            raise ValueError(msg)
+            raise ValueError("the checksum of its footer does not match")
 
 
 def _footer(file: BinaryIO) -> tuple[int, bytes]:
@@ -329,32 +327,29 @@ def read_geoparquet(
     file = Path(path)
     if not os.path.isfile(file):  # noqa: PTH113 - it answers where Path.is_file raises
         what = "is a folder" if os.path.isdir(file) else "does not exist"  # noqa: PTH112
-        msg = f"{file} {what}; give a {kind} file."
-        raise DatabaseError(msg)
+        raise DatabaseError(f"{file} {what}; give a {kind} file.")
     try:
         require_intact(file)
         parquet = pq.ParquetFile(file, memory_map=True, **CHECKING_PAGES)
         metadata = parquet.schema_arrow.metadata or {}
     except PermissionError as error:
-        msg = f"{file} cannot be read ({reason(error)}); ask its owner for access."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(
+            f"{file} cannot be read ({reason(error)}); ask its owner for access."
+        ) from error
     except (pa.ArrowException, OSError, ValueError) as error:
         raise_if_short(error)
-        msg = (
+        raise DatabaseError(
             f"{file} is damaged or is not a Parquet file; give another, or make the {kind} file "
             "again."
-        )
-        raise DatabaseError(msg) from error
+        ) from error
     try:
         specs = parse_json(metadata[SPEC_KEY], finite=True)
         crs = _crs_of(json.dumps(parse_json(metadata[b"geo"])["columns"]["geometry"]["crs"]))
         stored = specs["kind"]
     except (KeyError, TypeError, ValueError, CRSError) as error:
-        msg = f"{file} was not written by semsig; give a {kind} file."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(f"{file} was not written by semsig; give a {kind} file.") from error
     if stored != kind:
-        msg = f"{file} is a {stored} file; give a {kind} file."
-        raise DatabaseError(msg)
+        raise DatabaseError(f"{file} is a {stored} file; give a {kind} file.")
     try:
         if box is None:
             # Not in one piece: the memory of a batch serves the next one, too.
@@ -364,12 +359,12 @@ def read_geoparquet(
             table = parquet.read_row_groups(groups_meeting(parquet, box), columns)
     except (pa.ArrowException, OSError, ValueError) as error:
         raise_if_short(error)
-        msg = f"{file} is damaged; make the {kind} file again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(f"{file} is damaged; make the {kind} file again.") from error
     missing = set(columns or ()) - set(table.column_names)
     if missing:
-        msg = f"{file} lacks the column {min(missing)!r}; make the {kind} file again."
-        raise DatabaseError(msg)
+        raise DatabaseError(
+            f"{file} lacks the column {min(missing)!r}; make the {kind} file again."
+        )
     return table, specs, crs
 
 

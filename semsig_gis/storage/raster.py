@@ -64,11 +64,10 @@ def raster_at_cells(
             source = rasterio.open(path)
         with source:
             if source.crs is None:
-                msg = (
+                raise CrsError(
                     f"{path} does not say its coordinate reference system; give a raster that "
                     "does, such as a GeoTIFF."
                 )
-                raise CrsError(msg)
             number = _chosen_band(source, str(path), band)
             with WarpedVRT(
                 source,
@@ -82,15 +81,15 @@ def raster_at_cells(
             ) as warped:
                 values: NDArray[np.float64] = warped.read(number)
     except (CRSError, CPLE_BaseError) as error:
-        msg = (
+        raise CrsError(
             f"the coordinate reference system of {path} cannot be turned into that of the cells; "
             "give a raster in another."
-        )
-        raise CrsError(msg) from error
+        ) from error
     except (RasterioError, OSError) as error:
         reason = (getattr(error, "strerror", None) or str(error)).split(". ")[0].strip().rstrip(".")
-        msg = f"{path} cannot be read as a raster ({reason}); give a file such as a GeoTIFF."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{path} cannot be read as a raster ({reason}); give a file such as a GeoTIFF."
+        ) from error
     return values[top - up, across - left]
 
 
@@ -103,8 +102,9 @@ def _chosen_band(source: rasterio.DatasetReader, path: str, band: int | None) ->
         return bands[0]
     if band is None or band not in source.indexes:
         which = "none was named" if band is None else f"band {band} was asked for"
-        msg = f"{path} has {len(bands)} bands, but {which}; name one, or give a raster of one band."
-        raise InputError(msg)
+        raise InputError(
+            f"{path} has {len(bands)} bands, but {which}; name one, or give a raster of one band."
+        )
     return band
 
 
@@ -127,11 +127,10 @@ def write_cells(
     left, top = int(columns[0]), int(rows.max())
     width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1
     if width * height > MOST_PIXELS:
-        msg = (
+        raise InputError(
             f"the cells span {width:,} by {height:,} pixels, which is too wide for a raster; "
             "export the distant parts of the city separately."
         )
-        raise InputError(msg)
     west, north = grid.origin[0] + left * grid.step, grid.origin[1] + (top + 1) * grid.step
     with whole_file(path) as partial:
         strips = partial.with_name("strips.tif")
@@ -176,11 +175,10 @@ def write_cells(
             _check_blocks(partial)
         except (CPLE_BaseError, RasterioError) as error:
             # GDAL's own words do not help; they stay with the cause.
-            msg = (
+            raise InputError(
                 f"{path} could not be written whole, so what was there before is unchanged; free "
                 "some space or choose another folder."
-            )
-            raise InputError(msg) from error
+            ) from error
 
 
 def _check_blocks(path: Path) -> None:

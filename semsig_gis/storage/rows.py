@@ -48,8 +48,7 @@ def _all_rows(
             raise one
         found.append((line, one))
     if not found:
-        msg = f"{source} has no rows; give one {what} on each line."
-        raise InputError(msg)
+        raise InputError(f"{source} has no rows; give one {what} on each line.")
     return found
 
 
@@ -65,8 +64,9 @@ def file_rows(path: str | Path, *, what: str) -> Iterator[tuple[int, Row | Excep
         return json_rows(read_whole(file, most=MOST_ROWS).split(b"\n"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        msg = f"{what} file {file} cannot be read ({reason}); give a CSV or JSON lines file."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{what} file {file} cannot be read ({reason}); give a CSV or JSON lines file."
+        ) from error
 
 
 def scan_rows(
@@ -86,8 +86,7 @@ def scan_rows(
             if isinstance(row, Exception):
                 raise row
             if not isinstance(row, dict):
-                msg = "it is not a table of names and values"
-                raise InputError(msg)
+                raise InputError("it is not a table of names and values")
             found = read(row)
         except (SemsigError, ValueError, TypeError, OverflowError, RecursionError) as error:
             reason = str(error).rstrip(".")
@@ -109,8 +108,7 @@ def csv_rows(text: str, source: str) -> Iterator[tuple[int, Row | Exception]]:
     try:
         _ = reader.fieldnames
     except csv.Error as error:
-        msg = f"{source} is not CSV ({error}); correct it."
-        raise InputError(msg) from error
+        raise InputError(f"{source} is not CSV ({error}); correct it.") from error
     while True:
         row: Row | Exception | None
         try:

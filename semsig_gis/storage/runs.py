@@ -81,8 +81,9 @@ class RunKind:
         try:
             names = {path.name for path in folder.iterdir()} if folder.exists() else set()
         except OSError as error:
-            msg = f"{folder} cannot be read ({reason(error)}); choose another folder."
-            raise InputError(msg) from error
+            raise InputError(
+                f"{folder} cannot be read ({reason(error)}); choose another folder."
+            ) from error
         return {name for name in names if not name.startswith(HALF_DONE)}
 
     def _read(self, folder: Path, entries: set[str]) -> Recipe:
@@ -90,11 +91,10 @@ class RunKind:
             return self.read(folder)
         except (OSError, TypeError, ValueError) as error:
             first = min(entries - set(self.names) or entries, default="nothing")
-            msg = (
+            raise InputError(
                 f"{folder} contains {first!r}, but no {self.content} that can be read; choose "
                 "another folder."
-            )
-            raise InputError(msg) from error
+            ) from error
 
     def _refuse(self, folder: Path, stored: Recipe, recipe: Recipe) -> None:
         difference = ", ".join(_difference(stored, recipe))
@@ -138,11 +138,10 @@ def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
             with own_folder(target.parent) as box:
                 put_in_place(folder, target, box=box)
     except OSError as error:
-        msg = (
+        raise InputError(
             f"{target} could not be put in its place ({reason(error)}); the results are in "
             f"{folder}, so run the same command again."
-        )
-        raise InputError(msg) from error
+        ) from error
     return target
 
 
@@ -158,8 +157,7 @@ def read_json(path: Path) -> Recipe:
     """Return the values of a JSON file; TypeError if it holds anything but an object."""
     values = parse_json(read_whole(path), finite=True)
     if not isinstance(values, dict):
-        msg = f"{path} contains no named values"
-        raise TypeError(msg)
+        raise TypeError(f"{path} contains no named values")
     return values
 
 

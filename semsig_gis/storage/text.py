@@ -54,21 +54,18 @@ def parse_json(text: str | bytes, *, finite: bool = False) -> Any:  # noqa: ANN4
     try:
         return json.loads(text, **kinds)
     except RecursionError as error:
-        msg = "it is nested too deeply"
-        raise ValueError(msg) from error
+        raise ValueError("it is nested too deeply") from error
 
 
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        msg = f"{text[:20]} is not a finite number"
-        raise ValueError(msg)
+        raise ValueError(f"{text[:20]} is not a finite number")
     return value
 
 
 def _whole(text: str) -> int:
     value = int(text)
     if not -MOST_INTEGER <= value < MOST_INTEGER:
-        msg = f"{text[:20]} is beyond 64 bits"
-        raise ValueError(msg)
+        raise ValueError(f"{text[:20]} is beyond 64 bits")
     return value

@@ -37,8 +37,9 @@ def read_values(path: str | Path, what: str) -> Any:  # noqa: ANN401 - as the fi
         return tomllib.loads(text) if toml else parse_json(text, finite=True)
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        msg = f"{what} file {file} cannot be read ({reason}); give a JSON or TOML file."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{what} file {file} cannot be read ({reason}); give a JSON or TOML file."
+        ) from error
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
@@ -46,8 +47,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        msg = f"{where} is not valid TOML: {error}."
-        raise CatalogError(msg) from error
+        raise CatalogError(f"{where} is not valid TOML: {error}.") from error
 
 
 def check_keys(
@@ -62,38 +62,35 @@ def check_keys(
     """
     for key, value in table.items():
         if key not in allowed:
-            msg = (
+            raise CatalogError(
                 f"{where} has the key {key!r}, which is unknown"
                 f"{nearest_name(key, allowed)}; the keys are {', '.join(allowed)}."
             )
-            raise CatalogError(msg)
         kind = allowed[key]
         if kind is object:
             continue
         # bool is an int to Python, never to a catalogue
         if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-            msg = f"{where} has {key} = {value!r}; write {TYPE_NAMES[kind]}."
-            raise CatalogError(msg)
+            raise CatalogError(f"{where} has {key} = {value!r}; write {TYPE_NAMES[kind]}.")
     for key in needed:
         if key not in table:
-            msg = f"{where} lacks the key {key!r}; add it."
-            raise CatalogError(msg)
+            raise CatalogError(f"{where} lacks the key {key!r}; add it.")
 
 
 def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
     """Return a value that is one of `choices` (or a `Literal`); CatalogError offers the nearest."""
     if value not in choices:
         names = ", ".join(repr(choice) for choice in choices)
-        msg = f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {names}."
-        raise CatalogError(msg)
+        raise CatalogError(
+            f"{where} has {key} = {value!r}{nearest_name(value, choices)}; write one of {names}."
+        )
     return value
 
 
 def texts(items: object, key: str, where: str) -> tuple[str, ...]:
     """Return a list of texts, none of them empty; CatalogError for anything else."""
     if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
-        msg = f"{where} has {key} = {items!r}; write a list of texts."
-        raise CatalogError(msg)
+        raise CatalogError(f"{where} has {key} = {items!r}; write a list of texts.")
     return tuple(items)
 
 
@@ -101,8 +98,9 @@ def metres(value: object, key: str, where: str, *, most: float) -> float:
     """Return a length in metres, above 0 and up to `most`; CatalogError for anything else."""
     # bool is an int to Python, never to a catalogue; NaN is not above 0
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= most:
-        msg = f"{where} has {key} = {value!r}; write metres above 0 and up to {most:g}."
-        raise CatalogError(msg)
+        raise CatalogError(
+            f"{where} has {key} = {value!r}; write metres above 0 and up to {most:g}."
+        )
     return float(value)
 
 

@@ -26,18 +26,17 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     # A link stays, and the file that it names is replaced.
     target = Path(os.path.realpath(path))
     if os.path.isdir(target):  # noqa: PTH112 - it answers where Path.is_dir raises
-        msg = f"{path} is a folder; give the name of a file to write."
-        raise InputError(msg)
+        raise InputError(f"{path} is a folder; give the name of a file to write.")
     if os.path.exists(target) and not os.path.isfile(target):  # noqa: PTH110, PTH113
-        msg = f"{path} is a device or a pipe; give the name of a file to write."
-        raise InputError(msg)
+        raise InputError(f"{path} is a device or a pipe; give the name of a file to write.")
     with contextlib.ExitStack() as stack:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             folder = stack.enter_context(own_folder(target.parent))
         except OSError as error:
-            msg = f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
-            raise InputError(msg) from error
+            raise InputError(
+                f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
+            ) from error
         # A folder of its own, because some formats write companions beside the file (-journal).
         partial = folder / Path(path).name
         try:
@@ -46,11 +45,10 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         except OSError as error:
             if error.errno is None or error.filename not in {None, str(partial), str(target)}:
                 raise
-            msg = (
+            raise InputError(
                 f"{path} could not be written ({reason(error)}); what was there before is "
                 "unchanged, so make room or choose another place."
-            )
-            raise InputError(msg) from error
+            ) from error
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:
@@ -87,11 +85,10 @@ def _box(target: Path) -> Iterator[Path]:
         with own_folder(target.parent) as box:
             yield box
     except OSError as error:
-        msg = (
+        raise InputError(
             f"{target} could not be written ({reason(error)}); what was there before is "
             "unchanged, so make room or choose another place."
-        )
-        raise InputError(msg) from error
+        ) from error
 
 
 def put_in_place(new: Path, place: Path, *, box: Path) -> None:

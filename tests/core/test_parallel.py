@@ -149,8 +149,7 @@ def test_workers_that_see_something_else_are_named(
         if os.getpid() == here:
             return (__version__, *[0 for _ in paths])
         if there is None:
-            msg = "No module named 'semsig_gis'"
-            raise ModuleNotFoundError(msg)
+            raise ModuleNotFoundError("No module named 'semsig_gis'")
         return there
 
     monkeypatch.setattr(parallel, "_view", view)

@@ -83,8 +83,7 @@ def test_items_are_worked_on_side_by_side_and_come_in_their_order(
 def test_an_error_of_the_items_comes_after_what_was_before_it() -> None:
     def items() -> Iterator[int]:
         yield from range(3)
-        msg = "no more"
-        raise InputError(msg)
+        raise InputError("no more")
 
     results: list[int] = []
     with pytest.raises(InputError, match="no more"):

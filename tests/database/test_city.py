@@ -421,8 +421,7 @@ def test_what_waits_for_its_database_is_put_in_its_place(
 
 
 def read_only(*_: Path) -> None:
-    msg = "nothing may be written here."
-    raise InputError(msg)
+    raise InputError("nothing may be written here.")
 
 
 def test_what_waits_for_another_database_stays_aside(stored: Path, tmp_path: Path) -> None:
@@ -461,8 +460,7 @@ def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.Mon
         raise OSError(28, "No space left on device")
 
     def full_partial(_: object, partial: Path) -> None:
-        msg = f"{partial} could not be written (No space left on device); make room."
-        raise InputError(msg)
+        raise InputError(f"{partial} could not be written (No space left on device); make room.")
 
     for name, act, file in (
         ("save_objects", full, "city.objects"),

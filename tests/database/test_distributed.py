@@ -232,8 +232,7 @@ def test_a_run_in_which_all_fails_ends_soon_and_leaves_nothing(
 
     def fail(_: TilePlan, tile: tuple[int, int]) -> Part | None:
         tried.add(tile)
-        msg = "nothing works"
-        raise ValueError(msg)
+        raise ValueError("nothing works")
 
     monkeypatch.setattr(distributed, "build_tile", fail)
     with refused(DatabaseError, "and 9 more", "ValueError: nothing works", "0 tiles"):

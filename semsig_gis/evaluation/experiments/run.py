@@ -146,8 +146,9 @@ def open_results(folder: str | Path) -> dict[str, Evaluation]:
     try:
         text = read_text(place / SPEC)
     except OSError as error:
-        msg = f"{place} contains no results; give a folder that `semsig evaluate` wrote."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(
+            f"{place} contains no results; give a folder that `semsig evaluate` wrote."
+        ) from error
     spec = parse_experiment(text, where=str(place / SPEC))
     return {case.name: open_evaluation(place / case.name) for case in spec.cases}
 
@@ -185,8 +186,7 @@ class ExperimentWork:
         if self.spec.districts is not None:
             file = self.folder / self.spec.districts.file
             if not file.is_file():
-                msg = f"districts {file} do not exist; give a file of polygons."
-                raise SourceError(msg)
+                raise SourceError(f"districts {file} do not exist; give a file of polygons.")
             digests[self.spec.districts.file] = digest(file)
         return digests
 
@@ -229,8 +229,9 @@ class ExperimentWork:
         try:
             return gpd.read_file(file)
         except Exception as error:  # whatever the many readers raise
-            msg = f"districts {file} cannot be read ({error}); give a file of polygons."
-            raise SourceError(msg) from error
+            raise SourceError(
+                f"districts {file} cannot be read ({error}); give a file of polygons."
+            ) from error
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -542,11 +543,10 @@ def _answer(
     )
     if failed:
         (out, _), reason = next(iter(failed.items()))
-        msg = (
+        raise DatabaseError(
             f"{len(failed)} of the {len(sizes)} parts of the work failed ({reason}); what is done "
             f"is kept in {running[out][1]}, so fix the cause and run the same command again."
         )
-        raise DatabaseError(msg)
 
 
 def _answer_here(running: Running, task: Task) -> None:

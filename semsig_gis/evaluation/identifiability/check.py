@@ -156,13 +156,15 @@ def check_identifiability(
     require_number("number of threads", threads, least=1, most=MOST_WORKERS)
     require_number("seed", seed, least=0, most=MOST_SEED + 1)
     if seed == identifiability.seed:
-        msg = f"the seed of the check is {seed}, which is that of the trials; give another seed."
-        raise InputError(msg)
+        raise InputError(
+            f"the seed of the check is {seed}, which is that of the trials; give another seed."
+        )
     database = identifiability.database
     same = np.array_equal(index.database.cell_ids, database.cell_ids)
     if not same or index.noise != identifiability.noise:
-        msg = "the index belongs to another database or noise model; pass the matching one."
-        raise InputError(msg)
+        raise InputError(
+            "the index belongs to another database or noise model; pass the matching one."
+        )
     announce(queries * TRIAL_S / threads, "checking")
     cells = trial_cells(len(database), queries, seed=seed)
     photos = None

@@ -219,8 +219,7 @@ def _sample(columns: SymbolColumns, bases: Bases, seed: int) -> Sample:
 
 def _check(temperature: float, radius: float) -> None:
     if not 0 < temperature < math.inf:
-        msg = f"a temperature of {temperature} was given; give a power above 0."
-        raise InputError(msg)
+        raise InputError(f"a temperature of {temperature} was given; give a power above 0.")
     check_radius(radius)
 
 

@@ -127,8 +127,9 @@ class Identifiability(Displayed):
     def require_cells_of(self, database: SignatureDatabase) -> None:
         """Raise InputError where another database has other cells."""
         if not np.array_equal(self.database.cell_ids, database.cell_ids):
-            msg = "the identifiability belongs to other cells; give that of this database."
-            raise InputError(msg)
+            raise InputError(
+                "the identifiability belongs to other cells; give that of this database."
+            )
 
     def table(self, rows: slice = slice(None)) -> pa.Table:
         """Return what is known of some of the cells, all by default, as columns.
@@ -304,14 +305,14 @@ def identifiability_of(
         )
         identifiability = _parsed(database, noise, table, facts) if fits else None
     except (KeyError, TypeError, ValueError, SemsigError) as error:
-        msg = f"the identifiability in {path} is damaged ({error}); run semsig identify again."
-        raise DatabaseError(msg) from error
+        raise DatabaseError(
+            f"the identifiability in {path} is damaged ({error}); run semsig identify again."
+        ) from error
     if identifiability is None:
-        msg = (
+        raise DatabaseError(
             f"the identifiability in {path} belongs to other signatures or to another version of "
             "semsig; run semsig identify again."
         )
-        raise DatabaseError(msg)
     return identifiability
 
 

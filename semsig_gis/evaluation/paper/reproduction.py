@@ -160,8 +160,7 @@ NO_RANGES = (
 def _read_settings(folder: Path) -> dict[str, Any]:
     settings = read_json(folder / SETTINGS)
     if settings.keys() != {"size", "database", "queries", "seed", "versions"}:
-        msg = f"{SETTINGS} was written by another program"
-        raise ValueError(msg)
+        raise ValueError(f"{SETTINGS} was written by another program")
     return settings
 
 
@@ -279,11 +278,9 @@ def reproduce(
     semsig_gis.core.errors.InputError: the size is 'tiny'; give full or small.
     """
     if size not in get_args(Size):
-        msg = f"the size is {size!r}; give full or small."
-        raise InputError(msg)
+        raise InputError(f"the size is {size!r}; give full or small.")
     if database is not None and not Path(database).is_file():
-        msg = f"{database} is not a file; give a signature database in one file."
-        raise DatabaseError(msg)
+        raise DatabaseError(f"{database} is not a file; give a signature database in one file.")
     folder, show = Path(out), progress or (lambda _: None)
     city = City(folder / CITY if database is None else database)
     settings = {
@@ -402,8 +399,7 @@ def time_queries(
     one at a time, on one thread; what is worked out once for a database does not count.
     """
     if repetitions < 1:
-        msg = f"{repetitions} repetitions were asked for; give a whole number from 1."
-        raise InputError(msg)
+        raise InputError(f"{repetitions} repetitions were asked for; give a whole number from 1.")
     away = np.abs(database.lengths - length)
     cells = np.random.default_rng(0).choice(np.flatnonzero(away == away.min()), repetitions)
     queries = [database.signature(int(cell)) for cell in cells]

@@ -135,14 +135,14 @@ def _parsed(text: str, noises: Mapping[str, Noise]) -> QueryDistortion:
         if not equals and place == 0 and name not in DISTORTIONS:
             key, value = keys[0], setting
         if key not in keys:
-            msg = (
+            raise UnknownNameError(
                 f"distortion {text!r} cannot be read: {key!r} is not a "
                 f"setting{nearest_name(key, keys)}; the settings of {name} are {', '.join(keys)}."
             )
-            raise UnknownNameError(msg)
         if key in values:
-            msg = f"distortion {text!r} cannot be read: {key!r} is given twice; give it once."
-            raise InputError(msg)
+            raise InputError(
+                f"distortion {text!r} cannot be read: {key!r} is given twice; give it once."
+            )
         values[key] = _value(value, getattr(base, key), noises, text)
     return replace(base, **values)
 
@@ -152,8 +152,9 @@ def _value(word: str, like: object, noises: Mapping[str, Noise], text: str) -> A
     if isinstance(like, NoiseSpec | NoiseMixture):
         if word not in noises:
             names = ", ".join(noises)
-            msg = f"{word!r} is not a noise model{nearest_name(word, noises)}; give one of {names}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"{word!r} is not a noise model{nearest_name(word, noises)}; give one of {names}."
+            )
         return noises[word]
     try:
         if isinstance(like, bool):
@@ -162,8 +163,9 @@ def _value(word: str, like: object, noises: Mapping[str, Noise], text: str) -> A
             return type(like)(word)
     except (LookupError, ValueError) as error:
         kind = KINDS[type(like)]
-        msg = f"distortion {text!r} cannot be read; give {kind} in place of {word!r}."
-        raise InputError(msg) from error
+        raise InputError(
+            f"distortion {text!r} cannot be read; give {kind} in place of {word!r}."
+        ) from error
     return tuple(part for part in word.split("/") if part) if isinstance(like, tuple) else word
 
 

@@ -111,10 +111,9 @@ class FieldOfView(_AnyCity):
 
     def __post_init__(self) -> None:  # noqa: D105
         if not 0 < self.degrees <= FULL_TURN:
-            msg = (
+            raise InputError(
                 f"a view of {self.degrees!r} degrees was given; give degrees above 0, at most 360."
             )
-            raise InputError(msg)
 
     def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
         middle = rng.uniform(0.0, FULL_TURN)
@@ -201,11 +200,10 @@ class BlockedSectors(_AnyCity):
 
     def __post_init__(self) -> None:  # noqa: D105
         if self.count < 0 or not 0 <= self.degrees <= FULL_TURN:
-            msg = (
+            raise InputError(
                 f"{self.count} sectors of {self.degrees!r} degrees were given; give a whole number "
                 "from 0 up and degrees from 0 to 360."
             )
-            raise InputError(msg)
 
     def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
         middles = rng.uniform(0.0, FULL_TURN, self.count)
@@ -241,11 +239,10 @@ class Detector:
 
     def __post_init__(self) -> None:  # noqa: D105
         if not self.half >= NEAREST_M:
-            msg = (
+            raise InputError(
                 f"the setting half is {self.half!r} m; give the metres at which a detector sees "
                 f"half of the objects, from {NEAREST_M}, or infinity if distance does not matter."
             )
-            raise InputError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:
         """Return what it does to a query.
@@ -408,11 +405,10 @@ class Distortion:
             require_number(f"bearing {label}", value, least=0, most=FULL_TURN, unit="degrees")
         if self.false_class not in get_args(FalseClass):
             hint = nearest_name(str(self.false_class), get_args(FalseClass))
-            msg = (
+            raise UnknownNameError(
                 f"{self.false_class!r} is not a way to choose a false class{hint}; give "
                 f"{' or '.join(get_args(FalseClass))}."
             )
-            raise UnknownNameError(msg)
 
     def ready(self, city: CitySights) -> Spoiling:
         """Return what it does to a query of a city, whose classes false objects have."""
@@ -471,8 +467,9 @@ def distortion_of(name: str, distortions: Mapping[str, D]) -> D:
     if name not in distortions:
         *most, last = distortions
         hint = nearest_name(name, distortions)
-        msg = f"{name!r} is not a distortion{hint}; give {', '.join(most)} or {last}."
-        raise UnknownNameError(msg)
+        raise UnknownNameError(
+            f"{name!r} is not a distortion{hint}; give {', '.join(most)} or {last}."
+        )
     return distortions[name]
 
 
@@ -537,8 +534,9 @@ def _spoiled(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.int64]]:
     """Return codes, bearings, and which object each was; -1 for a false one."""
     if signature.codes is None or signature.bearings is None:
-        msg = "a signature without types or without bearings was given; give one with both."
-        raise InputError(msg)
+        raise InputError(
+            "a signature without types or without bearings was given; give one with both."
+        )
     codes: list[int] = signature.codes.tolist()
     bearings: list[float] = signature.bearings.tolist()
     rows = list(range(len(codes)))
@@ -569,23 +567,23 @@ def _class_chances(
 ) -> NDArray[np.float64]:
     """Return the chance of each class for a false object."""
     if classes.ndim != 1 or classes.size == 0 or len(np.unique(classes)) != classes.size:
-        msg = "the classes of false objects are not a list of distinct codes; give at least one."
-        raise InputError(msg)
+        raise InputError(
+            "the classes of false objects are not a list of distinct codes; give at least one."
+        )
     if distortion.false_class == "uniform":
         return np.full(classes.size, 1.0 / classes.size)
     if weights is None:
-        msg = "false classes by frequency need weights; give one for each class."
-        raise InputError(msg)
+        raise InputError("false classes by frequency need weights; give one for each class.")
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != classes.shape or not np.isfinite(values).all() or (values < 0).any():
-        msg = (
+        raise InputError(
             f"{values.size} weights for {classes.size} classes were given; "
             "give one for each class, 0 or more."
         )
-        raise InputError(msg)
     if not values.any():
-        msg = "class weights that are all zero were given; give at least one above zero."
-        raise InputError(msg)
+        raise InputError(
+            "class weights that are all zero were given; give at least one above zero."
+        )
     return np.asarray(values / values.sum())
 
 

@@ -72,17 +72,18 @@ class QuerySpec:
 
     def __post_init__(self) -> None:  # noqa: D105
         if self.number < 1:
-            msg = f"{self.number} queries were asked for; give a whole number from 1."
-            raise InputError(msg)
+            raise InputError(f"{self.number} queries were asked for; give a whole number from 1.")
         if not self.seeds or len(set(self.seeds)) < len(self.seeds):
-            msg = f"the seeds are {list(self.seeds)}; give at least one, and none twice."
-            raise InputError(msg)
+            raise InputError(
+                f"the seeds are {list(self.seeds)}; give at least one, and none twice."
+            )
         for seed in self.seeds:
             require_number("a seed", seed, least=0, most=MOST_SEED)
         if self.seen_from not in get_args(SeenFrom):
             hint = nearest_name(self.seen_from, get_args(SeenFrom))
-            msg = f"queries are seen from {self.seen_from!r}{hint}; give cells or anywhere."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"queries are seen from {self.seen_from!r}{hint}; give cells or anywhere."
+            )
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -152,18 +153,16 @@ def draw_queries(
     """
     city = database if city is None else city
     if city.crs != database.crs:
-        msg = (
+        raise CrsError(
             f"queries are seen in {city.crs.to_string()} and searched for in "
             f"{database.crs.to_string()}; build both databases in one reference system."
         )
-        raise CrsError(msg)
     check_count("queries", spec.number, len(city))
     if spec.seen_from == "anywhere" and store is None:
-        msg = (
+        raise InputError(
             "queries from anywhere need the street objects of the city; build its database with "
             "them, or let queries be seen from cells."
         )
-        raise InputError(msg)
     spoil = ready_chain(spec.distortions, CitySights.of(database))
     codes_there = _codes_there(city, database)
     queries = []
@@ -190,10 +189,9 @@ def draw_queries(
 def check_count(what: str, count: int, cells: int) -> None:
     """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
     if not 1 <= count <= cells:
-        msg = (
+        raise InputError(
             f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
         )
-        raise InputError(msg)
 
 
 def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
@@ -259,11 +257,10 @@ def _places(
         places.append(tried[stands, free.argmax(axis=1)[stands]])
         if sum(map(len, places)) >= number:
             return np.concatenate(places)[:number]
-    msg = (
+    raise InputError(
         f"{number} queries were asked for, but only {sum(map(len, places))} of the {len(cells)} "
         "cells have a place outside the buildings; give a smaller number."
     )
-    raise InputError(msg)
 
 
 def _codes_there(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:

@@ -69,20 +69,22 @@ class Method:
         for name in self.measures.values():
             metric(name)
         if not self.measures:
-            msg = "the method compares neither types nor angles; give a measure for one of them."
-            raise InputError(msg)
+            raise InputError(
+                "the method compares neither types nor angles; give a measure for one of them."
+            )
         if not 0 <= self.alpha <= 1:
-            msg = f"the share alpha of the types is {self.alpha}; give a number from 0 to 1."
-            raise InputError(msg)
+            raise InputError(
+                f"the share alpha of the types is {self.alpha}; give a number from 0 to 1."
+            )
         if self.keep is not None and not 0 < self.keep <= 100:  # noqa: PLR2004
-            msg = f"{self.keep} % of the cells are to be kept; give a number above 0 and up to 100."
-            raise InputError(msg)
+            raise InputError(
+                f"{self.keep} % of the cells are to be kept; give a number above 0 and up to 100."
+            )
         if self.keep is not None and len(self.measures) == 1:
-            msg = (
+            raise InputError(
                 "a two-stage method ranks by types and then by angles, but it has one measure; "
                 "give both, or leave the percentage out."
             )
-            raise InputError(msg)
 
     @classmethod
     def parse(cls, text: str) -> Method:
@@ -154,11 +156,10 @@ class Method:
         if not parts:
             names = {TYPES: "types", ANGLES: "bearings"}
             own, other = (TYPES, ANGLES) if self.angles is None else (ANGLES, TYPES)
-            msg = (
+            raise InputError(
                 f"method '{self}' compares {names[own]}, but the query has only {names[other]}; "
                 f"give its {names[own]}, or a method such as '{other}:edit'."
             )
-            raise InputError(msg)
         return "+".join(parts)
 
 

@@ -182,8 +182,9 @@ class DistanceLocator:
                 shortlist.add(part.select(met), scores[met])
         if shortlist.cells == 0:
             cells = len(self.database)
-            msg = f"none of the {cells:,} cells meets the requirement; require less."
-            raise EmptyResultError(msg)
+            raise EmptyResultError(
+                f"none of the {cells:,} cells meets the requirement; require less."
+            )
         return shortlist, part.select(slice(0))
 
     def rankings(

@@ -144,8 +144,9 @@ def expected_recall(
     and the number of cells that it stands for is rounded down.
     """
     if not 0 < percent <= 100:  # noqa: PLR2004
-        msg = f"A recall at {percent} % was requested; give a percentage above 0 and at most 100."
-        raise InputError(msg)
+        raise InputError(
+            f"A recall at {percent} % was requested; give a percentage above 0 and at most 100."
+        )
     # The small term keeps 0.07 * 100, which is just below 7, from being rounded down to 6.
     count = math.floor(percent * cells / 100 + 1e-9)
     low = np.asarray(rank_low, dtype=np.float64)

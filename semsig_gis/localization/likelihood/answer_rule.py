@@ -37,8 +37,7 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 def _check_share(name: str, value: object) -> None:
     if not (_is_number(value) and 0 < value < 1):
-        msg = f"{name} of the answers is {value!r}; give a share above 0 and below 1."
-        raise InputError(msg)
+        raise InputError(f"{name} of the answers is {value!r}; give a share above 0 and below 1.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,17 +73,16 @@ class AnswerRule:
         for name in ("precision", "confidence"):
             _check_share(name, getattr(self, name))
         if not (_is_number(self.threshold) and self.threshold >= 0):
-            msg = f"threshold of the answers is {self.threshold!r}; give a chance, 0 or more."
-            raise InputError(msg)
+            raise InputError(
+                f"threshold of the answers is {self.threshold!r}; give a chance, 0 or more."
+            )
         if not (_is_number(self.radius) and 0 < self.radius < math.inf):
-            msg = f"radius of the answers is {self.radius!r}; give metres above 0."
-            raise InputError(msg)
+            raise InputError(f"radius of the answers is {self.radius!r}; give metres above 0.")
         if not 0 <= self.wrong <= self.answered <= self.queries:
-            msg = (
+            raise InputError(
                 f"{self.wrong} wrong of {self.answered} answers to {self.queries} queries were "
                 "given; give counts that fit each other."
             )
-            raise InputError(msg)
 
     @property
     def coverage(self) -> float:
@@ -167,11 +165,10 @@ def calibrate(
     chances = np.asarray(masses, dtype=np.float64)
     right = np.asarray(correct)
     if chances.shape != right.shape or chances.ndim != 1 or not np.isfinite(chances).all():
-        msg = (
+        raise InputError(
             f"{chances.size} chances and {right.size} outcomes were given; give one finite chance "
             "and one outcome for each query."
         )
-        raise InputError(msg)
     order = np.argsort(-chances, kind="stable")
     ranked = chances[order]
     errors = np.cumsum(~right[order].astype(bool))
@@ -254,11 +251,11 @@ def open_rule(path: str | Path) -> AnswerRule:
         values: Mapping[str, Any] = parse_json(read_whole(path), finite=True)
         names = {field.name for field in fields(AnswerRule)}
         if not isinstance(values, dict) or not {"threshold"} <= set(values) <= names:
-            msg = f"its fields are not exactly {', '.join(sorted(names))}"
-            raise InputError(msg)
+            raise InputError(f"its fields are not exactly {', '.join(sorted(names))}")
         threshold = values["threshold"]
         return AnswerRule(**{**values, "threshold": math.inf if threshold is None else threshold})
     except (OSError, TypeError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error).rstrip(".")
-        msg = f"answer rule {path} cannot be used ({reason}); give a file that save_rule wrote."
-        raise InputError(msg) from error
+        raise InputError(
+            f"answer rule {path} cannot be used ({reason}); give a file that save_rule wrote."
+        ) from error

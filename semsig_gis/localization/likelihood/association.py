@@ -371,8 +371,7 @@ def rerank(
     of some thousand cells by the plain sum, to choose the cells, and then nine in each.
     """
     if count < 1:
-        msg = f"the number of cells to re-rank is {count}; give a whole number from 1."
-        raise InputError(msg)
+        raise InputError(f"the number of cells to re-rank is {count}; give a whole number from 1.")
     view = View.of(query)
     if view.bearings is None:
         return scores

@@ -156,8 +156,9 @@ class Location(Answer):
         """Return the rows of the fewest cells that hold a share of the chance, likeliest first."""
         cells = self.posterior.credible_cells(share)
         if not np.array_equal(self.posterior.database.cell_ids, database.cell_ids):
-            msg = "the answer was found in another database; give the database that was searched."
-            raise InputError(msg)
+            raise InputError(
+                "the answer was found in another database; give the database that was searched."
+            )
         return cells
 
     def explore(self) -> MapFrame:
@@ -230,10 +231,9 @@ class LikelihoodLocator:
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
         if self.refined and self.store is None:
-            msg = (
+            raise InputError(
                 "searching between the viewpoints needs the object store of the database; give it."
             )
-            raise InputError(msg)
 
     def locate(
         self,

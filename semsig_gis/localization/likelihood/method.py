@@ -47,8 +47,7 @@ class LikelihoodMethod:
     def __post_init__(self) -> None:  # noqa: D105
         check_north(self.north_sigma)
         if self.refined and self.on_grid:
-            msg = "refined and on_grid exclude each other; leave out one of them."
-            raise InputError(msg)
+            raise InputError("refined and on_grid exclude each other; leave out one of them.")
 
     @classmethod
     def parse(cls, text: str, *, noises: Mapping[str, Noise] = NOISES) -> LikelihoodMethod:
@@ -63,8 +62,9 @@ class LikelihoodMethod:
         if noise not in noises:
             names = ", ".join(noises)
             hint = nearest_name(noise, noises)
-            msg = f"method {text!r} has an unknown noise model{hint}; give one of {names}."
-            raise UnknownNameError(msg)
+            raise UnknownNameError(
+                f"method {text!r} has an unknown noise model{hint}; give one of {names}."
+            )
         misread = (
             f"method {text!r} cannot be read; give 'likelihood:NOISE' and optionally ':refined', "
             "':on_grid', ':heading=10' (degrees) or ':heading=unknown'."

@@ -66,8 +66,9 @@ class PhotoTable:
     def of(cls, photo: View, table: NoiseTable) -> PhotoTable:
         """Return the table of a view of one photo, whose objects may all be of classes known."""
         if photo.bearings is None:
-            msg = "the query has no bearings, which the search between cells needs; give them."
-            raise InputError(msg)
+            raise InputError(
+                "the query has no bearings, which the search between cells needs; give them."
+            )
         size = len(photo)
         unknown = np.full(size, math.nan)
         ranges = unknown if photo.ranges is None else photo.ranges

@@ -112,8 +112,9 @@ class Posterior(Displayed):
         in the order of the database; cells without any chance are never among them.
         """
         if not 0 < share <= 1:
-            msg = f"a region of a share of {share} was asked for; give a number above 0, at most 1."
-            raise InputError(msg)
+            raise InputError(
+                f"a region of a share of {share} was asked for; give a number above 0, at most 1."
+            )
         # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
         share *= 1.0 - 1e-12
         cells = self._top(share, self.chances)
@@ -129,8 +130,7 @@ class Posterior(Displayed):
         radius that is negative or not finite raises `InputError`.
         """
         if not (math.isfinite(radius) and radius >= 0):
-            msg = f"a radius of {radius} m was given; give metres, 0 or more."
-            raise InputError(msg)
+            raise InputError(f"a radius of {radius} m was given; give metres, 0 or more.")
         database = self.database
         centres = slice(None) if cells is None else cells
         columns = database.columns[centres].astype(np.int64)
@@ -209,11 +209,10 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     )
     total = chances.sum()
     if not (chances >= 0).all() or not math.isclose(total, 1.0, abs_tol=ROUNDING):
-        msg = (
+        raise InputError(
             f"{path} does not contain the chances of the cells of this database, which add up to "
             "1; give a .tif file that semsig localize --out wrote for it."
         )
-        raise InputError(msg)
     return Posterior(database=database, chances=chances / total)
 
 
@@ -247,19 +246,16 @@ def posterior(
     for part in parts:
         values = np.asarray(part, dtype=np.float64)
         if values.shape != total.shape:
-            msg = (
+            raise InputError(
                 f"{values.size} likelihoods or priors were given for {total.size} cells; "
                 "give one for each cell."
             )
-            raise InputError(msg)
         total += values
     top = total.max()
     if np.isnan(top) or top == np.inf:
-        msg = "a likelihood or a prior is not a number or is infinite; give logarithms."
-        raise InputError(msg)
+        raise InputError("a likelihood or a prior is not a number or is infinite; give logarithms.")
     if top == -np.inf:
-        msg = "the prior excludes every cell that the query may be in; widen it."
-        raise InputError(msg)
+        raise InputError("the prior excludes every cell that the query may be in; widen it.")
     chances = np.exp(total - top)
     return Posterior(database=database, chances=chances / chances.sum())
 
@@ -375,11 +371,10 @@ def refine(
     if len(cells) == 0 or any(
         sigma > 0 and heading is None for sigma, heading in zip(looked_for, before, strict=True)
     ):
-        msg = (
+        raise InputError(
             f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
             "give at least one cell, and headings where north is not known."
         )
-        raise InputError(msg)
     tables, weights = noise_tables(
         noise,
         taxonomy=objects.taxonomy,

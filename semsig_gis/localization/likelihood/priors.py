@@ -84,11 +84,10 @@ class KnownPosition:
                 values = [float(one[1]) for one in found if one]
                 readings = _readings(values, letters, database.crs)
         if not readings:
-            msg = (
+            raise InputError(
                 f"the position was given as {text!r}; give {NORTH_EAST},SIGMA in degrees or "
                 f"{METRES},SIGMA in metres of {database.crs.to_string()}, SIGMA in metres."
             )
-            raise InputError(msg)
         _check_sigma(sigma)
         near = []
         for form, (x, y, lon, lat) in readings:
@@ -97,7 +96,7 @@ class KnownPosition:
                 near.append(place)
         if len(near) != 1:
             read = " and ".join(place.read_as for place in near)
-            msg = (
+            raise InputError(
                 f"the position {text!r} is in the city as {read}; write which is meant, such as "
                 "60.171N,24.947E,200 or 386000m,6672000m,200."
                 if near
@@ -105,7 +104,6 @@ class KnownPosition:
                 f"{NORTH_EAST} or {EAST_NORTH}: {_extent(database)}; give a place there, or a "
                 "larger deviation."
             )
-            raise InputError(msg)
         return near[0]
 
     def to_dict(self) -> dict[str, Any]:
@@ -194,31 +192,29 @@ def area_prior(
     [7]
     """
     if not 0 <= outside < 1:
-        msg = (
+        raise InputError(
             f"the chance of a place outside the area is {outside}; give a number from 0 to below 1."
         )
-        raise InputError(msg)
     if not isinstance(area, (shapely.Polygon, shapely.MultiPolygon)) or area.is_empty:
-        msg = f"the area is a {type(area).__name__} or empty; give a polygon that is not."
-        raise InputError(msg)
+        raise InputError(
+            f"the area is a {type(area).__name__} or empty; give a polygon that is not."
+        )
     shape = area
     if crs is not None:
         try:
             shape = gpd.GeoSeries([area], crs=crs).to_crs(database.crs).iloc[0]
         except (RuntimeError, ValueError) as error:
-            msg = (
+            raise CrsError(
                 f"the coordinate reference system {crs!r} of the area cannot be read; give a code."
-            )
-            raise CrsError(msg) from error
+            ) from error
     shapely.prepare(shape)
     inside = shapely.intersects_xy(shape, *database.xy.T)
     if not inside.any():
         west, south, east, north = shape.bounds
-        msg = (
+        raise InputError(
             f"no cell lies in the area, which is at x {west:.0f} to {east:.0f}, y {south:.0f} to "
             f"{north:.0f}: {_extent(database)}; give an area there."
         )
-        raise InputError(msg)
     weights = np.where(
         inside,
         (1.0 - outside) / int(inside.sum()),
@@ -260,15 +256,13 @@ def position_prior(
     """
     _check_sigma(sigma)
     if not all(map(math.isfinite, position)):
-        msg = f"the position is {position}; give x and y in metres."
-        raise InputError(msg)
+        raise InputError(f"the position is {position}; give x and y in metres.")
     if not _is_near(database, position, sigma):
         x, y = position
-        msg = (
+        raise InputError(
             f"the position ({x:.1f}, {y:.1f}) is outside the city: {_extent(database)}; give x and "
             "y of a place there, or a larger deviation."
         )
-        raise InputError(msg)
     away = ((database.xy - np.asarray(position, dtype=np.float64)) ** 2).sum(axis=1)
     logs = -0.5 * away / sigma**2
     # From the nearest cell on, so that a position far outside excludes nothing by rounding.
@@ -334,15 +328,15 @@ def raster_prior(
     )
     missing = np.isnan(weights)
     if missing.all():
-        msg = f"{path} has no data at any cell: {_extent(database)}; give a raster of this area."
-        raise InputError(msg)
+        raise InputError(
+            f"{path} has no data at any cell: {_extent(database)}; give a raster of this area."
+        )
     values = weights[~missing]
     if np.isinf(values).any() or (values < 0).any():
-        msg = (
+        raise InputError(
             f"{path} contains values from {values.min():g} to {values.max():g}; give finite "
             "values, 0 or more."
         )
-        raise InputError(msg)
     weights[missing] = values[values > 0].min(initial=values.max())
     return weight_prior(database, weights)
 
@@ -375,14 +369,15 @@ def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.
     """
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != (len(database),):
-        msg = f"{values.size} weights for {len(database)} cells were given; give one for each cell."
-        raise InputError(msg)
+        raise InputError(
+            f"{values.size} weights for {len(database)} cells were given; give one for each cell."
+        )
     if not np.isfinite(values).all() or (values < 0).any():
-        msg = "a weight of the cells is negative or not finite; give finite numbers, 0 or more."
-        raise InputError(msg)
+        raise InputError(
+            "a weight of the cells is negative or not finite; give finite numbers, 0 or more."
+        )
     total = values.sum()
     if not total > 0:
-        msg = "the prior excludes every cell of the database; widen it."
-        raise InputError(msg)
+        raise InputError("the prior excludes every cell of the database; widen it.")
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(values / total))

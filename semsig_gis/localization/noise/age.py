@@ -59,30 +59,31 @@ class Drift(Displayed):
     def __post_init__(self) -> None:  # noqa: D105
         years: object = self.years  # a file may have anything
         if type(years) not in {int, float} or not 0 < self.years <= MOST_YEARS:
-            msg = f"years of the drift is {self.years!r}; give years above 0 and up to 100."
-            raise InputError(msg)
+            raise InputError(
+                f"years of the drift is {self.years!r}; give years above 0 and up to 100."
+            )
         for item in self.classes:
             counts = (item.before, item.added, item.removed, item.moved, item.gained, item.lost)
             if not all(type(count) is int and count >= 0 for count in counts):
-                msg = f"drift of class {item.class_name!r} has counts {counts}; give whole numbers."
-                raise InputError(msg)
+                raise InputError(
+                    f"drift of class {item.class_name!r} has counts {counts}; give whole numbers."
+                )
             metres = item.moved_m
             known = isinstance(metres, (int, float)) and 0 <= metres < math.inf
             if item.moved and not known:
-                msg = f"drift of class {item.class_name!r} has moved_m = {metres!r}; give metres."
-                raise InputError(msg)
+                raise InputError(
+                    f"drift of class {item.class_name!r} has moved_m = {metres!r}; give metres."
+                )
             if item.before < item.removed + item.moved + item.lost:
-                msg = (
+                raise InputError(
                     f"drift of class {item.class_name!r} has more objects removed, moved and lost "
                     f"than the {item.before} there were before; give counts that fit each other."
                 )
-                raise InputError(msg)
         if not sum(item.before for item in self.classes):
-            msg = (
+            raise InputError(
                 "the drift report has no objects from before the change; give the report of a "
                 "city that had some."
             )
-            raise InputError(msg)
 
     def _facts(self) -> dict[str, object]:
         counts = {
@@ -146,25 +147,24 @@ def open_drift(path: str | Path) -> Drift:
 def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
     """Return the drift of plain values."""
     if not isinstance(values, Mapping) or not isinstance(values.get("classes"), list):
-        msg = f"{where} has no list of classes; give what `semsig update --json` prints."
-        raise InputError(msg)
+        raise InputError(
+            f"{where} has no list of classes; give what `semsig update --json` prints."
+        )
     if "years" not in values:
-        msg = (
+        raise InputError(
             f"{where} does not say over how many years the city changed; add years, or write the "
             "report with `semsig update --years N --json`."
         )
-        raise InputError(msg)
     names = {field.name for field in fields(ClassChange)}
     plain = dict.fromkeys(names - {"class_name", "before", "moved_m"}, 0) | {"moved_m": None}
     classes = []
     for item in values["classes"]:
         known = isinstance(item, Mapping) and {"class_name", "before"} <= set(item) <= names
         if not known or not isinstance(item["class_name"], str):
-            msg = (
+            raise InputError(
                 f"{where} has a class {item!r}; give class_name, before and any of "
                 f"{', '.join(sorted(plain))}."
             )
-            raise InputError(msg)
         classes.append(ClassChange(**{**plain, **item}))
     return Drift(years=values["years"], classes=tuple(classes))
 
@@ -358,5 +358,4 @@ def fresh_noise(
 def check_map_age(years: float) -> None:
     """Refuse an age of a map, in years, that is out of its range."""
     if not 0 <= years <= MOST_YEARS:
-        msg = f"the age of the map is {years:g} years; give years from 0 to 100."
-        raise InputError(msg)
+        raise InputError(f"the age of the map is {years:g} years; give years from 0 to 100.")

@@ -140,11 +140,10 @@ def gather_evidence(
     named = [np.flatnonzero(View.of(one).class_scores().any(axis=0)) for one in detected]
     count = sum(map(len, detected))
     if len(views.codes) == 0 or count == 0:
-        msg = (
+        raise InputError(
             f"the {len(detected)} samples have {len(views.codes)} objects to see and {count} "
             "detections; give samples with some of both."
         )
-        raise InputError(msg)
     codes = np.unique(np.concatenate([views.codes, *named])).astype(np.uint8)
     codes = codes[codes != WILDCARD]
     start = _starting_model(codes, taxonomy.ranges(radius), position_sigma)

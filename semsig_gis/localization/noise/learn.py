@@ -67,24 +67,27 @@ class Sample:
 
     def __post_init__(self) -> None:  # noqa: D105
         if (self.xy is None) == (self.cell_id is None):
-            msg = "a sample needs its true place; give either its x and y or its cell_id."
-            raise InputError(msg)
+            raise InputError(
+                "a sample needs its true place; give either its x and y or its cell_id."
+            )
         if self.xy is not None and not np.isfinite(self.xy).all():
-            msg = f"the place of a sample is {self.xy}; give two finite coordinates in metres."
-            raise InputError(msg)
+            raise InputError(
+                f"the place of a sample is {self.xy}; give two finite coordinates in metres."
+            )
         view = View.of(self.signature)
         if (view.codes is None and view.scores is None) or view.bearings is None:
-            msg = "a sample needs the types and the bearings of its detections; give both."
-            raise InputError(msg)
+            raise InputError(
+                "a sample needs the types and the bearings of its detections; give both."
+            )
         if (view.class_scores()[:, WILDCARD] == 1).any():
-            msg = "a sample has a detection of unknown class; give its class, or leave it out."
-            raise InputError(msg)
+            raise InputError(
+                "a sample has a detection of unknown class; give its class, or leave it out."
+            )
         if any(math.isinf(photo.north_sigma or 0.0) for photo in view.photos):
-            msg = (
+            raise InputError(
                 "a sample has a photo of unknown heading; give the heading, or leave the sample "
                 "out."
             )
-            raise InputError(msg)
 
 
 def read_samples(path: str | Path, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> list[Sample]:
@@ -133,8 +136,7 @@ def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
     told = {name for name in SEEN if row.get(name) is not None}
     for name in ("types", "bearings"):
         if told <= {"types", "bearings"} - {name}:
-            msg = f"it has no {name}"
-            raise InputError(msg)
+            raise InputError(f"it has no {name}")
     signature = parse_view(row, taxonomy=taxonomy, radius=radius)
     x, y, cell = (row_value(row, name) for name in ("x", "y", "cell_id"))
     if x is not None and y is not None:
@@ -249,8 +251,9 @@ def learn_noise(
     (True, True)
     """
     if not (math.isfinite(position_sigma) and position_sigma >= 0):
-        msg = f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
-        raise InputError(msg)
+        raise InputError(
+            f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
+        )
     views, used = _true_views(samples, city, radius, footprints)
     detected = [samples[row].signature for row in used]
     reach = city.spec.radius if isinstance(city, SignatureDatabase) else radius
@@ -299,8 +302,9 @@ def _true_views(
     A sample of several photos sees all there is in each of them.
     """
     if not samples:
-        msg = "there are no samples to learn from; give detections with their true places."
-        raise InputError(msg)
+        raise InputError(
+            "there are no samples to learn from; give detections with their true places."
+        )
     photos = np.array([len(View.of(sample.signature).photos) for sample in samples])
     if isinstance(city, SignatureDatabase):
         true_ids = np.array([_cell_id(sample, city) for sample in samples])
@@ -310,8 +314,9 @@ def _true_views(
     else:
         xy = np.array([sample.xy for sample in samples if sample.xy is not None])
         if len(xy) < len(samples):
-            msg = "a sample gives only its cell; give x and y, or a database instead of objects."
-            raise InputError(msg)
+            raise InputError(
+                "a sample gives only its cell; give x and y, or a database instead of objects."
+            )
         index = ObjectIndex(city.xy)
         looks = np.repeat(xy, photos, axis=0)
         views = views_at(city, looks, index=index, radius=radius, footprints=footprints)
@@ -320,12 +325,11 @@ def _true_views(
         used = np.unique(np.repeat(np.arange(len(samples)), photos)[full])
         views = replace(views, offsets=np.append(0, views.offsets[full + 1]))
     if len(used) == 0:
-        msg = (
+        raise InputError(
             f"none of the {len(samples)} samples lies where an object of the city is in sight; "
             f"give places in its coordinate reference system ({city.crs.to_string()}), or its "
             "cell ids."
         )
-        raise InputError(msg)
     return views, used.tolist()
 
 

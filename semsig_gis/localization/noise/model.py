@@ -110,8 +110,7 @@ class NoiseSpec(Displayed):
 
     def __post_init__(self) -> None:  # noqa: D105
         if not isinstance(self.name, str):
-            msg = f"name of the noise model is {self.name!r}; give a text."
-            raise InputError(msg)
+            raise InputError(f"name of the noise model is {self.name!r}; give a text.")
         for label, number in _NUMBERS.items():
             number.check(label, getattr(self, label))
         for label in BY_CLASS:
@@ -191,16 +190,16 @@ class NoiseMixture(Displayed):
 
     def __post_init__(self) -> None:  # noqa: D105
         if not self.specs or len(self.specs) != len(self.weights):
-            msg = (
+            raise InputError(
                 f"{len(self.specs)} noise models and {len(self.weights)} weights were given; "
                 "give at least one model and one weight for each."
             )
-            raise InputError(msg)
         named = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
         _check_shares("weights of the mixture", named)
         if not all(weight > 0 for weight in self.weights):
-            msg = f"weights of the mixture are {self.weights}; leave out models without weight."
-            raise InputError(msg)
+            raise InputError(
+                f"weights of the mixture are {self.weights}; leave out models without weight."
+            )
 
     def _facts(self) -> dict[str, object]:
         models = zip(self.specs, self.weights, strict=True)
@@ -232,15 +231,15 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     Values are the fields of `NoiseSpec`, each optional, or those of a mixture of plain models.
     """
     if not isinstance(values, Mapping):
-        msg = f"a noise model is {values!r}; give a table of its fields."
-        raise InputError(msg)
+        raise InputError(f"a noise model is {values!r}; give a table of its fields.")
     kind = NoiseMixture if "specs" in values else NoiseSpec
     labels = [item.name for item in fields(kind)]
     for name in values:
         if name not in labels:
             hint = nearest_name(str(name), labels)
-            msg = f"a noise model has no field {name!r}{hint}; its fields are {', '.join(labels)}."
-            raise InputError(msg)
+            raise InputError(
+                f"a noise model has no field {name!r}{hint}; its fields are {', '.join(labels)}."
+            )
     if kind is NoiseSpec:
         return NoiseSpec(**values)
     try:
@@ -249,12 +248,12 @@ def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     except InputError:
         raise
     except (KeyError, TypeError, ValueError) as error:
-        msg = f"a mixture of noise models cannot be used ({error}); give lists specs and weights."
-        raise InputError(msg) from error
+        raise InputError(
+            f"a mixture of noise models cannot be used ({error}); give lists specs and weights."
+        ) from error
     specs = tuple(model for model in models if isinstance(model, NoiseSpec))
     if len(specs) < len(models):
-        msg = "a mixture of noise models contains another mixture; give plain models."
-        raise InputError(msg)
+        raise InputError("a mixture of noise models contains another mixture; give plain models.")
     return NoiseMixture(**{**values, "specs": specs, "weights": weights})
 
 
@@ -296,12 +295,11 @@ def place_noise(noise: Noise, step: float) -> Noise:
     def narrowed(spec: NoiseSpec) -> NoiseSpec:
         variance = spec.position_sigma**2 - step**2 / 12.0
         if variance < -ROUNDING:
-            msg = (
+            raise InputError(
                 f"noise model {spec.name!r} is for queries from the centres of cells; build the "
                 f"index for cell_noise(noise, {step:g}), which is for queries from anywhere in "
                 "them."
             )
-            raise InputError(msg)
         return replace(spec, position_sigma=0.0 if variance < ROUNDING else math.sqrt(variance))
 
     return noise.changed(narrowed)
@@ -335,8 +333,9 @@ def named_noise(name: str) -> Noise:
     if name not in NOISES:
         *most, last = NOISES
         hint = nearest_name(name, NOISES)
-        msg = f"{name!r} is not a noise model; give {', '.join(most)} or {last}{hint}."
-        raise UnknownNameError(msg)
+        raise UnknownNameError(
+            f"{name!r} is not a noise model; give {', '.join(most)} or {last}{hint}."
+        )
     return NOISES[name]
 
 
@@ -351,8 +350,7 @@ class _Number:
         """Refuse anything else."""
         number = value if isinstance(value, (int, float)) else math.nan
         if isinstance(value, bool) or not self.fits(number):
-            msg = f"{label} of the noise is {value!r:.40}; give {self.words}."
-            raise InputError(msg)
+            raise InputError(f"{label} of the noise is {value!r:.40}; give {self.words}.")
 
 
 _CHANCE = _Number("a chance from 0 to 1", lambda value: 0 <= value <= 1)
@@ -387,11 +385,10 @@ def _check_fading(name: str, points: object) -> None:
         metres, shares = table.T
         fits = (np.diff(metres, prepend=-1e-9) > 0).all() and ((shares >= 0) & (shares <= 1)).all()
     if not fits:
-        msg = (
+        raise InputError(
             f"fading of the noise for {name!r} is {points!r:.60}; give pairs of metres, ascending, "
             "and a share from 0 to 1."
         )
-        raise InputError(msg)
 
 
 def _check_shares(label: str, shares: Mapping[str, float]) -> None:
@@ -400,15 +397,15 @@ def _check_shares(label: str, shares: Mapping[str, float]) -> None:
         _CHANCE.check(f"{label}, {name!r},", value)
     total = math.fsum(shares.values())
     if abs(total - 1.0) > ROUNDING:
-        msg = f"{label} of the noise sums to {total:.6g}; give shares that sum to 1."
-        raise InputError(msg)
+        raise InputError(f"{label} of the noise sums to {total:.6g}; give shares that sum to 1.")
 
 
 def _table(label: str, value: object) -> Mapping[str, Any]:
     """Return a mapping by class, or refuse what is not one."""
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-        msg = f"{label} of the noise is {value!r}; give a table by the names of the classes."
-        raise InputError(msg)
+        raise InputError(
+            f"{label} of the noise is {value!r}; give a table by the names of the classes."
+        )
     return value
 
 

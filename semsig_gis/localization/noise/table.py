@@ -139,18 +139,16 @@ class NoiseTable:
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
         """Return the class row of each object of a query, k if unknown; InputError without any."""
         if not len(query):
-            msg = "the query has no objects; give at least one type or bearing."
-            raise InputError(msg)
+            raise InputError("the query has no objects; give at least one type or bearing.")
         if query.codes is None:
             return np.full(len(query), len(self.codes))
         rows = self.row_of[query.codes]
         if (rows < 0).any():
-            msg = (
+            raise InputError(
                 f"the query has an object of class code {int(query.codes[rows < 0][0])}, which no "
                 "cell of the database sees; leave it out, or give its class as not known "
                 f"(code {WILDCARD})."
             )
-            raise InputError(msg)
         return rows
 
 
@@ -220,8 +218,9 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
 def query_bearings(query: Signature) -> NDArray[np.float64]:
     """Return the bearings of a query, or refuse a query without."""
     if query.bearings is None:
-        msg = "the query has no bearings, which the search between cells needs; give them."
-        raise InputError(msg)
+        raise InputError(
+            "the query has no bearings, which the search between cells needs; give them."
+        )
     return query.bearings
 
 
@@ -248,11 +247,10 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
     for name, by_name in spec.confusion.items():
         shares = by_class(0.0, by_name)
         if shares.sum() <= 0:
-            msg = (
+            raise InputError(
                 f"confusion row {name!r} of the noise gives no chance to any class that is seen; "
                 "give some chance to the class itself."
             )
-            raise InputError(msg)
         shares /= shares.sum()
         row = _row(name, rows)
         if row < count:
@@ -304,9 +302,8 @@ def _fading(
 def _row(name: str, rows: Mapping[str, int]) -> int:
     """Return the row of a class that a noise model names."""
     if name not in rows:
-        msg = (
+        raise InputError(
             f"the noise model names a class {name!r} that the database does not "
             f"have{nearest_name(name, rows)}; its classes are {', '.join(rows)}."
         )
-        raise InputError(msg)
     return rows[name]

@@ -92,8 +92,7 @@ class Camera:
     def __post_init__(self) -> None:  # noqa: D105
         if self.projection not in get_args(Projection):
             names = ", ".join(get_args(Projection))
-            msg = f"the camera {self.projection!r} is unknown; the cameras are {names}."
-            raise InputError(msg)
+            raise InputError(f"the camera {self.projection!r} is unknown; the cameras are {names}.")
         for what, size in (("width", self.width), ("height", self.height)):
             require_number(
                 f"the {what} of a picture", size, least=1, most=MOST_PIXELS, unit="pixels"

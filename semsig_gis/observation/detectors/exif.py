@@ -45,8 +45,9 @@ def read_exif(path: str | Path) -> Shot:
                 return _shot_of(image)
     except UNREADABLE as error:
         reason = getattr(error, "strerror", None) or "it is not a picture"
-        msg = f"{path} cannot be read ({reason}); give a picture, or leave it out."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{path} cannot be read ({reason}); give a picture, or leave it out."
+        ) from error
 
 
 def picture_shot(content: bytes, name: str) -> Shot:
@@ -55,8 +56,7 @@ def picture_shot(content: bytes, name: str) -> Shot:
     It is decoded, too: InputError if it is of another format, damaged, or larger than Pillow takes.
     """
     if content[4:8] == b"ftyp" and content[8:12] in HEIC_BRANDS:
-        msg = f"{name} is a HEIC picture, which is not supported; save it as JPEG."
-        raise InputError(msg)
+        raise InputError(f"{name} is a HEIC picture, which is not supported; save it as JPEG.")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -65,11 +65,13 @@ def picture_shot(content: bytes, name: str) -> Shot:
                 image.draft("L", THUMBNAIL)  # of JPEG; all of it is read in any case
                 image.load()
     except Image.DecompressionBombError as error:
-        msg = f"{name} has too many pixels to be decoded safely; give a smaller copy of it."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{name} has too many pixels to be decoded safely; give a smaller copy of it."
+        ) from error
     except UNREADABLE as error:
-        msg = f"{name} cannot be read as a picture; give JPEG, PNG, WebP or GIF."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{name} cannot be read as a picture; give JPEG, PNG, WebP or GIF."
+        ) from error
     return shot
 
 

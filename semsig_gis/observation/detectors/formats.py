@@ -58,8 +58,7 @@ def read_pictures(paths: Iterable[str | Path]) -> list[Picture]:
         elif suffix == ".json" and not (results and documents[file] is images):
             pictures += _of_json(documents[file], str(file), images)
         elif suffix != ".json":
-            msg = f"{file} is not in a supported format; {ACCEPTED}."
-            raise InputError(msg)
+            raise InputError(f"{file} is not in a supported format; {ACCEPTED}.")
     return pictures
 
 
@@ -68,8 +67,7 @@ def _files(path: Path) -> list[Path]:
         return [path]
     found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
     if not found:
-        msg = f"the folder {path} contains no file of detections; {ACCEPTED}."
-        raise InputError(msg)
+        raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
     return found
 
 
@@ -82,8 +80,7 @@ def _text(file: Path) -> str:
         return read_text(file)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        msg = f"{file} cannot be read ({reason}); {ACCEPTED}."
-        raise InputError(msg) from error
+        raise InputError(f"{file} cannot be read ({reason}); {ACCEPTED}.") from error
 
 
 def _json(file: Path) -> Any:  # noqa: ANN401 - any JSON
@@ -92,8 +89,7 @@ def _json(file: Path) -> Any:  # noqa: ANN401 - any JSON
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        msg = f"{file} is not JSON ({error}); {ACCEPTED}."
-        raise InputError(msg) from error
+        raise InputError(f"{file} is not JSON ({error}); {ACCEPTED}.") from error
 
 
 def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa: ANN401 - any JSON
@@ -103,11 +99,10 @@ def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa:
             return _coco(document, document.get("annotations", []), source)
         if _is_results(document):
             if images is None:
-                msg = (
+                raise InputError(
                     f"{source} contains COCO results without images and categories; give the file "
                     "of its annotations as well, which has them."
                 )
-                raise InputError(msg)
             return _coco(images, document, source)
         if _is_label_studio(document):
             return [_label_studio(task, source) for task in document]
@@ -117,10 +112,10 @@ def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa:
         if isinstance(error, InputError):
             raise
         lacks = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
-        msg = f"{source} does not follow its format ({lacks}); export it again."
-        raise InputError(msg) from error
-    msg = f"{source} contains no detections in a known format; {ACCEPTED}."
-    raise InputError(msg)
+        raise InputError(
+            f"{source} does not follow its format ({lacks}); export it again."
+        ) from error
+    raise InputError(f"{source} contains no detections in a known format; {ACCEPTED}.")
 
 
 def _is_coco(document: Any) -> bool:  # noqa: ANN401 - any JSON
@@ -156,8 +151,9 @@ def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list
         image, category = item["image_id"], item["category_id"]
         if image not in boxes or category not in names:
             what = f"image {image!r}" if image not in boxes else f"category {category!r}"
-            msg = f"{where} is of the {what}, which is not listed; give the file that lists it."
-            raise InputError(msg)
+            raise InputError(
+                f"{where} is of the {what}, which is not listed; give the file that lists it."
+            )
         # A crowd is a heap of objects, and a mask without a box may be any part of one.
         if item.get("iscrowd") or not item.get("bbox"):
             others[image] += 1
@@ -185,14 +181,14 @@ def _yolo(file: Path, names: Path | None) -> Picture:
             continue
         where = f"{file}, line {number}"
         if len(values) < BOX or not values[0].isdecimal():
-            msg = (
+            raise InputError(
                 f"{where} is not a line of YOLO labels; write class, x, y, width, height (and "
                 "score)."
             )
-            raise InputError(msg)
         if int(values[0]) not in labels:
-            msg = f"{where} is of class {values[0]}, which has no name; list it in data.yaml."
-            raise InputError(msg)
+            raise InputError(
+                f"{where} is of class {values[0]}, which has no name; list it in data.yaml."
+            )
         corners, score = _yolo_corners(values[1:], where)
         boxes.append(box_of(labels[int(values[0])], corners, where, score=score))
     return Picture(name=file.stem, boxes=tuple(boxes), shares=True)
@@ -203,8 +199,9 @@ def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None
     try:
         values = [float(text) for text in texts]
     except ValueError as error:
-        msg = f"{where} has a value that is not a number; write class, x, y, width, height."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{where} has a value that is not a number; write class, x, y, width, height."
+        ) from error
     score = texts[-1] if len(texts) % 2 else None
     if len(texts) <= BOX:
         x, y, width, height = values[:4]
@@ -212,8 +209,9 @@ def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None
     else:
         corners = bounds(zip(values[::2], values[1::2], strict=False))
     if not all(-1 <= value <= 2 for value in corners):  # noqa: PLR2004 - a picture away
-        msg = f"{where} is not in shares of the picture; divide pixels by its width and height."
-        raise InputError(msg)
+        raise InputError(
+            f"{where} is not in shares of the picture; divide pixels by its width and height."
+        )
     return corners, score
 
 
@@ -222,8 +220,9 @@ def _yolo_names(file: Path, names: Path | None) -> dict[int, str]:
     beside = [folder / name for folder in (file.parent, file.parent.parent) for name in NAME_FILES]
     listed = names or next((path for path in beside if path.is_file()), None)
     if listed is None:
-        msg = f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
-        raise InputError(msg)
+        raise InputError(
+            f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
+        )
     text = _text(listed)
     if listed.suffix.lower() not in {".yaml", ".yml"}:
         return dict(enumerate(text.split("\n")))
@@ -232,8 +231,9 @@ def _yolo_names(file: Path, names: Path | None) -> dict[int, str]:
         pairs = found.items() if isinstance(found, dict) else enumerate(found)
         return {int(number): str(name) for number, name in pairs}
     except (yaml.YAMLError, RecursionError, *MISSHAPEN) as error:
-        msg = f"{listed} has no list of class names; give a YAML file with 'names'."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{listed} has no list of class names; give a YAML file with 'names'."
+        ) from error
 
 
 def _label_studio(task: dict[str, Any], source: str) -> Picture:
@@ -286,25 +286,25 @@ def _picture_name(address: str) -> str:
 def _cvat(file: Path) -> list[Picture]:
     text = _text(file)
     if "<!DOCTYPE" in text:  # which may define texts that swell
-        msg = f"{file} defines its own document type; export it as CVAT for images 1.1."
-        raise InputError(msg)
+        raise InputError(f"{file} defines its own document type; export it as CVAT for images 1.1.")
     try:
         root = ET.fromstring(text)  # noqa: S314 - without a document type
     except (ET.ParseError, ValueError) as error:
-        msg = f"{file} is not XML that can be read ({error}); export it as CVAT for images 1.1."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{file} is not XML that can be read ({error}); export it as CVAT for images 1.1."
+        ) from error
     if root.tag != "annotations" or root.find("track") is not None:
         what = "contains tracks of a video" if root.tag == "annotations" else "is not a CVAT file"
-        msg = f"{file} {what}; export it as CVAT for images 1.1."
-        raise InputError(msg)
+        raise InputError(f"{file} {what}; export it as CVAT for images 1.1.")
     try:
         return [_cvat_picture(image, str(file)) for image in root.iter("image")]
     except MISSHAPEN as error:
         if isinstance(error, InputError):
             raise
         lacks = f"an image or shape lacks {error}" if isinstance(error, KeyError) else str(error)
-        msg = f"{file} does not follow its format ({lacks}); export it as CVAT for images 1.1."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{file} does not follow its format ({lacks}); export it as CVAT for images 1.1."
+        ) from error
 
 
 def _cvat_picture(image: ET.Element, source: str) -> Picture:

@@ -140,15 +140,13 @@ def _meanings(one: str | Path, classes: set[str]) -> list[tuple[str, Meaning]]:
             text = read_text(one)
         else:
             known = ", ".join(shipped)
-            msg = (
+            raise UnknownNameError(
                 f"label map {str(one)!r} is unknown{nearest_name(str(one), shipped)}; give {known} "
                 "or a TOML file."
             )
-            raise UnknownNameError(msg)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        msg = f"label map {one} cannot be read ({reason}); give a TOML file."
-        raise InputError(msg) from error
+        raise InputError(f"label map {one} cannot be read ({reason}); give a TOML file.") from error
     where = f"label map {one}"
     content = parse_toml(text, where)
     check_keys(content, MAP_KEYS, where)
@@ -171,15 +169,15 @@ def _meaning(value: object, where: str, classes: set[str]) -> Meaning:
         for share in shares.values()
     )
     if not shares or not numbers or sum(shares.values()) > 1 + ROUNDING:
-        msg = (
+        raise CatalogError(
             f"{where} has class = {named!r}; write the name of a class, or a table of classes with "
             "their chances, which sum to 1 at most."
         )
-        raise CatalogError(msg)
     for name in shares:
         if name not in classes:
-            msg = f"{where} has the class {name!r}, which is unknown{nearest_name(name, classes)}."
-            raise CatalogError(msg)
+            raise CatalogError(
+                f"{where} has the class {name!r}, which is unknown{nearest_name(name, classes)}."
+            )
     height, sigma = (
         metres(item[key], key, where, most=MAX_HEIGHT_M) if key in item else None
         for key in ("height_m", "height_sigma")

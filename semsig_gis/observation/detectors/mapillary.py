@@ -70,10 +70,9 @@ def _picture(image: dict[str, Any], source: str) -> Picture:
         corners, shares = _corners(item["geometry"], where)
         if not shares:
             if size is None:
-                msg = (
+                raise InputError(
                     f"{where} is in pixels of a picture of unknown size; request its width as well."
                 )
-                raise InputError(msg)
             left, top, right, bottom = corners
             corners = left / size[0], top / size[1], right / size[0], bottom / size[1]
         boxes.append(box_of(item["value"], corners, where))
@@ -104,8 +103,9 @@ def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401
         try:
             return bounds(_tile_points(base64.b64decode(geometry, validate=True))), True
         except (binascii.Error, ValueError, IndexError, TypeError, ZeroDivisionError) as error:
-            msg = f"{where} has a geometry that is not a vector tile in base64; download it again."
-            raise InputError(msg) from error
+            raise InputError(
+                f"{where} has a geometry that is not a vector tile in base64; download it again."
+            ) from error
     points = list(_points(geometry.get("coordinates") if isinstance(geometry, dict) else geometry))
     corners = bounds(points)
     return corners, max(corners) <= 1.0
@@ -180,12 +180,10 @@ def _values(message: Any, field: int) -> Iterator[Any]:  # noqa: ANN401 - bytes 
             length, place = _varint(message, place)
             value, place = message[place : place + length], place + length
             if place > len(message):
-                msg = "it ends early"
-                raise ValueError(msg)
+                raise ValueError("it ends early")
         elif kind in {WIDE, NARROW}:
             value, place = None, place + (8 if kind == WIDE else 4)
         else:
-            msg = f"{kind} is an unknown kind of value"
-            raise ValueError(msg)
+            raise ValueError(f"{kind} is an unknown kind of value")
         if key >> 3 == field:
             yield value

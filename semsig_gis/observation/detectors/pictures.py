@@ -94,16 +94,17 @@ def box_of(
         left, top, right, bottom = (float(value) for value in corners)
         sure = 1.0 if score is None else float(str(score))
     except (TypeError, ValueError) as error:
-        msg = f"{where} has a box or a score that is not a number; correct it or take it out."
-        raise InputError(msg) from error
+        raise InputError(
+            f"{where} has a box or a score that is not a number; correct it or take it out."
+        ) from error
     numbers = left, top, right, bottom
     near = all(abs(number) <= MOST_PIXELS for number in numbers)  # false for NaN
     if not near or right < left or bottom < top:
-        msg = f"{where} has the box {numbers}; give four numbers, none of its sides below 0."
-        raise InputError(msg)
+        raise InputError(
+            f"{where} has the box {numbers}; give four numbers, none of its sides below 0."
+        )
     if not 0 <= sure <= 1:
-        msg = f"{where} has the score {sure:g}; give a number from 0 to 1."
-        raise InputError(msg)
+        raise InputError(f"{where} has the score {sure:g}; give a number from 0 to 1.")
     return Box(label=str(label), corners=numbers, score=sure, whole=whole)
 
 

@@ -178,11 +178,10 @@ class Detector:
             and pictures
             and not self.shots.keys() & {name for picture in pictures for name in _names(picture)}
         ):
-            msg = (
+            raise InputError(
                 f"--photos names {next(iter(self.shots))}, but none of the pictures with boxes; "
                 f"name them as {pictures[0].name}."
             )
-            raise InputError(msg)
 
     def _shot(self, picture: Picture) -> Shot:
         """Return all that is known of how a picture was taken."""
@@ -196,19 +195,17 @@ class Detector:
 
     def _camera(self, picture: Picture, shot: Shot) -> Camera:
         if shot.size is None:
-            msg = (
+            raise InputError(
                 f"the size of the picture {picture.name} is not known; give the folder of the "
                 "pictures with --images, or --size WIDTHxHEIGHT."
             )
-            raise InputError(msg)
         width, height = shot.size
         fov = field_of_view(shot)
         if fov is None:
-            msg = (
+            raise InputError(
                 f"the field of view of the picture {picture.name} is not known; give --fov in "
                 "degrees, or with --images the folder of the pictures, whose EXIF may contain it."
             )
-            raise InputError(msg)
         return Camera(
             width=width,
             height=height,
@@ -381,12 +378,10 @@ def read_shots(path: str | Path) -> dict[str, Shot]:
 def _shot_of(row: Row) -> tuple[str, Shot]:
     name = row_value(row, "image")
     if name is None:
-        msg = "it names no image"
-        raise InputError(msg)
+        raise InputError("it names no image")
     camera, place = row_value(row, "camera"), row_value(row, "place")
     if camera is not None and camera not in get_args(Projection):
-        msg = f"the camera {camera!r} is none of {', '.join(get_args(Projection))}"
-        raise InputError(msg)
+        raise InputError(f"the camera {camera!r} is none of {', '.join(get_args(Projection))}")
     numbers: dict[str, Any] = {
         name: float(value)
         for name in ("fov", "heading", "pitch", "roll")
@@ -410,8 +405,9 @@ def north_sigma(error: str | float) -> float:
     try:
         return math.inf if error == "unknown" else float(error)
     except ValueError as fault:
-        msg = f"the error of a heading is {error!r}; give degrees or 'unknown'."
-        raise InputError(msg) from fault
+        raise InputError(
+            f"the error of a heading is {error!r}; give degrees or 'unknown'."
+        ) from fault
 
 
 def _names(picture: Picture) -> tuple[str, str, str]:

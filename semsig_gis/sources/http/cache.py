@@ -109,11 +109,10 @@ class Cache:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
             lock = (Path(self.folder) / f"{key}.lock").open("ab")
         except OSError as error:
-            msg = (
+            raise InputError(
                 f"cache folder {self.folder} cannot be written ({error.strerror}); "
                 "choose a folder you can write to."
-            )
-            raise InputError(msg) from error
+            ) from error
         with lock:
             lock_descriptor(lock.fileno())  # closing releases it
             yield self.entry(key)

@@ -83,11 +83,9 @@ class HttpSpec:
     def __post_init__(self) -> None:
         """Refuse numbers of attempts below 1, and a deadline that is now."""
         if self.attempts < 1:
-            msg = f"attempts is {self.attempts}; it takes at least 1."
-            raise InputError(msg)
+            raise InputError(f"attempts is {self.attempts}; it takes at least 1.")
         if not 0 < self.deadline_s < math.inf:
-            msg = f"deadline_s is {self.deadline_s}; give seconds above 0."
-            raise InputError(msg)
+            raise InputError(f"deadline_s is {self.deadline_s}; give seconds above 0.")
 
     def deadline(self) -> Deadline:
         """Return the deadline of a request that begins now."""
@@ -173,8 +171,9 @@ def answer_to(
             target = urljoin(response.url, response.headers.get("Location", ""))
             _require_named_host(response.url, target, spec)
             url, params = target, None
-    msg = f"{host_of(request.url)} redirects too often from {request.url}; check the address."
-    raise HttpError(msg)
+    raise HttpError(
+        f"{host_of(request.url)} redirects too often from {request.url}; check the address."
+    )
 
 
 def _require_named_host(source: str, target: str, spec: HttpSpec) -> None:
@@ -190,11 +189,10 @@ def _require_named_host(source: str, target: str, spec: HttpSpec) -> None:
     named = new.hostname in spec.hosts and new.scheme in {old.scheme, "https"}
     safer = safer or (named and spec.secret is None)
     if not (same or safer):
-        msg = (
+        raise SourceError(
             f"{old.netloc} redirects to {new.netloc or target}, which neither you nor the "
             f"catalogue named; if you trust it, put its address in the catalogue."
         )
-        raise SourceError(msg)
 
 
 def _failure(error: Exception, url: str) -> Exception:
@@ -221,8 +219,10 @@ def require_success(response: requests.Response) -> None:
     if status in RETRIED:
         raise PassingError(what, status, _retry_after(response))
     detail = _detail(response)
-    msg = f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it."
-    raise HttpError(msg, status)
+    raise HttpError(
+        f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it.",
+        status,
+    )
 
 
 def _detail(response: requests.Response) -> str:
@@ -277,8 +277,9 @@ def require_address(url: str) -> None:
     except ValueError:  # half a bracket
         usable = False
     if not usable:
-        msg = f"{url!r} is not an address; write one that begins with https://, without a password."
-        raise InputError(msg)
+        raise InputError(
+            f"{url!r} is not an address; write one that begins with https://, without a password."
+        )
 
 
 def host_of(url: str) -> str:
@@ -333,8 +334,9 @@ def fetch(
         held = entry.copy()
         if held is None:
             state = "is damaged in" if entry.sidecar.exists() else "is not in"
-            msg = f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
-            raise NotCachedError(msg)
+            raise NotCachedError(
+                f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
+            )
         return held
     with cache.locked(key) as entry:
         held = entry.copy()
@@ -353,11 +355,10 @@ def fetch(
             entry.drop_part()
             raise
         except OSError as error:
-            msg = (
+            raise InputError(
                 f"cache folder {cache.folder} cannot be written ({error.strerror or error}); "
                 "make room or choose another folder."
-            )
-            raise InputError(msg) from error
+            ) from error
 
 
 def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
@@ -378,8 +379,7 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
     except OverdueError as error:
         raise _overdue(url, spec) from error
     except PassingError as error:
-        msg = f"{host_of(url)} {error}; try again later."
-        raise HttpError(msg, error.status) from error
+        raise HttpError(f"{host_of(url)} {error}; try again later.", error.status) from error
     return body[:BLOCK].decode("utf-8", errors="replace")
 
 
@@ -427,8 +427,7 @@ def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
             spec.sleep(pause)
     if job.held is not None:
         remedy += f", or work offline with the copy of {job.held.fetched_at} in the cache"
-    msg = f"{host} {failure}{remedy}."
-    raise HttpError(msg, failure.status) from failure
+    raise HttpError(f"{host} {failure}{remedy}.", failure.status) from failure
 
 
 def _overdue(url: str, spec: HttpSpec, entry: Entry | None = None) -> HttpError:
@@ -457,11 +456,10 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
         require_success(response)
         edition = begun if have else Edition.of(response.headers)
         if job.accept and edition.content_type and edition.content_type not in job.accept:
-            msg = (
+            raise SourceError(
                 f"{host_of(request.url)} sent {edition.content_type} where "
                 f"{' or '.join(job.accept)} was expected; check the address {request.url}."
             )
-            raise SourceError(msg)
         if not have:
             entry.start_part(edition)
         _receive(response, job, have)
@@ -518,10 +516,9 @@ def _receive(response: requests.Response, job: _Job, have: int) -> None:
     blocks = blocks_of(response)
     if job.spec.secret is not None:
         if Edition.of(response.headers).encoding:
-            msg = (
+            raise HttpError(
                 f"{host_of(job.request.url)} sent a compressed answer although none was requested."
             )
-            raise HttpError(msg)
         blocks = job.spec.secret.strained(blocks)
     with job.entry.part.open("ab") as stream:
         for block in blocks:
@@ -555,8 +552,9 @@ def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterato
             yield block
         return
     if encoding not in {"gzip", "x-gzip"}:
-        msg = f"{host} sent the unsupported Content-Encoding {encoding}; report it to the service."
-        raise SourceError(msg)
+        raise SourceError(
+            f"{host} sent the unsupported Content-Encoding {encoding}; report it to the service."
+        )
     unzip = zlib.decompressobj(wbits=31)
     try:
         while packed := unzip.unconsumed_tail or unzip.unused_data or read(BLOCK):
@@ -573,11 +571,10 @@ def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterato
 
 def _require_room(size: int, job: _Job) -> None:
     if size > job.spec.max_bytes:
-        msg = (
+        raise TooLargeError(
             f"{host_of(job.request.url)} sends more than the {job.spec.max_bytes:,} bytes that are "
             "accepted; ask for a smaller area or for fewer layers."
         )
-        raise TooLargeError(msg)
 
 
 def _pairs(items: Mapping[str, str | float] | None) -> tuple[tuple[str, str], ...]:

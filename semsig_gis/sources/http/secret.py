@@ -35,11 +35,10 @@ class Secret:
                 if value
                 else "is not set"
             )
-            msg = (
+            raise InputError(
                 f"the environment variable {variable} {what}; set it to the access token that the "
                 "service gave you."
             )
-            raise InputError(msg)
         return cls(value)
 
     @property

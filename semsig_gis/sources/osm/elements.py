@@ -37,14 +37,12 @@ def way_shape(xy: NDArray[np.float64], role: Role) -> BaseGeometry:
     Nodes are longitude and latitude, shape (n, 2). A closed way is an area, but for a street.
     """
     if len(xy) < 2:  # noqa: PLR2004
-        msg = "has less than two nodes"
-        raise BadFeatureError(msg)
+        raise BadFeatureError("has less than two nodes")
     if role == "streets":
         return shapely.LineString(xy)
     if not _is_ring(xy):
         if role == "buildings":
-            msg = "is not closed, as the outline of a building is"
-            raise BadFeatureError(msg)
+            raise BadFeatureError("is not closed, as the outline of a building is")
         return shapely.LineString(xy)
     area = _areas(shapely.Polygon(xy))
     if role == "buildings":
@@ -93,8 +91,7 @@ def _rings(ways: Iterable[NDArray[np.float64]]) -> list[BaseGeometry]:
     lines = [shapely.LineString(xy) for xy in ways if not _is_ring(xy) and len(xy) > 1]
     joined, cuts, dangles, broken = shapely.polygonize_full(lines)
     if not all(part.is_empty for part in (cuts, dangles, broken)):
-        msg = "has ways that do not join to rings"
-        raise BadFeatureError(msg)
+        raise BadFeatureError("has ways that do not join to rings")
     outlines = shapely.get_exterior_ring(shapely.get_parts(joined))
     filled = [shapely.Polygon(outline) for outline in outlines]
     return [_areas(ring) for ring in (*closed, *filled)]
@@ -108,8 +105,7 @@ def _areas(geometry: shapely.Geometry) -> BaseGeometry:
 
 def _require_area(area: BaseGeometry) -> BaseGeometry:
     if area.is_empty:
-        msg = "encloses no area"
-        raise BadFeatureError(msg)
+        raise BadFeatureError("encloses no area")
     return area
 
 
@@ -144,8 +140,7 @@ def has_shape(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bo
 def require_tags(spec: LayerSpec) -> tuple[tuple[tuple[str, tuple[str, ...]], ...], ...]:
     """Return the tags of a layer; CatalogError if it says none."""
     if not spec.tags:
-        msg = f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].'
-        raise CatalogError(msg)
+        raise CatalogError(f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].')
     return spec.tags
 
 

@@ -178,12 +178,10 @@ def frame_table(frame: gpd.GeoDataFrame) -> FeatureTable:
     levels = [name for name in frame.index.names if name is not None and name not in frame]
     frame = frame.reset_index(level=levels) if levels else frame
     if frame.crs is None:
-        msg = "the table has no coordinate reference system; state it with set_crs."
-        raise CrsError(msg)
+        raise CrsError("the table has no coordinate reference system; state it with set_crs.")
     if not frame.columns.is_unique:
         names = frame.columns[frame.columns.duplicated()]
-        msg = f"the table has several columns {names[0]!r}; rename or drop them."
-        raise InputError(msg)
+        raise InputError(f"the table has several columns {names[0]!r}; rename or drop them.")
     geometry = frame.geometry
     if not frame.crs.equals(WGS84, ignore_axis_order=True):
         geometry = geometry.to_crs(WGS84)

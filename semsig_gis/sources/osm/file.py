@@ -78,11 +78,10 @@ def read_layers(
         return ()
     for spec in specs:
         if spec.id_field is not None:
-            msg = (
+            raise CatalogError(
                 f"layer {spec.name!r} has id_field = {spec.id_field!r}, yet the kind and number of "
                 "an element identify it; remove it."
             )
-            raise CatalogError(msg)
     index = TagIndex(specs)
     with _as_one(files, index) as file, readable(where):
         outlines = _scan(file, layers, index)
@@ -129,11 +128,9 @@ def _file(path: Path) -> osmium.io.File:
     name = path.name.lower()
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
     if kind is None:
-        msg = f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}."
-        raise SourceError(msg)
+        raise SourceError(f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}.")
     if path.stat().st_size == 0:
-        msg = f"{path} is empty; download it again."
-        raise SourceError(msg)
+        raise SourceError(f"{path} is empty; download it again.")
     require_modest(path)
     # The whole path, because libosmium takes "-" for standard input and "http:" for an address.
     return osmium.io.File(str(path.absolute()), kind)
@@ -226,10 +223,10 @@ def _require_whole(ways: Sequence[int], lines: Mapping[int, NDArray[np.float64]]
     """Refuse what has ways or nodes that the file lacks, as at the edge of an extract."""
     absent = [way for way in ways if way not in lines]
     if absent:
-        msg = f"lacks {len(absent)} of its {len(ways)} ways, as where a file is clipped"
-        raise BadFeatureError(msg)
+        raise BadFeatureError(
+            f"lacks {len(absent)} of its {len(ways)} ways, as where a file is clipped"
+        )
     nodes = sum(len(lines[way]) for way in ways)
     missing = sum(int(np.isnan(lines[way][:, 0]).sum()) for way in ways)
     if missing:
-        msg = f"lacks {missing} of its {nodes} nodes, as where a file is clipped"
-        raise BadFeatureError(msg)
+        raise BadFeatureError(f"lacks {missing} of its {nodes} nodes, as where a file is clipped")

@@ -30,11 +30,10 @@ def readable(what: object) -> Iterator[None]:
         yield
     except (osmium.InvalidLocationError, RuntimeError, ValueError) as error:
         cause = " ".join(str(error).split()).rstrip(".")
-        msg = (
+        raise SourceError(
             f"{what} cannot be read ({cause}); it is damaged or not the kind of file that its name "
             "says, so download it again."
-        )
-        raise SourceError(msg) from error
+        ) from error
 
 
 def merge_extracts(

@@ -89,11 +89,13 @@ def load_document(path: Path, *, where: str) -> Document:
         # as part of a sentence of ours
         return Document(elements, remark.rstrip(".").replace(". ", ", ")[:LONGEST_REMARK])
     except OSError as error:
-        msg = f"{where} cannot be read ({error.strerror}); give a JSON file of an Overpass server."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{where} cannot be read ({error.strerror}); give a JSON file of an Overpass server."
+        ) from error
     except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
-        msg = f"{where} is not JSON as Overpass servers send it; download it again."
-        raise SourceError(msg) from error
+        raise SourceError(
+            f"{where} is not JSON as Overpass servers send it; download it again."
+        ) from error
 
 
 def _is_element(element: dict[str, Any]) -> bool:
@@ -129,8 +131,7 @@ def read_layers(
     for file in paths:
         document = load_document(file, where=str(file))
         if document.failed:
-            msg = f"{file} is incomplete ({document.remark}); ask for a smaller area."
-            raise SourceError(msg)
+            raise SourceError(f"{file} is incomplete ({document.remark}); ask for a smaller area.")
         places = _Positions(document)
         for element in document.elements:
             name = kind, number = element["type"], element["id"]
@@ -206,8 +207,9 @@ class _Positions:
             nodes = [self._by_kind["node"].get(number) for number in way.get("nodes", ())]
         missing = sum(node is None for node in nodes)
         if missing or not nodes:
-            msg = f"lacks {missing} of its {len(nodes)} nodes" if nodes else "has no positions"
-            raise BadFeatureError(msg)
+            raise BadFeatureError(
+                f"lacks {missing} of its {len(nodes)} nodes" if nodes else "has no positions"
+            )
         return np.array([_point(node) for node in nodes])
 
 
@@ -215,16 +217,14 @@ def _point(place: dict[str, Any]) -> tuple[float, float]:
     try:
         return float(place["lon"]), float(place["lat"])
     except (KeyError, TypeError, ValueError) as error:
-        msg = "has no valid position"
-        raise BadFeatureError(msg) from error
+        raise BadFeatureError("has no valid position") from error
 
 
 def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAULT_HTTP) -> Area:
     """Return the first place of that name that has an outline, from a Nominatim server."""
     name = " ".join(name.split())
     if not name:
-        msg = "the name of the place is empty; write one such as 'Helsinki'."
-        raise InputError(msg)
+        raise InputError("the name of the place is empty; write one such as 'Helsinki'.")
     host = host_of(endpoint)
 
     fetched = fetch(
@@ -241,11 +241,10 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
         if outline is not None:
             return Area(outline, str(place.get("display_name", name)))
     found = f"has no outline ({places[0].get('display_name')})" if places else "is unknown"
-    msg = (
+    raise InputError(
         f"place {name!r} {found} at {host}; write the name of a city or district, or its bounding "
         "box as west,south,east,north."
     )
-    raise InputError(msg)
 
 
 def _places(path: Path, host: str) -> list[dict[str, Any]]:
@@ -254,8 +253,7 @@ def _places(path: Path, host: str) -> list[dict[str, Any]]:
     except ValueError:
         places = None
     if not isinstance(places, list) or not all(isinstance(place, dict) for place in places):
-        msg = f"{host} did not answer as a Nominatim server does; check the address."
-        raise SourceError(msg)
+        raise SourceError(f"{host} did not answer as a Nominatim server does; check the address.")
     return places
 
 
@@ -326,8 +324,7 @@ def fetch_layers(
     are, which may grow. SourceError if no server gives a tile.
     """
     if not endpoints:
-        msg = "there is no Overpass server to ask; name one in endpoints."
-        raise InputError(msg)
+        raise InputError("there is no Overpass server to ask; name one in endpoints.")
     if not specs:
         return []
     addresses = [address.rstrip("/").removesuffix("/interpreter") for address in endpoints]
@@ -390,16 +387,14 @@ class _Servers:
         if len(failures) == 1:
             raise failures[0]
         causes = ", and ".join(str(failure).rstrip(".") for failure in failures)
-        msg = f"no Overpass server gave an answer: {causes}."
-        raise SourceError(msg) from failures[0]
+        raise SourceError(f"no Overpass server gave an answer: {causes}.") from failures[0]
 
     def _ask(self, address: str, query: str) -> Path:
         def check(path: Path) -> None:
             document = load_document(path, where=f"the answer of {host_of(address)}")
             # One that is incomplete by its size is kept: the next run need not learn it again.
             if document.failed and not document.exhausted:
-                msg = f"{host_of(address)} failed ({document.remark}); try again later."
-                raise HttpError(msg)
+                raise HttpError(f"{host_of(address)} failed ({document.remark}); try again later.")
 
         return fetch(
             f"{address}/interpreter",
@@ -422,8 +417,10 @@ class _Servers:
             return  # a server without it says by its answer that it is busy
         wait = waiting_time(status)
         if wait > spec.longest_wait_s:
-            msg = f"{host_of(address)} has no free slot for {wait:.0f} s; try again after that."
-            raise HttpError(msg, TOO_MANY)
+            raise HttpError(
+                f"{host_of(address)} has no free slot for {wait:.0f} s; try again after that.",
+                TOO_MANY,
+            )
         if wait:
             spec.tell(f"{host_of(address)} has no free slot for {wait:.0f} s")
             spec.sleep(wait + NO_SLOT_MARGIN_S)

@@ -66,20 +66,20 @@ def _address(client: Client) -> str:
     """Return the address of the layer; CatalogError, with the layers there are, if it is none."""
     found = SERVER.fullmatch(f"{client.endpoint}/{quote(client.dataset, safe='/')}".rstrip("/"))
     if found is None:
-        msg = (
+        raise CatalogError(
             f"layer {client.layer.name!r} has the dataset {client.dataset!r}, which is not a layer "
             "of an ArcGIS server; write 'SERVICE/FeatureServer/LAYER', the layer by number or "
             "name."
         )
-        raise CatalogError(msg)
     service = found[1]
     layer = client.dataset.rstrip("/").rpartition("/")[2] if found[2] else ""
     try:
         root = client.json(Query(service, {"f": "json"}))
     except HttpError as error:
         msg = f"{error}".removesuffix("; correct it.")
-        msg = f"{msg}; correct `dataset` or `endpoints` in the catalogue."
-        raise HttpError(msg, error.status) from error
+        raise HttpError(
+            f"{msg}; correct `dataset` or `endpoints` in the catalogue.", error.status
+        ) from error
     layers = {str(item["id"]): item["name"] for item in _tables(root)}
     if not layer and len(layers) == 1:
         layer = next(iter(layers))
@@ -95,11 +95,10 @@ def _tables(root: dict[str, Any]) -> list[dict[str, Any]]:
     try:
         return [*root["layers"], *root.get("tables", ())]
     except (KeyError, TypeError) as error:
-        msg = (
+        raise SourceError(
             "the server did not send the description of a FeatureServer or MapServer; check the "
             "address."
-        )
-        raise SourceError(msg) from error
+        ) from error
 
 
 def _id_field(info: dict[str, Any]) -> str | None:
@@ -121,11 +120,10 @@ def _fetch_pages(
     read = functools.partial(_page, client=client)
     if not (info.get("advancedQueryCapabilities") or {}).get("supportsPagination", False):
         if told is None or told > most:
-            msg = (
+            raise SourceError(
                 f"{host_of(query.url)} sends {most:,} rows at most and cannot send the rest of "
                 f"{told or 'more'}; ask for a smaller area."
             )
-            raise SourceError(msg)
         return client.pages(query, read, lambda *_: None, told=told)
     asked = query.also(resultRecordCount=most)
     if key:

@@ -59,12 +59,11 @@ def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 
     if resource.get("datastore_active") and suffix in TABLES:
         return _rows(client, spec, str(resource.get("id")))
     if client.layer.server_where:
-        msg = (
+        raise CatalogError(
             f"layer {client.layer.name!r} has a server_where, and the datastore of "
             f"{host_of(client.endpoint)} does not accept it; write it as `where`, which is applied "
             "here."
         )
-        raise CatalogError(msg)
     address = urljoin(f"{client.endpoint}/", str(resource.get("url") or ""))
     file = client.file(
         Query(address),
@@ -92,11 +91,10 @@ def _package(client: Client) -> dict[str, Any]:
         raise client.unknown(names, what="dataset") from error
     package = reply.get("result")
     if not isinstance(package, dict):
-        msg = (
+        raise SourceError(
             "the portal did not send the description of a dataset; check that the address is that "
             "of a CKAN portal."
         )
-        raise SourceError(msg)
     return package
 
 
@@ -118,11 +116,10 @@ def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]
     usable = [(item, suffix) for item in resources if (suffix := _suffix(item)) is not None]
     names = [_shown(item) for item in resources]
     if not usable:
-        msg = (
+        raise CatalogError(
             f"dataset {client.dataset!r} of layer {client.layer.name!r} has no resource that can "
             f"be read, only {', '.join(names) or 'none at all'}; choose another dataset."
         )
-        raise CatalogError(msg)
     named = [pair for pair in usable if _is_named(pair[0], client.layer.files)]
     order = [*dict.fromkeys(FORMATS.values()), ""]
     chosen = named or usable
@@ -130,12 +127,11 @@ def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]
     chosen = [pair for pair in chosen if pair[1] == best]
     if len(chosen) > 1 and not named:
         listed = ", ".join(_shown(item) for item, _ in chosen)
-        msg = (
+        raise CatalogError(
             f"dataset {client.dataset!r} of layer {client.layer.name!r} has several resources "
             f"({listed}); name the one that is meant in `files`, by a pattern such as "
             f"{_file_name(chosen[0][0])!r}."
         )
-        raise CatalogError(msg)
     return max(chosen, key=lambda pair: _edition(pair[0]))
 
 
@@ -178,11 +174,10 @@ def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:
 def _result(content: bytes, client: Client) -> dict[str, Any]:
     result = json_object(content, client.endpoint).get("result")
     if not isinstance(result, dict) or not isinstance(result.get("records"), list):
-        msg = (
+        raise SourceError(
             f"{host_of(client.endpoint)} sent JSON without records; check the address "
             f"{client.endpoint}."
         )
-        raise SourceError(msg)
     return result
 
 
@@ -197,8 +192,7 @@ def _refuse_page(path: Path, address: str) -> None:
     """Refuse a web page in the place of a file."""
     with path.open("rb") as stream:
         if HTML.match(stream.read(200).lstrip()):
-            msg = (
+            raise SourceError(
                 f"{host_of(address)} sent a web page where the file {address} was expected; "
                 "download it by hand, or tell its publisher."
             )
-            raise SourceError(msg)

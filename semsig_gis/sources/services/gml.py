@@ -42,8 +42,7 @@ def local_name(element: ET.Element) -> str:
 def parse_xml(content: bytes) -> ET.Element:
     """Return the root of a document; ValueError if it is none, or defines texts of its own."""
     if b"<!DOCTYPE" in content.replace(b"\0", b""):  # may define texts that swell; in UTF-16, too
-        msg = "it has a document type"
-        raise ValueError(msg)
+        raise ValueError("it has a document type")
     try:
         return ET.fromstring(content)  # noqa: S314 - without a document type
     except ET.ParseError as error:
@@ -69,8 +68,9 @@ def stated_crs(content: bytes) -> tuple[CRS | None, bool]:
     try:
         crs = CRS.from_user_input(f"EPSG:{code[1]}" if code else name)
     except CRSError as error:
-        msg = f"the GML names the CRS {name[:60]!r}, which is unknown; tell its publisher."
-        raise CrsError(msg) from error
+        raise CrsError(
+            f"the GML names the CRS {name[:60]!r}, which is unknown; tell its publisher."
+        ) from error
     northing_first = crs.axis_info[0].direction.lower() in {"north", "south"}
     return crs, northing_first and AUTHORITY_ORDER.match(name) is not None
 
@@ -116,8 +116,7 @@ def _geometry(element: ET.Element, *, swap: bool) -> shapely.Geometry:
         outer, *inner = (_ring(part, swap=swap) for part in element if _is_boundary(part))
         return shapely.Polygon(outer, inner)
     if name not in SEVERAL:
-        msg = f"{name} is not read"
-        raise ValueError(msg)
+        raise ValueError(f"{name} is not read")
     parts = [_geometry(part, swap=swap) for part in _parts(element)]
     if name in {"Curve", "CompositeCurve", "Ring"}:
         return shapely.LineString(np.vstack([shapely.get_coordinates(part) for part in parts]))

@@ -103,11 +103,10 @@ class Positions:
         coordinates = self._x and self._y
         positioned = self._shape or self._point or coordinates or table.has_geometry
         if not (positioned or table.empty):
-            msg = (
+            raise SourceError(
                 f"{where} has no position: none of its fields {', '.join(table.fields)} is "
                 f"{SHAPE} or {POINT}; name the one that is, as an alias in the catalogue."
             )
-            raise SourceError(msg)
 
     def of(self, record: Record) -> Position:
         """Return the position of a record, or None where it has none."""
@@ -150,8 +149,7 @@ def _shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
     try:
         return _built(value)
     except (AttributeError, LookupError, TypeError, ValueError, ShapelyError) as error:
-        msg = f"its shape {_shown(value)} is not a geometry"
-        raise BadFeatureError(msg) from error
+        raise BadFeatureError(f"its shape {_shown(value)} is not a geometry") from error
 
 
 def _built(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
@@ -201,8 +199,9 @@ def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
         lat, lon = value.strip().strip("()").split(",") if isinstance(value, str) else value
         return float(lon), float(lat)
     except (AttributeError, LookupError, TypeError, ValueError) as error:
-        msg = f"its point {_shown(value)} is not a latitude and a longitude"
-        raise BadFeatureError(msg) from error
+        raise BadFeatureError(
+            f"its point {_shown(value)} is not a latitude and a longitude"
+        ) from error
 
 
 def _coordinates(values: Mapping[str, Any], x: str, y: str) -> tuple[float, float] | None:
@@ -213,8 +212,9 @@ def _coordinates(values: Mapping[str, Any], x: str, y: str) -> tuple[float, floa
         # What is no number, raises.
         return tuple(decimal(v) if isinstance(v, str) else float(v) for v in both)  # type: ignore[arg-type, return-value]
     except (TypeError, ValueError) as error:
-        msg = f"its {x} {both[0]!r} and {y} {both[1]!r} are not two numbers"
-        raise BadFeatureError(msg) from error
+        raise BadFeatureError(
+            f"its {x} {both[0]!r} and {y} {both[1]!r} are not two numbers"
+        ) from error
 
 
 def _shown(value: object) -> str:

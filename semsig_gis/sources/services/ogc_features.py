@@ -31,19 +31,17 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     conformance = client.json(Query(f"{client.endpoint}/conformance"), accept=JSON)
     classes = [str(name) for name in conformance.get("conformsTo") or ()]
     if not any(CORE in name for name in classes):
-        msg = (
+        raise SourceError(
             f"{host_of(client.endpoint)} does not declare that it supports OGC API - Features; "
             f"check the address {client.endpoint}."
         )
-        raise SourceError(msg)
     params: dict[str, str | float] = {"limit": PAGE_ROWS}
     if client.layer.server_where:
         if not any(FILTER in name for name in classes):
-            msg = (
+            raise CatalogError(
                 f"layer {client.layer.name!r} has a server_where, and {host_of(client.endpoint)} "
                 "accepts no filter; write it as `where`, which is applied here."
             )
-            raise CatalogError(msg)
         params |= {"filter": client.layer.server_where, "filter-lang": "cql2-text"}
     collection, address = _collection(client)
     items = _link(collection, "items", GEOJSON[0]) or f"{address}/items"

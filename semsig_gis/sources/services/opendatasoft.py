@@ -53,12 +53,11 @@ def _field_types(address: str, client: Client) -> Mapping[str, str]:
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        msg = (
+        raise CatalogError(
             f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
             f"layer {client.layer.name!r}; look for it at {client.endpoint}/explore and correct "
             "`dataset` in the catalogue."
-        )
-        raise CatalogError(msg) from error
+        ) from error
 
 
 def _described(reply: bytes) -> dict[str, str]:
@@ -66,11 +65,10 @@ def _described(reply: bytes) -> dict[str, str]:
         content: Any = parse_json(reply)
         return {field["name"]: field["type"] for field in content["fields"]}
     except (KeyError, TypeError, ValueError) as error:
-        msg = (
+        raise SourceError(
             "the portal does not describe its dataset as the Explore API v2.1 does; "
             "check that the address is that of an Opendatasoft portal."
-        )
-        raise SourceError(msg) from error
+        ) from error
 
 
 def _query(client: Client, types: Mapping[str, str], area: Area | None) -> dict[str, str | float]:
@@ -82,11 +80,10 @@ def _query(client: Client, types: Mapping[str, str], area: Area | None) -> dict[
     if area is not None:
         points = [name for name in places if types[name] == POINT] or places
         if not points:
-            msg = (
+            raise CatalogError(
                 f"dataset {layer.dataset!r} of layer {layer.name!r} has no positions to cut an "
                 "area out of."
             )
-            raise CatalogError(msg)
         conditions.append(_inside(area, find_field(POINT, layer, points) or points[0]))
     if conditions:
         query["where"] = " and ".join(f"({condition})" for condition in conditions)
@@ -123,5 +120,4 @@ def _require_whole(path: Path) -> None:
         stream.seek(max(0, path.stat().st_size - 16))
         end = stream.read().rstrip()
     if not (begin.startswith(b"{") and end.endswith(b"}")):
-        msg = "what the portal sent is not whole geojson; try again later."
-        raise SourceError(msg)
+        raise SourceError("what the portal sent is not whole geojson; try again later.")

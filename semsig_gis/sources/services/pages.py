@@ -121,11 +121,10 @@ class Client:
         """Fetch a file; SourceError if it lies with a host that the catalogue does not name."""
         hosts = frozenset(urlsplit(endpoint).hostname or "" for endpoint in self.endpoints)
         if urlsplit(query.url).hostname not in hosts:
-            msg = (
+            raise SourceError(
                 f"{host_of(self.endpoint)} sends on to {query.url.partition('?')[0]}, whose host "
                 "the catalogue does not name; if you trust it, add its address to `endpoints`."
             )
-            raise SourceError(msg)
         at_home = urlsplit(query.url)[:2] == urlsplit(self.endpoint)[:2]
         spec = dataclasses.replace(
             self.spec, hosts=hosts, secret=self.spec.secret if at_home else None
@@ -206,11 +205,10 @@ class Client:
         return tuple(files)
 
     def _refuse(self, what: str) -> None:
-        msg = (
+        raise PagingError(
             f"{host_of(self.endpoint)} {what}; its data may have changed meanwhile, so run it "
             "again, or tell its publisher."
         )
-        raise PagingError(msg)
 
     def unknown(self, names: Iterable[str], *, what: str, name: str = "") -> CatalogError:
         """Return the error for a dataset that the service does not have, with those it has."""
@@ -252,8 +250,9 @@ def json_object(content: bytes, url: str) -> dict[str, Any]:
     """Return a JSON object that a service sent, as `json_value` does; SourceError if it is none."""
     reply = json_value(content, url)
     if not isinstance(reply, dict):
-        msg = f"{host_of(url)} sent JSON that is not an object; check the address {url}."
-        raise SourceError(msg)
+        raise SourceError(
+            f"{host_of(url)} sent JSON that is not an object; check the address {url}."
+        )
     return reply
 
 
@@ -277,8 +276,7 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
         what = f"answered with the error {error_text(content) or status}"
         if status in RETRIED:
             raise PassingError(what, status)
-        msg = f"{host} {what} to {url}; correct it."
-        raise HttpError(msg, status)
+        raise HttpError(f"{host} {what} to {url}; correct it.", status)
     return reply
 
 
@@ -287,11 +285,10 @@ def geojson_page(content: bytes, client: Client) -> Page:
     reply = json_object(content, client.endpoint)
     rows = reply.get("features")
     if not isinstance(rows, list):
-        msg = (
+        raise SourceError(
             f"{host_of(client.endpoint)} sent JSON without features; check the address "
             f"{client.endpoint}."
         )
-        raise SourceError(msg)
     counts = (reply.get(name) for name in ("numberMatched", "totalFeatures"))
     told = next((count for count in counts if isinstance(count, int) and count >= 0), None)
     links = reply.get("links") or ()
@@ -305,16 +302,14 @@ def xml_root(content: bytes, url: str) -> ET.Element:
     if begin.startswith(b"<") and not HTML.match(begin):
         said = error_text(content)
         if said:
-            msg = f"{host} answered with the error {said} to {url}; correct it."
-            raise HttpError(msg)
+            raise HttpError(f"{host} answered with the error {said} to {url}; correct it.")
         try:
             return parse_xml(content)
         except ValueError as error:
             what = "sent XML that is not whole"
             raise PassingError(what) from error
     what = "a web page" if HTML.match(begin) else "something else"
-    msg = f"{host} sent {what} where XML was expected; check the address {url}."
-    raise SourceError(msg)
+    raise SourceError(f"{host} sent {what} where XML was expected; check the address {url}.")
 
 
 def refuse_markup(content: bytes, url: str) -> None:
@@ -324,11 +319,11 @@ def refuse_markup(content: bytes, url: str) -> None:
         return
     said = error_text(content)
     if said:
-        msg = f"{host_of(url)} answered with the error {said} to {url}; correct it."
-        raise HttpError(msg)
+        raise HttpError(f"{host_of(url)} answered with the error {said} to {url}; correct it.")
     what = "a web page" if HTML.match(begin) else "XML"
-    msg = f"{host_of(url)} sent {what} where JSON was expected; check the address {url}."
-    raise SourceError(msg)
+    raise SourceError(
+        f"{host_of(url)} sent {what} where JSON was expected; check the address {url}."
+    )
 
 
 def fetch_layers(

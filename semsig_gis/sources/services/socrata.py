@@ -78,23 +78,21 @@ def _about(client: Client) -> dict[str, Any]:
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        msg = (
+        raise CatalogError(
             f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
             f"layer {client.layer.name!r}; look for it at {client.endpoint}/browse and correct "
             "`dataset` in the catalogue."
-        )
-        raise CatalogError(msg) from error
+        ) from error
 
 
 def _types(about: Mapping[str, Any]) -> dict[str, str]:
     """Return the columns of a dataset and their types, without those that the portal computes."""
     columns = about.get("columns")
     if not isinstance(columns, list):
-        msg = (
+        raise SourceError(
             "the portal does not describe its dataset as Socrata does; check that the address is "
             "that of a Socrata portal."
         )
-        raise SourceError(msg)
     types = {item.get("fieldName", ""): item.get("dataTypeName", "") for item in columns}
     return {name: kind for name, kind in types.items() if name and not name.startswith(":")}
 

@@ -90,8 +90,7 @@ def _json(path: Path) -> Table:
     except UnicodeDecodeError as error:
         raise _not_utf8(path) from error
     except (ValueError, RecursionError) as error:
-        msg = f"{path} is not whole JSON ({error}); download it again."
-        raise SourceError(msg) from error
+        raise SourceError(f"{path} is not whole JSON ({error}); download it again.") from error
     if isinstance(content, dict) and isinstance(content.get("result"), dict):
         content = content["result"]  # of CKAN, in an envelope
     collection = isinstance(content, dict) and content.get("type") == "FeatureCollection"
@@ -104,11 +103,10 @@ def _json(path: Path) -> Table:
     records = [_record(item) for item in items] if isinstance(items, list) else [""]
     good = [record for record in records if isinstance(record, Record)]
     if records and not good:
-        msg = (
+        raise SourceError(
             f"{path} has no records; give an export of a portal, which is a list of them or has "
             "one under features, results or records."
         )
-        raise SourceError(msg)
     return Table(
         fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
         records=lambda _: iter(records),
@@ -172,8 +170,9 @@ def _stated_crs(definition: object, path: Path) -> CRS:
     try:
         system = CRS.from_user_input(definition)
     except CRSError as error:
-        msg = f"{path} states a CRS that is unknown ({str(definition)[:60]}); correct it."
-        raise CrsError(msg) from error
+        raise CrsError(
+            f"{path} states a CRS that is unknown ({str(definition)[:60]}); correct it."
+        ) from error
     return _usual(system)
 
 
@@ -186,14 +185,12 @@ def _gml(path: Path) -> Table:
     try:
         root = parse_xml(content)
     except ValueError as error:
-        msg = f"{path} is not whole GML ({error}); download it again."
-        raise SourceError(msg) from error
+        raise SourceError(f"{path} is not whole GML ({error}); download it again.") from error
     said = error_text(content)
     found = list(features(root))
     if said or not (found or local_name(root) == "FeatureCollection"):
         what = f"contains the error {said}" if said else "has no features"
-        msg = f"{path} {what}; give GML as a Web Feature Service sends it."
-        raise SourceError(msg)
+        raise SourceError(f"{path} {what}; give GML as a Web Feature Service sends it.")
     crs, swap = stated_crs(content)
     records = [Record(*read_feature(item, swap=swap)) for item in found]
     return Table(

@@ -91,12 +91,11 @@ def _capabilities(content: bytes, client: Client) -> _Capabilities:
     root = xml_root(content, client.endpoint)
     version = root.get("version", "")
     if local_name(root) != "WFS_Capabilities" or not version.startswith("2."):
-        msg = (
+        raise SourceError(
             f"{host_of(client.endpoint)} is not a Web Feature Service of version 2.0 (it sent "
             f"{local_name(root)} {version}".rstrip()
             + f"); check the address {client.endpoint}."
         )
-        raise SourceError(msg)
     formats = [
         value
         for operation in _named(root, "Operation", "GetFeature")
@@ -194,11 +193,10 @@ def _fetch_pages(
 def _gml_page(content: bytes, client: Client) -> Page:
     root = xml_root(content, client.endpoint)
     if local_name(root) != "FeatureCollection":
-        msg = (
+        raise SourceError(
             f"{host_of(client.endpoint)} sent {local_name(root)} where features were expected; "
             f"check the address {client.endpoint}."
         )
-        raise SourceError(msg)
     matched = root.get("numberMatched", "")
     rows = [ET.tostring(item, encoding="unicode") for item in features(root)]
     return Page(rows, told=int(matched) if matched.isdecimal() else None)

@@ -135,8 +135,7 @@ class CitySpec:
         require_number("size of the city", self.size, least=least, most=most, unit="metres")
         require_number("seed of the city", self.seed, least=0, most=MOST_SEED)
         if not all(abs(one) <= MOST_CENTRE_M for one in self.centre):
-            msg = f"centre of the city is {self.centre}; give x and y in metres."
-            raise InputError(msg)
+            raise InputError(f"centre of the city is {self.centre}; give x and y in metres.")
 
 
 PARIS_LIKE = CitySpec(size=9690.0)

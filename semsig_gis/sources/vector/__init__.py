@@ -121,8 +121,7 @@ def read_layer(
         return read_csv_layer(lines, spec, filters=filters, crs=crs, where=where)
     layer = describe(member)
     if layer.geometry == NO_GEOMETRY:
-        msg = f"{where} has no geometry; give the layer that contains the positions."
-        raise SourceError(msg)
+        raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
     rules = RowRules(spec, layer.fields, filters=filters, where=where)
     table = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
     return raw_layer(table.rows, rules, table.crs, by_file=table.by_file, notes=table.notes)
@@ -244,13 +243,13 @@ def _pick(path: Path, wanted: str | None) -> Member:
     if len(matches) == 1:
         return matches[0]
     if wanted is not None and not matches:
-        msg = (
+        raise UnknownNameError(
             f"{path} has no layer {wanted!r}{nearest_name(wanted, names)}; "
             f"its layers are {', '.join(names)}."
         )
-        raise UnknownNameError(msg)
-    msg = f"{path} contains {len(matches)} layers ({', '.join(names)}); give the name of one."
-    raise SourceError(msg)
+    raise SourceError(
+        f"{path} contains {len(matches)} layers ({', '.join(names)}); give the name of one."
+    )
 
 
 def _csv(member: Member, spec: LayerSpec | None, *, where: str) -> CsvTable | None:

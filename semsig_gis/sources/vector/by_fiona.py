@@ -126,8 +126,7 @@ def _position(geometry: fiona.Geometry | None) -> Position:
         with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
             return shapely.geometry.shape(geometry)
     except (AttributeError, TypeError, ValueError, shapely.errors.ShapelyError) as error:
-        msg = f"its {geometry.type} is not valid ({error})"
-        raise BadFeatureError(msg) from error
+        raise BadFeatureError(f"its {geometry.type} is not valid ({error})") from error
 
 
 def _has_open_ring(geometry: fiona.Geometry) -> bool:

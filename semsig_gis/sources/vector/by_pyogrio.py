@@ -117,8 +117,7 @@ def layer_names(member: Member) -> list[str]:
     except Exception as error:
         raise unreadable(member, error) from error
     if not names:
-        msg = f"{member} contains no layer; download it again."
-        raise SourceError(msg)
+        raise SourceError(f"{member} contains no layer; download it again.")
     return names
 
 
@@ -214,8 +213,7 @@ def _read(
         table: Any = next(reader, ())
     if len(table) != size:  # as Arrow's way ends at an error without a word, have it said
         read(member.address, max_features=size, **what)
-        msg = "cannot be read"
-        raise ValueError(msg)
+        raise ValueError("cannot be read")
     columns = []
     for field in fields:
         try:

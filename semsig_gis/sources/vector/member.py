@@ -120,8 +120,9 @@ def members(path: Path) -> tuple[Member, ...]:
     require_file(path, "a vector file")
     suffixes = {*DRIVERS, ".zip"}
     if suffix not in suffixes:
-        msg = f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
-        raise SourceError(msg)
+        raise SourceError(
+            f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
+        )
     inner = _archived(path) if suffix == ".zip" else (None,)
     return tuple(Member(path, name) for name in inner)
 
@@ -149,19 +150,17 @@ def _archived(path: Path) -> tuple[str, ...]:
     except _ZIP_FAULTS as error:
         raise unreadable(path, error) from error
     if broken is not None:
-        msg = f"archive {path} is damaged at {broken}; download it again."
-        raise SourceError(msg)
+        raise SourceError(f"archive {path} is damaged at {broken}; download it again.")
     usable = [
         name
         for name in names
         if Path(name).suffix.lower() in DRIVERS and not name.startswith("__MACOSX/")
     ]
     if not usable:
-        msg = (
+        raise SourceError(
             f"archive {path} contains no vector file, only {', '.join(names) or 'nothing'}; one of "
             f"{', '.join(sorted(DRIVERS))} is needed."
         )
-        raise SourceError(msg)
     data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
     return tuple(data or usable)
 
@@ -178,8 +177,7 @@ def _refuse_damaged(path: Path) -> None:
     except sqlite3.Error as error:
         verdict = str(error)
     if verdict != "ok":
-        msg = (
+        raise SourceError(
             f"{path} cannot be read ({' '.join(verdict.split())}); it may be damaged, so download "
             "it again."
         )
-        raise SourceError(msg)

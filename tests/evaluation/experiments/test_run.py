@@ -228,8 +228,7 @@ def test_parts_that_fail_are_told_and_the_others_are_kept(
 ) -> None:
     def fail(database: Any, locator: Any, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
         if len(queries) < PART_QUERIES:
-            msg = "the disk hiccups"
-            raise OSError(msg)
+            raise OSError("the disk hiccups")
         return score_queries(database, locator, queries, **options)
 
     monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", fail)

@@ -54,17 +54,15 @@ def metric(
     that stands for any other) with an `InputError`.
     """
     if name not in METRICS:
-        msg = (
+        raise UnknownNameError(
             f"measure {name!r} is unknown{nearest_name(name, METRICS)}; "
             f"the measures are {', '.join(METRICS)}."
         )
-        raise UnknownNameError(msg)
     if name == "edit" and (weights is not None or wildcard is not None):
         return partial(edit.distances, weights=weights, wildcard=wildcard)
     if wildcard is not None:
-        msg = (
+        raise InputError(
             f"the query has objects of unknown class (?), which measure {name!r} cannot compare; "
             "use 'edit', or leave them out."
         )
-        raise InputError(msg)
     return METRICS[name]

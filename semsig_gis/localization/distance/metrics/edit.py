@@ -135,11 +135,10 @@ class EditWeights:
             weight = getattr(self, field.name)
             whole = isinstance(weight, int) and not isinstance(weight, bool)
             if not whole or not 1 <= weight <= _LARGEST_WEIGHT:
-                msg = (
+                raise InputError(
                     f"edit weight {field.name!r} is {weight!r}; "
                     f"give a whole number from 1 to {_LARGEST_WEIGHT}."
                 )
-                raise InputError(msg)
 
 
 def distances(
@@ -164,11 +163,10 @@ def distances(
     sequences = [checked_sequence(query) for query in queries]
     costs = weights or EditWeights()
     if wildcard is not None and costs != EditWeights():
-        msg = (
+        raise InputError(
             f"a wildcard was given with edit weights {'/'.join(map(str, astuple(costs)))}; "
             "wildcards are compared with weights of 1 only."
         )
-        raise InputError(msg)
     few = only is not None and len(only) * _FEWER < len(table)
     if wildcard is not None or (
         costs == EditWeights() and not few and _pays(len(sequences), table)
