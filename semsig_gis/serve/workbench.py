@@ -22,7 +22,7 @@ from semsig_gis.evaluation.queries.distortion_text import ready_chain
 from semsig_gis.evaluation.queries.distortions import Detector as FailingDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 from semsig_gis.exports import export_answer
-from semsig_gis.localization.likelihood.incremental import TurnMemo
+from semsig_gis.localization.likelihood.incremental import IncrementalIndex
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.likelihood.priors import KnownPosition, position_prior
@@ -100,7 +100,7 @@ class Workbench:
     _indexes: dict[tuple[str, str], LikelihoodIndex] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
     _scores: dict[str, CellScores] = field(default_factory=dict)
-    _memo: TurnMemo = field(default_factory=TurnMemo)
+    _incremental: IncrementalIndex | None = None
 
     @property
     def database(self) -> SignatureDatabase:
@@ -329,13 +329,16 @@ class Workbench:
 
     def _locator(self, question: Question) -> LikelihoodLocator:
         """Return what answers a question."""
+        index = self._index(question)
+        if self._incremental is None or self._incremental.index is not index:
+            self._incremental = IncrementalIndex(index)
         locator = LikelihoodLocator(
-            index=self._index(question),
+            index=index,
             store=self.store,
             refined=None if question.seen_from == "anywhere" else False,
             top=question.top,
             explained=question.top,
-            memo=self._memo,
+            incremental=self._incremental,
         )
         if self._is_quick(question):
             locator = replace(locator, refined=False, quick=True, explained=QUICKLY_EXPLAINED)

@@ -20,7 +20,7 @@ from semsig_gis.database.database import views_in
 from semsig_gis.database.occlusion import Footprints
 from semsig_gis.database.sightings import ViewpointSpec, bearings, views_at
 from semsig_gis.database.viewpoints import choose_viewpoints
-from semsig_gis.localization.likelihood.off_centre import views_aside
+from semsig_gis.localization.likelihood.off_centre import views_off_centre
 
 if TYPE_CHECKING:
     from semsig_gis.database.sightings import Mode
@@ -182,7 +182,7 @@ def test_cells_tell_what_is_seen_between_their_middles() -> None:
     assert len(cells) > 20
     index = ObjectIndex(objects.xy)
     places = np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 2.0], [0.0, -4.0]])
-    seen = views_aside(database, cells, places)
+    seen = views_off_centre(database, cells, places)
     assert len(seen) == len(places) * len(cells)
     for number, place in enumerate(places):
         views = np.arange(number, len(seen), len(places))

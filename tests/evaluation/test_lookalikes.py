@@ -136,7 +136,7 @@ def test_without_a_class(noise: NoiseSpec, seed: int, radius: float) -> None:
     length = np.minimum(database.lengths, len(table.missed) - 1)[owner]
     kinds, far = table.row_of[database.codes], database.distance_units
     sure = table.detected[length, kinds]
-    missed = np.log1p(-sure * table.seen[kinds, far]) - sure * table.left[kinds, far]
+    missed = np.log1p(-sure * table.remaining[kinds, far]) - sure * table.leaving[kinds, far]
     for cell in range(0, len(database), 13):
         beyond = apart(index, cell) > radius
         sums = []
@@ -325,8 +325,8 @@ def test_a_column_is_what_an_object_in_its_step_adds(
     owner = np.repeat(np.arange(cells), database.lengths)
     length = np.minimum(database.lengths, len(table.missed) - 1)[owner]
     sure, far = table.detected[length, kinds], database.distance_units
-    chance = sure * table.seen[kinds, far]
-    heard = chance / (1.0 - chance) * inside + sure * table.left[kinds, far] / 360.0
+    chance = sure * table.remaining[kinds, far]
+    heard = chance / (1.0 - chance) * inside + sure * table.leaving[kinds, far] / 360.0
     heard *= table.named[length, kinds, name]
     expected = np.log1p(np.bincount(owner, heard, cells) / table.density[name])
     # A byte holds no more than 255 steps; deviations come in levels where they differ.

@@ -123,7 +123,7 @@ def symbol_columns(
     owners = np.repeat(np.arange(cells), database.lengths)
     kinds, far = table.row_of[database.codes], database.distance_units
     sure = table.detected[table.length_rows(database.lengths)[owners], kinds]
-    chances, leaving = sure * table.seen[kinds, far], sure * table.left[kinds, far]
+    chances, leaving = sure * table.remaining[kinds, far], sure * table.leaving[kinds, far]
     spread_of, spread = _spreads(database, table)
     bins, units = np.divmod(database.bearing_units, BIN_UNITS)
 

@@ -184,7 +184,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
     """Return what comes of one query, in the order of `Trials`."""
-    loglik = rerank(index, query, scores, count=RERANKED, aside=False, sample=SAMPLE).loglik
+    loglik = rerank(index, query, scores, count=RERANKED, off_centre=False, sample=SAMPLE).loglik
     kept = loglik > loglik.max() - HOPELESS
     kept[cell] = True
     cells = np.flatnonzero(kept)

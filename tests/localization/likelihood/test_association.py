@@ -39,7 +39,7 @@ from semsig_gis.localization.likelihood.association import (
 )
 from semsig_gis.localization.likelihood.explain import explain, explain_cell
 from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.off_centre import views_aside
+from semsig_gis.localization.likelihood.off_centre import views_off_centre
 from semsig_gis.localization.likelihood.photo import LOST, PhotoTable, photo_loglik
 from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, cell_noise, named_noise
 from semsig_gis.localization.noise.table import database_tables, query_bearings
@@ -279,7 +279,7 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
     cells = rng.choice(longest[:80], 40, replace=False)
     along = (np.arange(side) - 1) * town.grid.step / side
     places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
-    seen = views_aside(town, cells, places)
+    seen = views_off_centre(town, cells, places)
     query = View.of(town.signature(int(cells[0])))
     sharp = [replace(spec, bearing_sigma=1.5) for spec in GENERIC.specs]
     noise = NoiseMixture(specs=tuple(sharp), weights=weights, name="sharp")

@@ -17,9 +17,10 @@ from worlds import random_town
 
 from semsig_gis.core.geometry import consecutive
 from semsig_gis.core.signature import Signature
-from semsig_gis.localization.likelihood.index import TURNS, build_index, index_fingerprint
+from semsig_gis.localization.likelihood.index import build_index, index_fingerprint
 from semsig_gis.localization.likelihood.kernels import promising_cells
-from semsig_gis.localization.likelihood.off_centre import views_aside
+from semsig_gis.localization.likelihood.off_centre import views_off_centre
+from semsig_gis.localization.likelihood.turns import TURNS
 from semsig_gis.localization.noise.model import cell_noise, named_noise
 from semsig_gis.localization.noise.table import database_tables
 from semsig_gis.observation.view import Photo, View
@@ -133,7 +134,7 @@ def test_places_aside_are_summed_over(
     cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
     step = town.grid.step
     places = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
-    seen = views_aside(town, cells, places)
+    seen = views_off_centre(town, cells, places)
     (spec,) = cell_noise(noise, step / 2.0).specs
     (table,), _ = database_tables(town, spec)
     codes = town.present_codes.tolist()
@@ -154,7 +155,9 @@ def test_places_aside_are_summed_over(
         north = [[(0.0, 1.0)]]
         each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
     expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
-    found = build_index(town, cell_noise(noise, step)).scorer_aside(view, north_sigma=0.0)(cells)
+    found = build_index(town, cell_noise(noise, step)).off_centre_scorer(view, north_sigma=0.0)(
+        cells
+    )
     assert found == pytest.approx(expected, abs=0.5 * len(view))
     assert np.median(np.abs(found - expected)) < 0.1 * len(view)
 
