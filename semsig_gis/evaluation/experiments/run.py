@@ -24,7 +24,10 @@ from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
-from semsig_gis.evaluation.evaluate import (
+from semsig_gis.evaluation.figures import district_labels
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
+from semsig_gis.evaluation.queries.draw import check_count, draw_queries
+from semsig_gis.evaluation.scoring import (
     PAIR_S,
     QUERY_S,
     make_evaluation,
@@ -32,9 +35,6 @@ from semsig_gis.evaluation.evaluate import (
     scored_tables,
     versions,
 )
-from semsig_gis.evaluation.figures import district_labels
-from semsig_gis.evaluation.file import open_evaluation, save_evaluation
-from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.localization.answers import DistanceMemo
 from semsig_gis.localization.locator import make_locator
