@@ -101,9 +101,7 @@ class Cache:
 
     def forget(self, file: Fetched) -> None:
         """Make the next request fetch a file again; the file itself stays for its readers."""
-        CacheEntry(Path(self.folder), file.path.name.partition("-")[0]).sidecar.unlink(
-            missing_ok=True
-        )
+        self.entry(file.path.name.partition("-")[0]).sidecar.unlink(missing_ok=True)
 
     @contextlib.contextmanager
     def locked(self, key: str) -> Iterator[CacheEntry]:

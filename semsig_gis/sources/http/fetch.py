@@ -549,7 +549,7 @@ def _unpack(part: Path, body: Path, encoding: str, download: _Download) -> tuple
             _check_size(size, download)
             if swells(packed.tell(), size):
                 what = f"what {download.host} sends"
-                raise bomb(what, "inform its publisher")
+                raise bomb(what, "report it to the publisher")
             digest.update(block)
             stream.write(block)
     return digest.hexdigest(), size
