@@ -184,7 +184,7 @@ from .reports.scenes import (
     draw_scene as draw_scene,
     draw_scenes as draw_scenes,
 )
-from .reports.tables import Table as Table
+from .core.tables import Table as Table
 from .evaluation.experiments.run import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (
