@@ -118,7 +118,7 @@ from .localization.likelihood.priors import (
     raster_prior as raster_prior,
     weight_prior as weight_prior,
 )
-from .localization.route import Leg as Leg
+from .observation.leg import Leg as Leg
 from .evaluation.queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
 from .evaluation.queries.distortions import (
     Distortion as Distortion,
@@ -184,7 +184,7 @@ from .reports.scenes import (
     draw_scene as draw_scene,
     draw_scenes as draw_scenes,
 )
-from .reports.tables import Table as Table
+from .core.tables import Table as Table
 from .evaluation.experiments.run import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (

@@ -17,8 +17,9 @@ import shapely
 
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
+from semsig_gis.core.tables import Table
 from semsig_gis.core.text import percent
-from semsig_gis.reports.tables import Table, brief_notes, distortion_rows, note_tables
+from semsig_gis.reports.tables import brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:

@@ -18,6 +18,11 @@ from semsig_gis.core.geometry import Distortion
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.update import UpdateReport
+from semsig_gis.evaluation.experiments.tables import (
+    experiment_figures,
+    experiment_markdown,
+    experiment_tables,
+)
 from semsig_gis.evaluation.identifiability.analysis import identify
 from semsig_gis.evaluation.identifiability.check import (
     ChanceBin,
@@ -40,9 +45,6 @@ from semsig_gis.reports.evaluation import (
     comparison_sentence,
     comparison_table,
     evaluation_tables,
-    experiment_figures,
-    experiment_markdown,
-    experiment_tables,
 )
 from semsig_gis.reports.identifiability import (
     check_tables,
@@ -57,8 +59,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from semsig_gis.core.tables import Table
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.reports.tables import Table
 
 SIX = six_cells()
 LONG = replace(
