@@ -38,7 +38,7 @@ from .objects.load import (
     choose_layers as choose_layers,
     read_files as read_files,
 )
-from .reports.quality import quality_report as quality_report
+from .objects.quality import quality_report as quality_report
 from .objects.surroundings import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,
