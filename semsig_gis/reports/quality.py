@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
+from semsig_gis.core.tables import Table
 from semsig_gis.core.text import percent
 from semsig_gis.objects.quality import SQUARE_M
-from semsig_gis.reports.tables import Table, brief_notes, distortion_rows, note_tables
+from semsig_gis.reports.tables import brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:

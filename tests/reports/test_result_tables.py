@@ -18,15 +18,20 @@ from semsig_gis.core.geometry import Distortion
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.update import UpdateReport
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.experiments.tables import (
+    experiment_figures,
+    experiment_markdown,
+    experiment_tables,
+)
+from semsig_gis.evaluation.identifiability.analysis import identify
 from semsig_gis.evaluation.identifiability.check import (
     ChanceBin,
     IdentifiabilityCheck,
     check_identifiability,
 )
-from semsig_gis.evaluation.identifiability.identify import identify
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.evaluation.spec import ExperimentSpec
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index
@@ -41,9 +46,6 @@ from semsig_gis.reports.evaluation import (
     comparison_sentence,
     comparison_table,
     evaluation_tables,
-    experiment_figures,
-    experiment_markdown,
-    experiment_tables,
 )
 from semsig_gis.reports.identifiability import (
     check_tables,
@@ -58,8 +60,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from semsig_gis.core.tables import Table
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.reports.tables import Table
 
 SIX = six_cells()
 LONG = replace(

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-import semsig_gis
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, crs_label, to_degrees
+from semsig_gis.core.presentation import map_with
 from semsig_gis.core.text import percent
 from semsig_gis.localization.answers import (
     REGION_SHARE,
@@ -163,7 +163,7 @@ class Location(Answer):
 
     def explore(self) -> MapFrame:
         """Show where it may have been seen on a map in a notebook (see `location_map`)."""
-        return semsig_gis.show_map(semsig_gis.location_map(self))
+        return map_with("location_map", self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the chances of all cells as plain values that JSON can hold.
