@@ -118,7 +118,7 @@ from .localization.likelihood.priors import (
     raster_prior as raster_prior,
     weight_prior as weight_prior,
 )
-from .localization.route import Leg as Leg
+from .observation.leg import Leg as Leg
 from .evaluation.queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
 from .evaluation.queries.distortions import (
     Distortion as Distortion,

@@ -146,6 +146,11 @@ class SignatureDatabase(Displayed):
         """Viewpoint of every cell in metres, shape (n, 2)."""
         return frozen(self.grid.viewpoints(self.columns, self.rows))
 
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints in metres: west, south, east and north; not of no cells."""
+        return np.concatenate([self.xy.min(axis=0), self.xy.max(axis=0)])
+
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Number of objects that every cell sees, shape (n,)."""
@@ -416,6 +421,11 @@ class SequenceTable:
     def __getitem__(self, index: int) -> NDArray[np.uint8]:
         """Return one distinct sequence."""
         return self.values[self.offsets[index] : self.offsets[index + 1]]
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints in metres: west, south, east and north; not of no cells."""
+        return np.concatenate([self.xy.min(axis=0), self.xy.max(axis=0)])
 
     @cached_property
     def lengths(self) -> NDArray[np.int64]:

@@ -38,8 +38,8 @@ from semsig_gis.localization.likelihood.posterior import (
     prior_ratio,
     refine,
 )
+from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
-from semsig_gis.localization.route import route_posteriors
 from semsig_gis.observation.north import GRID_NORTH
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.incremental import TurnMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.posterior import Refinement
-    from semsig_gis.localization.route import Leg
+    from semsig_gis.observation.leg import Leg
     from semsig_gis.observation.north import North
 
 DISAGREEMENT = 0.01
