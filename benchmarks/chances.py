@@ -25,10 +25,10 @@ from benchmarks.tables import TODAY
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.build import build_database
 from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.evaluate import score_queries, scored_tables
 from semsig_gis.evaluation.figures import calibration_bins, plain_records
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
+from semsig_gis.evaluation.scoring import score_queries, scored_tables
 from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import LikelihoodLocator

@@ -26,8 +26,8 @@ from benchmarks.workbench import asked, photo_in, serving
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.identifiability.identify import identify
+from semsig_gis.evaluation.identifiability.analysis import identify
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import locate

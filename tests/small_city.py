@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.database.build import build_database
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identifiability.result import BANDS, ClassGain, Identifiability
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import locate

@@ -33,8 +33,8 @@ def demo(
     """Run every step on a small made-up city, offline."""
     from semsig_gis.database.build import build_database
     from semsig_gis.database.file import save_database
-    from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.evaluation.file import save_evaluation
+    from semsig_gis.evaluation.scoring import evaluate as run
     from semsig_gis.exports import export_database
     from semsig_gis.maps.evaluation import evaluation_map
     from semsig_gis.maps.objects import objects_map

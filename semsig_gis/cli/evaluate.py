@@ -106,10 +106,10 @@ def evaluate(
     import dataclasses
 
     from semsig_gis.database.city import open_city
-    from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.evaluation.file import save_evaluation
     from semsig_gis.evaluation.queries.distortion_text import parse_chain
     from semsig_gis.evaluation.queries.distortions import Distortion
+    from semsig_gis.evaluation.scoring import evaluate as run
     from semsig_gis.localization.distance.method import Method
     from semsig_gis.localization.likelihood.index import build_index
     from semsig_gis.reports.evaluation import evaluation_headline, evaluation_tables
@@ -179,8 +179,8 @@ def experiment(
 ) -> None:
     """Run the evaluations of an experiment, or resume them."""
     from semsig_gis.evaluation.experiments.run import run_experiment
+    from semsig_gis.evaluation.experiments.tables import experiment_tables
     from semsig_gis.evaluation.spec import open_experiment_spec
-    from semsig_gis.reports.evaluation import experiment_tables
 
     opened = open_experiment_spec(spec)
     with progress("answering") as advance:
@@ -361,8 +361,8 @@ def identify(
     Adds columns to the database, which `semsig info`, `map` and `export` show.
     """
     from semsig_gis.database.city import open_city
+    from semsig_gis.evaluation.identifiability.analysis import identify as run
     from semsig_gis.evaluation.identifiability.check import check_identifiability
-    from semsig_gis.evaluation.identifiability.identify import identify as run
     from semsig_gis.evaluation.identifiability.result import save_identifiability
     from semsig_gis.localization.likelihood.index import build_index
     from semsig_gis.localization.noise.model import cell_noise

@@ -272,9 +272,9 @@ def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
 def _save_loaded(
     loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
 ) -> None:
+    from semsig_gis.objects.quality import quality_report
     from semsig_gis.objects.surroundings import save_surroundings
     from semsig_gis.objects.table import save_objects
-    from semsig_gis.reports.quality import quality_report
 
     notes = list(loaded.notes)
     save_objects(loaded.objects, out)

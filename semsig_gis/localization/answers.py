@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import numpy as np
 
-import semsig_gis
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import LICENSES, to_degrees
+from semsig_gis.core.presentation import plot_with
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.observation.north import GRID_NORTH
 from semsig_gis.observation.view import View
@@ -101,7 +101,7 @@ class Answer(Displayed):
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw where the query may have been seen (see `plot_answer`)."""
-        return semsig_gis.plot_answer(self, ax=ax, legend=legend)
+        return plot_with("plot_answer", self, ax=ax, legend=legend)
 
     def _candidate_records(self) -> list[dict[str, Any]]:
         """Return the candidates as plain values, with ``lon`` and ``lat`` to a centimetre."""

@@ -16,7 +16,7 @@ from osm_xml import node, relation, way, write_osm
 from osmium.osm import WAY, Area, Node, Relation, Way
 
 from semsig_gis.database.build import build_database
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.objects.load import build_objects, choose_layers
 from semsig_gis.objects.surroundings import read_surroundings
 from semsig_gis.sources import find_files

@@ -16,8 +16,8 @@ from worlds import ARRAYS, CORNER, random_town
 from semsig_gis.core.errors import DatabaseError, SemsigError
 from semsig_gis.database.file import database_specs, open_database, save_database
 from semsig_gis.database.tiles import build_tiles
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import objects_specs, open_objects, save_objects
 

@@ -14,7 +14,6 @@ from pandas.testing import assert_frame_equal
 from sentences import refused
 
 from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.file import (
     open_evaluation,
     save_evaluation,
@@ -26,6 +25,7 @@ from semsig_gis.evaluation.queries.distortion_text import NAMED_DISTORTIONS, par
 from semsig_gis.evaluation.queries.distortions import Detector
 from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.result import machine
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.metrics.edit import EditWeights
 from semsig_gis.localization.likelihood.method import LikelihoodMethod

@@ -26,8 +26,8 @@ from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.evaluation.identifiability import result as identifiability_file
+from semsig_gis.evaluation.identifiability.analysis import _places, identify
 from semsig_gis.evaluation.identifiability.check import check_identifiability
-from semsig_gis.evaluation.identifiability.identify import _places, identify
 from semsig_gis.evaluation.identifiability.lookalikes import find_lookalikes
 from semsig_gis.evaluation.identifiability.result import (
     open_identifiability,

@@ -40,8 +40,8 @@ from semsig_gis.core.symbology import OUTCOMES, class_signs
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.sightings import ViewpointSpec
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identifiability.result import Identifiability
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.geopackage import read_geopackage
 from semsig_gis.exports.styles import CLASS_MARKERS, by_class

@@ -13,7 +13,7 @@ import semsig_gis
 from semsig_gis.core.defaults import DEFAULT_METHOD, PAPER_METHOD
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.city import open_city
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.answers import Requirement
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index

@@ -18,7 +18,7 @@ from small_city import small_city, small_evaluation
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.symbology import FAILURES, OUTCOMES
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.maps.evaluation import evaluation_map
 from semsig_gis.maps.page import page_of_map

@@ -16,8 +16,8 @@ from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.core.text import percent
 from semsig_gis.database.update import CellChanges
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.queries.distortions import MissingClasses
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.answer_rule import AnswerRule
 from semsig_gis.localization.likelihood.index import build_index

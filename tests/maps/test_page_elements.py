@@ -31,9 +31,9 @@ from semsig_gis.core.symbology import CANDIDATE_RAMP, OBJECT_COLOURS, VERDICTS
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
 from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.queries.distortions import MissingClasses
 from semsig_gis.evaluation.queries.draw import QuerySpec
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import locate

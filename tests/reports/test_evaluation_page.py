@@ -15,8 +15,8 @@ from sentences import refused
 from worlds import random_town
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.noise.model import named_noise

@@ -8,7 +8,7 @@ from reports import HARM, LONG, outcome_map, texts
 from worlds import random_town
 
 from semsig_gis.core.symbology import OUTCOMES
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.reports import outcomes
 from semsig_gis.reports.outcomes import draw_map
 

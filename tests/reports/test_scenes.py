@@ -16,7 +16,7 @@ from worlds import random_town
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.symbology import class_signs
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.reports.report_model import SceneObject
 from semsig_gis.reports.scenes import (
     _round_length,

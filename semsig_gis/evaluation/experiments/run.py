@@ -19,12 +19,16 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, finish_tasks
+from semsig_gis.core.resources import announce
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
-from semsig_gis.evaluation.evaluate import (
+from semsig_gis.evaluation.experiments.tables import experiment_figures, experiment_markdown
+from semsig_gis.evaluation.figures import district_labels
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
+from semsig_gis.evaluation.queries.draw import check_count, draw_queries
+from semsig_gis.evaluation.scoring import (
     PAIR_S,
     QUERY_S,
     make_evaluation,
@@ -32,13 +36,9 @@ from semsig_gis.evaluation.evaluate import (
     scored_tables,
     versions,
 )
-from semsig_gis.evaluation.figures import district_labels
-from semsig_gis.evaluation.file import open_evaluation, save_evaluation
-from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.localization.answers import DistanceMemo
 from semsig_gis.localization.locator import make_locator
-from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
 from semsig_gis.storage.text import read_text

@@ -22,11 +22,11 @@ from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.summary import database_summary
-from semsig_gis.evaluation.evaluate import versions
 from semsig_gis.evaluation.experiments.run import run_experiments
 from semsig_gis.evaluation.paper import figures as paris
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count
+from semsig_gis.evaluation.scoring import versions
 from semsig_gis.evaluation.spec import ExperimentSpec
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.scores import score_cells

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import semsig_gis
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.core.geometry import crs_label
+from semsig_gis.core.presentation import map_with
 from semsig_gis.database.database import join_databases, rows_of_result
 from semsig_gis.database.file import PartitionedDatabase
 from semsig_gis.localization.answers import (
@@ -101,7 +101,7 @@ class Localization(Answer):
 
     def explore(self, database: SignatureDatabase) -> MapFrame:
         """Show the candidates on a map in a notebook (see `localization_map`)."""
-        return semsig_gis.show_map(semsig_gis.localization_map(self, database))
+        return map_with("localization_map", self, database)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values that JSON can hold, candidates as a list of records.

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-import semsig_gis
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, crs_label, to_degrees
+from semsig_gis.core.presentation import map_with
 from semsig_gis.core.text import percent
 from semsig_gis.localization.answers import (
     REGION_SHARE,
@@ -38,8 +38,8 @@ from semsig_gis.localization.likelihood.posterior import (
     prior_ratio,
     refine,
 )
+from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
-from semsig_gis.localization.route import route_posteriors
 from semsig_gis.observation.north import GRID_NORTH
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.incremental import TurnMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.posterior import Refinement
-    from semsig_gis.localization.route import Leg
+    from semsig_gis.observation.leg import Leg
     from semsig_gis.observation.north import North
 
 DISAGREEMENT = 0.01
@@ -163,7 +163,7 @@ class Location(Answer):
 
     def explore(self) -> MapFrame:
         """Show where it may have been seen on a map in a notebook (see `location_map`)."""
-        return semsig_gis.show_map(semsig_gis.location_map(self))
+        return map_with("location_map", self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the chances of all cells as plain values that JSON can hold.

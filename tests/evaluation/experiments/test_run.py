@@ -22,7 +22,6 @@ from worlds import CORNER, TOWN, World, contents, save_town
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
 from semsig_gis.core.temporary import MACHINE
-from semsig_gis.evaluation.evaluate import evaluate, score_queries
 from semsig_gis.evaluation.experiments import run
 from semsig_gis.evaluation.experiments.run import (
     ExperimentWork,
@@ -31,6 +30,7 @@ from semsig_gis.evaluation.experiments.run import (
     run_experiment,
     run_experiments,
 )
+from semsig_gis.evaluation.scoring import evaluate, score_queries
 from semsig_gis.evaluation.spec import Districts, parse_experiment
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.locator import parse_method

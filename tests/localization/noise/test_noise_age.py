@@ -15,9 +15,9 @@ from benchmarks._later_city import later_city
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.build import build_database
 from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.evaluate import score_queries, scored_tables
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
+from semsig_gis.evaluation.scoring import score_queries, scored_tables
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.noise.age import (

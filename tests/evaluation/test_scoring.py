@@ -15,9 +15,9 @@ from worlds import random_town
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.compare import changed_successes, common_cases, compare_evaluations
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.queries.distortions import DISTORTIONS, Detector, Distortion
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
+from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.scores import score_cells
 from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS
