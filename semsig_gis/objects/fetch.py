@@ -10,7 +10,7 @@ from platformdirs import user_cache_path
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.sources import mapillary, overture
-from semsig_gis.sources.area import clip_layer, names_place, parse_area
+from semsig_gis.sources.clip import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.access_token import AccessToken
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 # Readers whose service sends an area in parts, each a file.
 TILED: Mapping[str, ModuleType] = {

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec, Progress
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.services.layers import Download
 
 # The function that fetches a layer, by the name of the catalogue's reader.

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources.http.cache import Cache, Fetched
     from semsig_gis.sources.http.fetch import HttpSpec, Progress
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 T = TypeVar("T")
 NAMES_LISTED = 12
