@@ -32,7 +32,7 @@ from semsig_gis.core.geometry import (
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.resources import announce
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.temporary import HALF_DONE
+from semsig_gis.core.temporary import TEMPORARY_PREFIX
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -266,7 +266,7 @@ def build_parts(
         failed = finish_tasks(
             work,
             left,
-            done=note_part,
+            on_success=note_part,
             workers=workers,
             scheduler=scheduler,
             files=[*filter(None, (plan.folder, plan.objects, plan.buildings, plan.streets))],
@@ -522,7 +522,7 @@ def _require_replaceable(target: Path) -> None:
         if target.exists() and not target.is_file():
             raise InputError(f"{target} is a device or a pipe; give the name of a folder to write.")
         return
-    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
+    others = {path.name for path in target.iterdir() if not path.name.startswith(TEMPORARY_PREFIX)}
     if MANIFEST in others:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:

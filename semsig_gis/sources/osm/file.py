@@ -18,7 +18,7 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.temporary import own_folder
+from semsig_gis.core.temporary import temporary_folder
 from semsig_gis.sources import require_file
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import require_modest
@@ -118,7 +118,7 @@ def _as_one(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[o
     if len(files) == 1:
         yield from files.values()
         return
-    with own_folder(Path(tempfile.gettempdir())) as folder:
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
         yield merge_extracts(files, index, folder / "merged.opl")
 
 
