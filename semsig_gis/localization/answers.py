@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from semsig_gis.core.display import Axes
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SequenceTable, SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database.sequences import SequenceTable
     from semsig_gis.observation.north import North
 
 

@@ -21,8 +21,8 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
 from semsig_gis.localization.route import Leg
