@@ -14,8 +14,8 @@ from .sources.catalog import (
     load_catalog as load_catalog,
     paper_taxonomy as paper_taxonomy,
 )
-from .sources.area import clip_layers as clip_layers
-from .sources.layers import LayerSpec as LayerSpec
+from .sources.clip import clip_layers as clip_layers
+from .sources.layer_spec import LayerSpec as LayerSpec
 from .sources.synthetic.city import (
     CitySpec as CitySpec,
     PARIS_LIKE as PARIS_LIKE,
@@ -38,7 +38,7 @@ from .objects.load import (
     choose_layers as choose_layers,
     read_files as read_files,
 )
-from .reports.quality import quality_report as quality_report
+from .objects.quality import quality_report as quality_report
 from .objects.surroundings import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,

@@ -18,9 +18,9 @@ import pandas as pd
 
 from semsig_gis import __version__
 from semsig_gis.core.defaults import DEFAULT_METHOD
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance, cell_ids, wrap_degrees
+from semsig_gis.core.resources import announce
 from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation

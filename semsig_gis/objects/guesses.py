@@ -14,7 +14,7 @@ from semsig_gis.core.errors import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.keywords import keywords, words_of
 from semsig_gis.sources.numbers import decimal
-from semsig_gis.sources.osm.file import FORMATS
+from semsig_gis.sources.osm.features import FORMATS
 from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT
 from semsig_gis.sources.services.layers import POINT, SHAPE, fold
 from semsig_gis.sources.services.table import Record, open_table

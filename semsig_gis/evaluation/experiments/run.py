@@ -19,9 +19,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, finish_tasks
+from semsig_gis.core.resources import announce
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
 from semsig_gis.evaluation.experiments.tables import experiment_figures, experiment_markdown

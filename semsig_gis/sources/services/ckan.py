@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.services.pages import Client
 
     Resource = dict[str, Any]

@@ -33,10 +33,10 @@ from semsig_gis.storage.text import parse_json
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Fetched
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.services.table import Record, Table
 

@@ -13,9 +13,9 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.sources import require_file
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.http.errors import error_text
+from semsig_gis.sources.paths import require_file
 from semsig_gis.sources.rows import WGS84
 from semsig_gis.sources.services.gml import (
     ID,
