@@ -16,7 +16,7 @@ from semsig_gis.localization.distance.scores import score_cells
 from semsig_gis.localization.distance.ties import expected_best, rank_range, top_candidates
 from semsig_gis.localization.likelihood.association import rerank
 from semsig_gis.localization.likelihood.posterior import KEPT, posterior, refine
-from semsig_gis.localization.route import route_posteriors
+from semsig_gis.localization.likelihood.route import route_posteriors
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -14,7 +14,7 @@ from semsig_gis.core.geometry import cell_ids, wrap_degrees
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.evaluation.queries.distortions import distort, named_distortion
-from semsig_gis.localization.route import Leg
+from semsig_gis.observation.leg import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

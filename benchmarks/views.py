@@ -41,7 +41,7 @@ from semsig_gis.localization.answers import REGION_SHARE
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.noise.model import NoiseSpec, cell_noise
-from semsig_gis.localization.route import Leg
+from semsig_gis.observation.leg import Leg
 from semsig_gis.sources.synthetic.city import PARIS_LIKE as LIKE_PARIS
 from semsig_gis.sources.synthetic.city import CitySpec
 

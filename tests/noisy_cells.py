@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from worlds import World
 
+    from semsig_gis.core.tables import Table
     from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.reports.tables import Table
 
 TAXONOMY = paper_taxonomy()
 METHODS = [

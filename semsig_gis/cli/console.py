@@ -27,9 +27,9 @@ from semsig_gis.core.text import visible
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
+    from semsig_gis.core.tables import Table
     from semsig_gis.database.city import City
     from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.reports.tables import Table
 
 
 VARIABLE = "SEMSIG_SUPERVISED"

@@ -179,8 +179,8 @@ def experiment(
 ) -> None:
     """Run the evaluations of an experiment, or resume them."""
     from semsig_gis.evaluation.experiments.run import run_experiment
+    from semsig_gis.evaluation.experiments.tables import experiment_tables
     from semsig_gis.evaluation.spec import open_experiment_spec
-    from semsig_gis.reports.evaluation import experiment_tables
 
     opened = open_experiment_spec(spec)
     with progress("answering") as advance:

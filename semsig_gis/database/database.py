@@ -152,12 +152,9 @@ class SignatureDatabase(Displayed):
         return read_only(self.grid.viewpoints(self.columns, self.rows))
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Box of the viewpoints in metres, ``(xmin, ymin, xmax, ymax)``; NaN without cells."""
-        if not len(self):
-            return (math.nan,) * 4
-        (west, south), (east, north) = self.xy.min(axis=0).tolist(), self.xy.max(axis=0).tolist()
-        return west, south, east, north
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints in metres: west, south, east, north; ValueError without cells."""
+        return np.concatenate([self.xy.min(axis=0), self.xy.max(axis=0)])
 
     @cached_property
     def lengths(self) -> NDArray[np.int64]:

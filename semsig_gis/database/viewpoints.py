@@ -106,7 +106,7 @@ def _checked_area(area: object) -> shapely.Polygon | shapely.MultiPolygon:
 
 
 def _kind_of(shape: object) -> str:
-    return f"a {shape.geom_type}" if isinstance(shape, shapely.Geometry) else repr(shape)
+    return f"a {type(shape).__name__}" if isinstance(shape, shapely.Geometry) else repr(shape)
 
 
 def choose_viewpoints(

@@ -13,7 +13,6 @@ import numpy as np
 from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import wrap_degrees
 from semsig_gis.evaluation.queries.draw import SeenFrom
-from semsig_gis.localization.route import Leg
 from semsig_gis.observation.detectors.camera import Camera
 from semsig_gis.observation.detectors.views import (
     DEGREE_DIGITS,
@@ -21,6 +20,7 @@ from semsig_gis.observation.detectors.views import (
     METRE_DIGITS,
     placed,
 )
+from semsig_gis.observation.leg import Leg
 from semsig_gis.observation.sentences import parse_view
 from semsig_gis.observation.view import View
 

@@ -22,7 +22,7 @@ from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.localization.likelihood.method import LikelihoodMethod
 from semsig_gis.localization.noise.model import NoiseSpec, named_noise
-from semsig_gis.localization.route import Leg
+from semsig_gis.observation.leg import Leg
 from semsig_gis.observation.view import check_north
 from semsig_gis.sources.synthetic.city import CitySpec
 

@@ -18,6 +18,11 @@ from semsig_gis.core.geometry import Distortion
 from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.update import UpdateReport
 from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.evaluation.experiments.tables import (
+    experiment_figures,
+    experiment_markdown,
+    experiment_tables,
+)
 from semsig_gis.evaluation.identifiability.analysis import identify
 from semsig_gis.evaluation.identifiability.check import (
     ChanceBin,
@@ -35,14 +40,12 @@ from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.objects.changes import ClassChange
 from semsig_gis.objects.conflate import ConflatedPair
 from semsig_gis.objects.load import LayerReport, UnreadLayer
+from semsig_gis.objects.quality import ClassQuality, QualityReport
 from semsig_gis.reports.database import database_tables
 from semsig_gis.reports.evaluation import (
     comparison_sentence,
     comparison_table,
     evaluation_tables,
-    experiment_figures,
-    experiment_markdown,
-    experiment_tables,
 )
 from semsig_gis.reports.identifiability import (
     check_tables,
@@ -50,15 +53,15 @@ from semsig_gis.reports.identifiability import (
     identifiability_tables,
 )
 from semsig_gis.reports.page import write_report
-from semsig_gis.reports.quality import ClassQuality, QualityReport, quality_tables, update_tables
+from semsig_gis.reports.quality import quality_tables, update_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from semsig_gis.core.tables import Table
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.reports.tables import Table
 
 SIX = six_cells()
 LONG = replace(

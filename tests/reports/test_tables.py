@@ -6,16 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from semsig_gis.core.tables import Table, figure, interval
 from semsig_gis.core.text import percent
 from semsig_gis.reports.report_model import Number
 from semsig_gis.reports.tables import (
     WIDEST,
-    Table,
     _width,
     brief_notes,
     distortion_rows,
-    figure,
-    interval,
     note_tables,
     number_table,
 )

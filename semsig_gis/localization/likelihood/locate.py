@@ -38,8 +38,8 @@ from semsig_gis.localization.likelihood.posterior import (
     prior_ratio,
     refine,
 )
+from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
-from semsig_gis.localization.route import route_posteriors
 from semsig_gis.observation.north import GRID_NORTH
 
 if TYPE_CHECKING:
@@ -51,14 +51,14 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.localization.answers import DistanceMemo
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
     from semsig_gis.localization.likelihood.explain import Explanation
     from semsig_gis.localization.likelihood.incremental import TurnMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.posterior import Refinement
-    from semsig_gis.localization.route import Leg
+    from semsig_gis.observation.leg import Leg
     from semsig_gis.observation.north import North
 
 DISAGREEMENT = 0.01
@@ -462,7 +462,7 @@ class LocateOptions(TypedDict, total=False):
     rule: AnswerRule
     top: int
     store: ObjectStore | None
-    refined: bool
+    refined: bool | None
     explained: int
     known: Mapping[str, Any]
     north: North

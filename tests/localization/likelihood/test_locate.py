@@ -30,7 +30,7 @@ from semsig_gis.localization.likelihood.locate import locate, locate_route
 from semsig_gis.localization.likelihood.posterior import Posterior, Refinement, posterior, refine
 from semsig_gis.localization.likelihood.priors import position_prior
 from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.localization.route import Leg
+from semsig_gis.observation.leg import Leg
 from semsig_gis.observation.view import View
 
 if TYPE_CHECKING:

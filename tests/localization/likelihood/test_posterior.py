@@ -32,7 +32,8 @@ from semsig_gis.localization.likelihood.priors import (
     raster_prior,
     weight_prior,
 )
-from semsig_gis.localization.route import LOST, Leg, moved_chances, route_posteriors
+from semsig_gis.localization.likelihood.route import LOST, moved_chances, route_posteriors
+from semsig_gis.observation.leg import Leg
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -21,10 +21,11 @@ from semsig_gis.localization.likelihood.index import CellScores, build_index
 from semsig_gis.localization.likelihood.locate import locate
 from semsig_gis.localization.likelihood.posterior import posterior, refine
 from semsig_gis.localization.likelihood.priors import area_prior, position_prior, weight_prior
+from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.learn import Sample, learn_noise
 from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise, place_noise
 from semsig_gis.localization.noise.table import noise_tables
-from semsig_gis.localization.route import Leg, route_posteriors
+from semsig_gis.observation.leg import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Callable
