@@ -12,7 +12,7 @@ from osm_xml import street_town, write_osm
 from sentences import refused, sentence
 
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.detect import told_catalogs
+from semsig_gis.sources.detect import detect_catalogs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,7 +52,7 @@ def write(folder: Path, name: str) -> Path:
 def test_files_tell_their_catalogue(tmp_path: Path, name: str, catalog: str, what: str) -> None:
     path = write(tmp_path / "city", name)
     for given in (path, path.parent):
-        names, (line,) = told_catalogs([given])
+        names, (line,) = detect_catalogs([given])
         assert names == (catalog,)
         assert all(words in line for words in (str(path), what, catalog))
 
@@ -61,12 +61,12 @@ def test_a_file_that_does_not_tell_is_refused(tmp_path: Path) -> None:
     trees, osm = write(tmp_path, "trees.gpkg"), write(tmp_path, "town.osm")
     for given in (trees, tmp_path):
         with refused(InputError, "trees.gpkg", "--catalog", "semsig draft"):
-            told_catalogs([osm, given])
+            detect_catalogs([osm, given])
     (tmp_path / "empty").mkdir()
     with refused(InputError, "empty", "--catalog"):
-        told_catalogs([tmp_path / "empty"])
+        detect_catalogs([tmp_path / "empty"])
     with refused(SourceError, "nowhere.gpkg does not exist"):
-        told_catalogs([tmp_path / "nowhere.gpkg"])
+        detect_catalogs([tmp_path / "nowhere.gpkg"])
 
 
 def test_no_catalogue_need_be_named_of_a_file_that_tells_it(run: Run, tmp_path: Path) -> None:
