@@ -61,7 +61,7 @@ from .observation.north import North as North
 from .observation.sentences import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
 from .database.summary import database_summary as database_summary
-from .localization.answers import Requirement as Requirement
+from .localization.requirement import Requirement as Requirement
 from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,
