@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
     from semsig_gis.sources.catalog import Catalog
     from semsig_gis.sources.filters import Rules
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 def _catalogs(incomplete: str) -> list[str]:
@@ -120,14 +120,14 @@ def load(
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
     from semsig_gis.objects.skipped_layers import passed_by, read_small
-    from semsig_gis.sources.area import BOX, clip_layers, parse_area
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
-    from semsig_gis.sources.detect import told_catalogs
+    from semsig_gis.sources.clip import BOX, clip_layers, parse_area
+    from semsig_gis.sources.detect import detect_catalogs
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
     if not names:
-        told, lines = told_catalogs(files)
+        told, lines = detect_catalogs(files)
         names = list(told)
         for line in lines:
             remark(line)

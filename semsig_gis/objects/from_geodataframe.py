@@ -15,7 +15,7 @@ from semsig_gis.objects.table import Licence
 from semsig_gis.sources import TAGS_READER
 from semsig_gis.sources.catalog import Catalog, built_in_taxonomy, load_catalog
 from semsig_gis.sources.filters import as_text
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
 from semsig_gis.sources.osm.features import (
     frame_fields,
     frame_layers,

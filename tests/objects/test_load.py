@@ -32,7 +32,7 @@ from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.reports.quality import quality_tables
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.rows import RowRules, Rows
 

@@ -10,8 +10,8 @@ from sentences import refused
 from servers import Answer
 
 from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.area import parse_area
 from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.clip import parse_area
 from semsig_gis.sources.http.access_token import AccessToken
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec
 from semsig_gis.sources.mapillary import MOST_FEATURES, fetch_layers, read_layers

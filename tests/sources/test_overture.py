@@ -14,8 +14,8 @@ from stores import keep_in_bucket
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import find_files
-from semsig_gis.sources.area import clip_layer, parse_area
 from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.clip import clip_layer, parse_area
 from semsig_gis.sources.http.fetch import HttpSpec, NotCachedError
 from semsig_gis.sources.overture import fetch_layers, read_layers
 
