@@ -61,7 +61,7 @@ from .observation.north import North as North
 from .observation.sentences import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
 from .database.summary import database_summary as database_summary
-from .localization.answers import Requirement as Requirement
+from .localization.requirement import Requirement as Requirement
 from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,
@@ -74,7 +74,7 @@ from .database.update import (
     update_file as update_file,
     update_tiles as update_tiles,
 )
-from .database.sightings import ViewpointSpec as ViewpointSpec
+from .database.viewpoints import ViewpointSpec as ViewpointSpec
 from .localization.distance.method import Method as Method
 from .localization.distance.scores import score_cells as score_cells
 from .localization.distance.search import Localization as Localization

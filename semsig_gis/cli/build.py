@@ -93,7 +93,7 @@ def build(
     from semsig_gis.core.geometry import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.sightings import ViewpointSpec
+    from semsig_gis.database.viewpoints import ViewpointSpec
     from semsig_gis.objects.surroundings import read_area
     from semsig_gis.objects.table import open_objects
     from semsig_gis.storage.geoparquet import NOWHERE

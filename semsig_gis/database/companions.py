@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import HALF_DONE, is_abandoned, remove_abandoned
+from semsig_gis.core.temporary import TEMPORARY_PREFIX, is_abandoned, remove_abandoned
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import store_path, waiting_store
 from semsig_gis.storage.whole import alone_in, reason
@@ -98,7 +98,7 @@ def _found(city: City) -> Iterator[tuple[Path, str]]:
     for name in sorted({str(city.path.absolute()), str(file)}):  # a link had its own
         for index in sorted(glob.glob(f"{glob.escape(name)}.*.likelihood")):  # noqa: PTH207
             yield Path(index), INDEX
-    for folder in sorted(file.parent.glob(f"{HALF_DONE}*")):
+    for folder in sorted(file.parent.glob(f"{TEMPORARY_PREFIX}*")):
         if folder.is_dir():
             yield folder, LEFT if is_abandoned(folder) else AT_WORK
 

@@ -17,7 +17,7 @@ from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import SourceError
 from semsig_gis.core.geometry import HALF_WIDTH
-from semsig_gis.core.temporary import own_folder
+from semsig_gis.core.temporary import temporary_folder
 from semsig_gis.database.file import INPUTS, digest
 from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
 from semsig_gis.objects.table import open_objects, save_objects
@@ -60,7 +60,7 @@ def folder_beside(out: str | Path) -> Iterator[Path]:
     """Give a folder beside a result, for what its workers read; it is removed after the block."""
     parent = Path(os.path.realpath(out)).parent
     parent.mkdir(parents=True, exist_ok=True)
-    with own_folder(parent) as folder:
+    with temporary_folder(parent) as folder:
         yield folder
 
 

@@ -32,7 +32,7 @@ from semsig_gis.core.geometry import (
 from semsig_gis.core.parallel import check_workers, finish_tasks
 from semsig_gis.core.resources import announce
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.temporary import HALF_DONE
+from semsig_gis.core.temporary import TEMPORARY_PREFIX
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -52,9 +52,8 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
-from semsig_gis.database.viewpoints import require_surroundings
+from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
 from semsig_gis.objects.surroundings import read_surroundings
 from semsig_gis.objects.table import open_objects
 from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
@@ -266,7 +265,7 @@ def build_parts(
         failed = finish_tasks(
             work,
             left,
-            done=note_part,
+            on_success=note_part,
             workers=workers,
             scheduler=scheduler,
             files=[*filter(None, (plan.folder, plan.objects, plan.buildings, plan.streets))],
@@ -522,7 +521,7 @@ def _require_replaceable(target: Path) -> None:
         if target.exists() and not target.is_file():
             raise InputError(f"{target} is a device or a pipe; give the name of a folder to write.")
         return
-    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
+    others = {path.name for path in target.iterdir() if not path.name.startswith(TEMPORARY_PREFIX)}
     if MANIFEST in others:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:

@@ -25,7 +25,6 @@ from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.search import DistanceLocator
 from semsig_gis.localization.distance.ties import (
     NEAR_METRES,
     NEAR_PLACES,
@@ -36,7 +35,6 @@ from semsig_gis.localization.distance.ties import (
     rank_range,
     top_candidates,
 )
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.likelihood.method import LikelihoodMethod
 from semsig_gis.localization.locator import make_locator, parse_method
 
@@ -47,9 +45,10 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import Query
-    from semsig_gis.localization.answers import Answer, DistanceMemo, Locator, Ranking
+    from semsig_gis.localization.answers import Answer, Ranking
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.locator import AnyMethod
+    from semsig_gis.localization.locator import AnyMethod, Locator
     from semsig_gis.observation.view import Photo
 
 # Seconds that a query, and a cell of a query, takes: only for telling how long the work is.
@@ -141,10 +140,10 @@ def evaluate(
             used = replace(used, on_grid=True)
         locator = make_locator(database, used)
     elif isinstance(method, Method):
-        used, locator = method, DistanceLocator(database=database, method=method)
+        used, locator = method, make_locator(database, method)
     elif method.database is database:
         used = LikelihoodMethod(noise=method.noise, on_grid=True)
-        locator = LikelihoodLocator(index=method)
+        locator = make_locator(database, used, index=method)
     else:
         raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."

@@ -18,9 +18,9 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.temporary import own_folder
+from semsig_gis.core.temporary import temporary_folder
 from semsig_gis.sources.area import Area, join_areas
-from semsig_gis.sources.compression import require_modest
+from semsig_gis.sources.compression import check_compression_ratio
 from semsig_gis.sources.osm.elements import (
     KIND_BY_LETTER,
     ElementLayer,
@@ -123,7 +123,7 @@ def _single_file(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Itera
     if len(files) == 1:
         yield from files.values()
         return
-    with own_folder(Path(tempfile.gettempdir())) as folder:
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
         yield merge_extracts(files, index, folder / "merged.opl")
 
 
@@ -136,7 +136,7 @@ def _file(path: Path) -> osmium.io.File:
         raise SourceError(f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}.")
     if path.stat().st_size == 0:
         raise SourceError(f"{path} is empty; download it again.")
-    require_modest(path)
+    check_compression_ratio(path)
     # An absolute path, because libosmium reads "-" as standard input and "http:" as an address.
     return osmium.io.File(str(path.absolute()), kind)
 
