@@ -56,7 +56,7 @@ from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, 
 from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
 from semsig_gis.objects.surroundings import read_surroundings
 from semsig_gis.objects.table import open_objects
-from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
+from semsig_gis.storage.geoparquet import EMPTY_BOX, bounds_by_group
 from semsig_gis.storage.runs import (
     PARTIAL,
     RunKind,
@@ -364,7 +364,7 @@ def plan_tiles(
     places: dict[Input, str | Path | None]
     places = {"objects": objects, "buildings": buildings, "streets": along}
     paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
-    nothing = open_objects(paths["objects"], box=NOWHERE)
+    nothing = open_objects(paths["objects"], box=EMPTY_BOX)
     reach = float(nothing.taxonomy.ranges(spec.radius).max())
     require_step(grid, reach)
     require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
@@ -413,7 +413,7 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
             f"at least {reach / MOST_REACHED:g} m."
         )
     objects: Counter[int] = Counter()
-    for bounds in each_bounds(path):
+    for bounds in bounds_by_group(path):
         widened = bounds + np.array([-reach, -reach, reach, reach])
         places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
         boxes, count = np.unique(places, axis=0, return_counts=True)
