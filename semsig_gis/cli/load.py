@@ -122,12 +122,12 @@ def load(
     from semsig_gis.objects.skipped_layers import passed_by, read_small
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
     from semsig_gis.sources.clip import BOX, clip_layers, parse_area
-    from semsig_gis.sources.detect import told_catalogs
+    from semsig_gis.sources.detect import detect_catalogs
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
     if not names:
-        told, lines = told_catalogs(files)
+        told, lines = detect_catalogs(files)
         names = list(told)
         for line in lines:
             remark(line)
@@ -334,7 +334,7 @@ def sources(
 
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]
-        readers = sorted({*READERS, *installed_readers(taken=READERS)})
+        readers = sorted({*READERS, *installed_readers(reserved=READERS)})
         if as_json:
             print_json({"catalogs": [_listed(c) for c in catalogs], "readers": readers})
             return

@@ -16,7 +16,7 @@ from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.database.database import SequenceTable
+from semsig_gis.database.sequences import SequenceTable
 from semsig_gis.localization.distance.metrics import METRICS, edit, metric
 from semsig_gis.localization.distance.metrics.edit import BLOCK_SEQUENCES, BitPlanes, EditWeights
 
