@@ -12,7 +12,7 @@ import numpy as np
 
 from semsig_gis.core.geometry import cell_ids, wrap_degrees
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.sightings import views_at
+from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.evaluation.queries.distortions import distort, named_distortion
 from semsig_gis.observation.leg import Leg
 
@@ -104,7 +104,7 @@ def off_grid(city: City, level: str, count: int) -> list[Query]:
     cells = _cells(database)[:count]
     aside = _random(_ANYWHERE).uniform(-0.5, 0.5, (len(cells), 2)) * database.grid.step
     places = database.xy[cells] + aside
-    views = views_at(city.objects, places, index=city.tree, radius=database.spec.radius)
+    views = visible_objects_at(city.objects, places, index=city.tree, radius=database.spec.radius)
     queries = []
     for number, (low, high) in enumerate(pairwise(views.offsets.tolist())):
         signature = Signature(views.codes[low:high], views.bearings[low:high])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.objects.load import build_objects, choose_layers, read_files
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
 from semsig_gis.sources.synthetic.city import synthetic_city, synthetic_surroundings

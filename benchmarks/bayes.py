@@ -25,7 +25,7 @@ from benchmarks._cities import MADE_UP, made_up, made_up_streets
 from benchmarks.views import DEGREES, NOISE
 from semsig_gis.core.geometry import FULL_TURN, signed_degrees
 from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.database import views_in
+from semsig_gis.database.database import visible_objects_in
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
 from semsig_gis.localization.likelihood.index import build_index
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sightings import Views
+    from semsig_gis.database.sightings import VisibleObjects
     from semsig_gis.evaluation.queries.draw import Query
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.observation.view import Photo
@@ -110,8 +110,8 @@ class ExactPosterior:
     database: SignatureDatabase
 
     @cached_property
-    def _views(self) -> Views:
-        return views_in(self.database, np.arange(len(self.database)))
+    def _views(self) -> VisibleObjects:
+        return visible_objects_in(self.database, np.arange(len(self.database)))
 
     @cached_property
     def _table(self) -> NoiseTable:

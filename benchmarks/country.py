@@ -19,9 +19,9 @@ from benchmarks.comparison import Comparison
 from benchmarks.memory import own_peak
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles, plan_tiles
 from semsig_gis.database.update import update_tiles
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import open_objects, save_objects
 from semsig_gis.sources.catalog import paper_taxonomy

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.maps.cells import ambiguity_map

@@ -93,10 +93,10 @@ def build(
     from semsig_gis.core.geometry import GridSpec
     from semsig_gis.core.signature import SignatureSpec
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.sightings import ViewpointSpec
+    from semsig_gis.database.viewpoints import ViewpointSpec
     from semsig_gis.objects.surroundings import read_area
     from semsig_gis.objects.table import open_objects
-    from semsig_gis.storage.geoparquet import NOWHERE
+    from semsig_gis.storage.geoparquet import EMPTY_BOX
 
     if streets is not None and viewpoints != "streets":
         raise InputError("--streets is used only with --viewpoints streets; give both or neither.")
@@ -109,7 +109,7 @@ def build(
             width=street_width / 2,
             area=None
             if area is None
-            else read_area(area, crs=open_objects(objects, box=NOWHERE).crs),
+            else read_area(area, crs=open_objects(objects, box=EMPTY_BOX).crs),
         ),
     }
     if tile is None and not workers and scheduler is None:

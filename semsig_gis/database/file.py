@@ -20,7 +20,7 @@ from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.core.temporary import remove_abandoned
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.storage.geoparquet import (
     geo_metadata,
     points_to_wkb,

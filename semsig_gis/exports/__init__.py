@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.table import CellGeometry
+    from semsig_gis.database.database import CellGeometry, SignatureDatabase
     from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.layers import Layer

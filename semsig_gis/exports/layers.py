@@ -24,8 +24,8 @@ from semsig_gis.core.geometry import (
     SOURCE_ID,
 )
 from semsig_gis.core.symbology import OUTCOMES
+from semsig_gis.database.database import CellTable
 from semsig_gis.database.file import database_specs
-from semsig_gis.database.table import CellTable
 from semsig_gis.exports.styles import (
     AMBIGUITY,
     IDENTIFIABILITY,
@@ -43,8 +43,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.table import CellGeometry
+    from semsig_gis.database.database import CellGeometry, SignatureDatabase
     from semsig_gis.evaluation.identifiability.result import Identifiability
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.styles import Style

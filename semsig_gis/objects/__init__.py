@@ -1,1 +1,1 @@
-"""Raw layers become one clean table of street objects."""
+"""Load raw layers into one checked table of street objects."""

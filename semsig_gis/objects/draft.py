@@ -26,7 +26,7 @@ from semsig_gis.core.errors import (
 )
 from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
-from semsig_gis.core.temporary import own_folder
+from semsig_gis.core.temporary import temporary_folder
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,
@@ -153,7 +153,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
 
 def _require_loads(text: str, path: Path) -> None:
     """Refuse a draft by which its own file does not load, with what a load says of it."""
-    with own_folder(Path(tempfile.gettempdir())) as folder:
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
         file.write_text(text, encoding="utf-8")
         try:

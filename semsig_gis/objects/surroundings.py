@@ -22,10 +22,10 @@ from semsig_gis.sources.osm.features import frame_fields, frame_layers, has_elem
 from semsig_gis.sources.parquet import SUFFIXES, read_parquet
 from semsig_gis.sources.rows import WGS84
 from semsig_gis.storage.geoparquet import (
-    CHECKED_PAGES,
     GROUP_ROWS,
+    WRITE_CHECKSUMS,
+    add_footer_checksum,
     hilbert_order,
-    seal,
 )
 from semsig_gis.storage.whole import whole_file
 
@@ -75,9 +75,9 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
             schema_version="1.1.0",
             write_covering_bbox=True,
             row_group_size=GROUP_ROWS,
-            **CHECKED_PAGES,
+            **WRITE_CHECKSUMS,
         )
-        seal(partial)
+        add_footer_checksum(partial)
 
 
 def read_surroundings(

@@ -17,7 +17,7 @@ import numpy as np
 from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, nearest_name
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.symbology import SHADES, VERDICTS, class_signs
-from semsig_gis.database.sightings import views_at
+from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.evaluation.queries.distortion_text import ready_chain
 from semsig_gis.evaluation.queries.distortions import Detector as FailingDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
@@ -457,7 +457,7 @@ class Workbench:
         """Return what is seen from a place, or from the middle of its cell."""
         if self.store is None:
             return Sight.of_cell(self.database, cell)
-        views = views_at(
+        views = visible_objects_at(
             self.store.objects,
             place,
             index=self.store.index,

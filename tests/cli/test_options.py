@@ -15,8 +15,8 @@ from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.parallel import check_workers
 from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tiles import TileSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.identifiability.lookalikes import check_radius
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec

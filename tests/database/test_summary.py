@@ -15,8 +15,8 @@ from worlds import CORNER, lamps, surroundings, worlds
 
 from semsig_gis.core.errors import EmptyResultError
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.summary import database_summary
+from semsig_gis.database.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable

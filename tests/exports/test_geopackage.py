@@ -39,7 +39,7 @@ from semsig_gis.core.signature import SignatureSpec, quantize
 from semsig_gis.core.symbology import OUTCOMES, class_signs
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.identifiability.result import Identifiability
 from semsig_gis.evaluation.scoring import evaluate
 from semsig_gis.exports import export_answer, export_database
@@ -50,7 +50,7 @@ from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
-    from semsig_gis.database.table import CellGeometry
+    from semsig_gis.database.database import CellGeometry
 
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"

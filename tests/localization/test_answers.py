@@ -14,7 +14,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.database import SequenceTable
+from semsig_gis.database.sequences import SequenceTable
 from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.requirement import Requirement
 from semsig_gis.sources.catalog import paper_taxonomy

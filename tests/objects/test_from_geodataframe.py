@@ -16,8 +16,8 @@ from sentences import refused
 
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.objects.from_geodataframe import objects_from_frame
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy

@@ -16,8 +16,8 @@ from worlds import random_town
 
 from semsig_gis.core.geometry import Distortion
 from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.update import UpdateReport
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.experiments.tables import (
     experiment_figures,
     experiment_markdown,

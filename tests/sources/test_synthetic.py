@@ -18,7 +18,7 @@ from sentences import refused
 from semsig_gis.core.errors import InputError
 from semsig_gis.database.build import build_database
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.paper.figures import DATABASE, OCCURRENCES
 from semsig_gis.objects.load import build_objects
 from semsig_gis.sources.catalog import paper_taxonomy

@@ -39,7 +39,11 @@ from semsig_gis.evaluation.scoring import (
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.locator import make_locator
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
+from semsig_gis.storage.geoparquet import (
+    VERIFY_CHECKSUMS,
+    add_footer_checksum,
+    check_footer_checksum,
+)
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
 from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import toml_text
@@ -258,7 +262,7 @@ class ExperimentWork:
             for name, scored in self._scored(names, queries):
                 with whole_file(missing[name]) as half:
                     scored.to_parquet(half, write_page_checksum=True)
-                    seal(half)
+                    add_footer_checksum(half)
 
     def _scored(
         self, names: Sequence[str], queries: Sequence[Query]
@@ -299,7 +303,7 @@ class ExperimentWork:
         for distortion, method in product(self.spec.distortions, self.spec.methods):
             parts = [part for part in self.parts if part.distortion == distortion]
             files = [_part_file(place, part, method) for part in parts]
-            tables = [pq.read_table(file, **CHECKING_PAGES) for file in files]
+            tables = [pq.read_table(file, **VERIFY_CHECKSUMS) for file in files]
             scored = pa.concat_tables(tables, promote_options="default").to_pandas()
             for top in self.spec.top:
                 case = Case(distortion=distortion, method=method, top=top)
@@ -351,8 +355,8 @@ def _is_whole(file: Path, *, rows: int) -> bool:
     if not file.is_file():
         return False
     try:
-        require_intact(file)
-        return bool(pq.read_table(file, **CHECKING_PAGES).num_rows == rows)
+        check_footer_checksum(file)
+        return bool(pq.read_table(file, **VERIFY_CHECKSUMS).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False
 
@@ -535,7 +539,7 @@ def _answer(
     failed = finish_tasks(
         answer,
         list(sizes),
-        done=count_answers,
+        on_success=count_answers,
         workers=workers,
         scheduler=scheduler,
         files=[work.folder.resolve() / work.spec.database for work, _ in running.values()],

@@ -19,9 +19,9 @@ from semsig_gis.core.parallel import check_workers
 from semsig_gis.database.build import build_database
 from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.summary import database_summary
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.experiments.run import run_experiments
 from semsig_gis.evaluation.paper import figures as paris
 from semsig_gis.evaluation.queries.distortion_text import parse_chain

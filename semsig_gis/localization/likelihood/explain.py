@@ -16,8 +16,8 @@ import numpy as np
 from semsig_gis.core.display import Displayed
 from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees, wrap_degrees
 from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.database import views_in
-from semsig_gis.database.sightings import views_at
+from semsig_gis.database.database import visible_objects_in
+from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.localization.likelihood.association import Detections, associate, near_pairs
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables, query_bearings
 from semsig_gis.observation.north import GRID_NORTH
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.sightings import Views
+    from semsig_gis.database.sightings import VisibleObjects
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.objects.table import StreetObjects
     from semsig_gis.observation.north import North
@@ -160,7 +160,7 @@ def explain(
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
-    view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
+    view = visible_objects_at(objects, place, index=index, radius=radius, footprints=footprints)
     codes = np.flatnonzero(np.bincount(objects.codes)).astype(np.uint8)
     scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
     return scene.explanation(query, noise, heading)
@@ -180,7 +180,7 @@ def explain_cell(
     ``source`` and ``source_id`` are missing, and places of objects are good to some decimetres.
     """
     x, y = database.xy[cell].tolist()
-    view = views_in(database, np.array([cell]))
+    view = visible_objects_in(database, np.array([cell]))
     codes, radius = database.present_codes, database.spec.radius
     scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)
     return scene.explanation(query, noise, heading)
@@ -204,7 +204,7 @@ class _Scene:
     """What is seen from a place, of the classes that the city has."""
 
     xy: tuple[float, float]
-    view: Views
+    view: VisibleObjects
     codes: NDArray[np.uint8]
     taxonomy: Taxonomy
     crs: CRS

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sightings import Views
+    from semsig_gis.database.sightings import VisibleObjects
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.observation.view import View
 
@@ -112,7 +112,7 @@ class PhotoTable:
 
 def photo_loglik(
     photo: PhotoTable,
-    views: Views,
+    views: VisibleObjects,
     tables: Sequence[NoiseTable],
     weights: NDArray[np.float64],
     *,

@@ -18,7 +18,7 @@ from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import cell_ids, signed_degrees
 from semsig_gis.core.text import percent
-from semsig_gis.database.sightings import views_at
+from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.localization.likelihood.association import turn_logs
 from semsig_gis.localization.likelihood.index import own_sigma
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
@@ -397,7 +397,9 @@ def refine(
         parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
         prior, turned = np.repeat(prior, 4), np.repeat(turned, 4, axis=1)
         size /= 2.0
-        views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
+        views = visible_objects_at(
+            objects, parts, index=index, radius=radius, footprints=footprints
+        )
         wide = [
             replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
             for table in tables

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.sightings import Views
+    from semsig_gis.database.sightings import VisibleObjects
     from semsig_gis.localization.likelihood.association import Association, Pairs
 
 
@@ -65,7 +65,7 @@ class Evidence:
 
     names: list[str]
     start: NoiseTable
-    views: Views
+    views: VisibleObjects
     seen: Detections
     pairs: Pairs
 
@@ -125,7 +125,7 @@ class Counts:
 
 
 def gather_evidence(
-    views: Views,
+    views: VisibleObjects,
     detected: Sequence[Signature],
     *,
     taxonomy: Taxonomy,

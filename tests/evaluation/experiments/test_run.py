@@ -21,7 +21,7 @@ from sentences import refused
 from worlds import CORNER, TOWN, World, contents, save_town
 
 from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.core.temporary import MACHINE
+from semsig_gis.core.temporary import MACHINE_PREFIX
 from semsig_gis.evaluation.experiments import run
 from semsig_gis.evaluation.experiments.run import (
     ExperimentWork,
@@ -259,7 +259,7 @@ def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_p
     first, second, *_ = sorted(parts.iterdir())
     first.write_bytes(first.read_bytes()[:-50])
     pd.read_parquet(second).iloc[1:].to_parquet(second)
-    (parts / f"{MACHINE}left").mkdir()
+    (parts / f"{MACHINE_PREFIX}left").mkdir()
     run_to_the_end(folder, tmp_path, results)
 
 

@@ -17,8 +17,8 @@ from worlds import CORNER, TAXONOMY, World, random_town
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.taxonomy import Taxonomy
 from semsig_gis.database.build import build_database
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.store import ObjectStore
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
 from semsig_gis.objects.load import assemble, choose_layers, read_files

@@ -27,7 +27,7 @@ from worlds import CODES, World, random_town
 
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
-from semsig_gis.database.database import views_in
+from semsig_gis.database.database import visible_objects_in
 from semsig_gis.localization.likelihood.association import (
     Detections,
     Pairs,
@@ -158,7 +158,7 @@ def test_pairs_weigh_as_one_at_a_time(seed: int, size: int, noise: NoiseSpec, si
     database = random_database(seed)
     query = random_query(database, seed, size=size)
     (table,), _ = database_tables(database, noise)
-    views, starts = views_in(database, np.array([0])), np.array([0, size])
+    views, starts = visible_objects_in(database, np.array([0])), np.array([0, size])
     pairs = near_pairs(views.offsets, views.bearings, starts, query_bearings(query))
     found = associated_views(database, query, noise)
     weights = slow_weights(table, database, query, 0)
@@ -175,7 +175,7 @@ def associated_views(
     """Associate what the photos of a query show with what the first cell sees."""
     (table,), _ = database_tables(database, noise)
     seen = Detections.of([query], table)
-    views = views_in(database, np.zeros(len(seen.photos), np.int64))
+    views = visible_objects_in(database, np.zeros(len(seen.photos), np.int64))
     return associate(
         table,
         views,

@@ -17,7 +17,7 @@ from worlds import CODES, CORNER, World, random_town
 from semsig_gis.core.rtree import ObjectIndex
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.sightings import views_at
+from semsig_gis.database.sightings import visible_objects_at
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.localization.likelihood.answer_rule import AnswerRule
 from semsig_gis.localization.likelihood.estimate import (
@@ -49,7 +49,7 @@ PLACE = CORNER + np.array([103.0, 97.0])
 
 def seen_from(xy: np.ndarray, *, objects: StreetObjects = STORE.objects) -> Signature:
     """Return what there is to see from a place, without a mistake."""
-    view = views_at(objects, xy[None], index=ObjectIndex(objects.xy), radius=30.0)
+    view = visible_objects_at(objects, xy[None], index=ObjectIndex(objects.xy), radius=30.0)
     return Signature(view.codes, view.bearings)
 
 
