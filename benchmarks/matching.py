@@ -18,7 +18,7 @@ from benchmarks.likelihood import growth_of_likelihood, likelihood_rows
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
 from semsig_gis.database.database import SignatureDatabase
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.scores import score_cells
 from semsig_gis.sources.catalog import paper_taxonomy

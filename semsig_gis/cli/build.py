@@ -30,7 +30,7 @@ from semsig_gis.cli.console import (
 from semsig_gis.core.errors import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.database.companions import Companion
+    from semsig_gis.database.companion_files import Companion
 
 MB = 1e6
 
@@ -261,7 +261,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
         print_json(_info(database))
         return
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.companions import companions
+    from semsig_gis.database.companion_files import companions
     from semsig_gis.reports.database import database_tables
     from semsig_gis.reports.identifiability import identifiability_tables
 
@@ -280,7 +280,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
 
 def _info(path: Path) -> dict[str, Any]:
     from semsig_gis.database.city import open_city
-    from semsig_gis.database.companions import companions
+    from semsig_gis.database.companion_files import companions
     from semsig_gis.database.summary import database_summary
 
     city = open_city(path)
@@ -317,7 +317,7 @@ def clean(
 
     Older versions and interrupted runs leave them; the database is not changed.
     """
-    from semsig_gis.database.companions import remove_companions
+    from semsig_gis.database.companion_files import remove_companions
 
     removed = remove_companions(database, objects=objects, dry_run=dry_run)
     total = sum(one.bytes for one in removed)

@@ -35,7 +35,7 @@ def demo(
     from semsig_gis.database.file import save_database
     from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.evaluation.file import save_evaluation
-    from semsig_gis.exports import export_database
+    from semsig_gis.exports.export import export_database
     from semsig_gis.maps.evaluation import evaluation_map
     from semsig_gis.maps.objects import objects_map
     from semsig_gis.maps.page import save_map

@@ -115,7 +115,7 @@ def evaluate(
     from semsig_gis.reports.evaluation import evaluation_headline, evaluation_tables
 
     if report is not None:  # what draws, and is missed before the work rather than after it
-        from semsig_gis.reports.evaluation_page import evaluation_page
+        from semsig_gis.reports.evaluation_html import evaluation_page
         from semsig_gis.reports.page import write_page
     chain = [
         dataclasses.replace(

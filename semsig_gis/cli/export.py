@@ -67,7 +67,7 @@ def export(
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
     from semsig_gis.database.city import open_city
-    from semsig_gis.exports import ITEM, export_database, export_item
+    from semsig_gis.exports.export import ITEM, export_database, export_item
     from semsig_gis.objects.table import open_objects
 
     keep_inputs(out, read=(database, objects))

@@ -313,7 +313,7 @@ def _write(
     options: LocalizeOptions, out: Path, city: City, answer: Answer, locator: Locator[Answer]
 ) -> dict[str, Any]:
     """Write the regions to search, or all chances, and return what there is to say of regions."""
-    from semsig_gis.exports import export_answer
+    from semsig_gis.exports.export import export_answer
     from semsig_gis.localization.answers import REGION_SHARE
 
     if answer.tied_beyond:

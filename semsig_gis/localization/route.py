@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
 
-LOST = 1e-6
+LOST_LEG_CHANCE = 1e-6
 """Chance that a leg is quite wrong, and the next place anywhere."""
 LEAST_CHANCE = 1e-12  # cells below this, against the likeliest, do not move
 LEAST_SHARE = 1e-6  # of the blur that is left out
@@ -90,7 +90,7 @@ def route_posteriors(
     forward = [likely[0]]
     for here, leg in zip(likely[1:], legs, strict=True):
         came = moved_chances(database, forward[-1], leg)
-        both = here * ((1.0 - LOST) * came + LOST / size)
+        both = here * ((1.0 - LOST_LEG_CHANCE) * came + LOST_LEG_CHANCE / size)
         forward.append(both / both.sum())
     backward = np.ones(size)
     chances = [forward[-1]]
@@ -99,7 +99,7 @@ def route_posteriors(
         ahead = likely[row + 1] * backward
         ahead /= ahead.sum()
         back = moved_chances(database, ahead, Leg(dx=-leg.dx, dy=-leg.dy, sigma=leg.sigma))
-        backward = (1.0 - LOST) * back + LOST / size
+        backward = (1.0 - LOST_LEG_CHANCE) * back + LOST_LEG_CHANCE / size
         both = forward[row] * backward
         chances.append(both / both.sum())
     return tuple(Posterior(database=database, chances=view) for view in reversed(chances))

@@ -23,7 +23,7 @@ from semsig_gis.core.geometry import (
     SOURCE_ID,
     require_metric_crs,
 )
-from semsig_gis.objects.conflate import ConflationReport, conflate
+from semsig_gis.objects.conflation import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note

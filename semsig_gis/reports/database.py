@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core.text import percent
 from semsig_gis.database.summary import database_summary
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.reports.tables import Table, distortion_rows, note_tables
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from semsig_gis.core.symbology import ERROR_BREAKS
 from semsig_gis.evaluation.figures import percentile
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.evaluation.queries.distortion_text import chain_text
 from semsig_gis.evaluation.queries.distortions import DISTORTIONS, FalseClass
 from semsig_gis.evaluation.result import Evaluation

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.geometry import Distortion
     from semsig_gis.core.taxonomy import ObjectClass
     from semsig_gis.database.update import UpdateReport
-    from semsig_gis.objects.conflate import ConflatedPair, ConflationReport
+    from semsig_gis.objects.conflation import ConflatedPair, ConflationReport
     from semsig_gis.objects.load import LayerReport, LoadReport, UnreadLayer
     from semsig_gis.objects.table import StreetObjects
 

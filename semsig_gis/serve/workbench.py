@@ -21,7 +21,7 @@ from semsig_gis.database.sightings import views_at
 from semsig_gis.evaluation.queries.distortion_text import ready_chain
 from semsig_gis.evaluation.queries.distortions import Detector as FailingDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
-from semsig_gis.exports import export_answer
+from semsig_gis.exports.export import export_answer
 from semsig_gis.localization.likelihood.incremental import TurnMemo
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import LikelihoodLocator

@@ -10,7 +10,7 @@ from small_city import small_city
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.core.temporary import MACHINE, OWNER, own_folder
-from semsig_gis.database.companions import companions, remove_companions
+from semsig_gis.database.companion_files import companions, remove_companions
 from semsig_gis.database.file import open_database
 from semsig_gis.database.store import ObjectStore, open_store, save_with_store
 

@@ -14,7 +14,7 @@ import pyogrio
 import pytest
 from small_city import small_city, small_localization, small_location
 
-from semsig_gis.exports import export_answer
+from semsig_gis.exports.export import export_answer
 
 if TYPE_CHECKING:
     from pathlib import Path

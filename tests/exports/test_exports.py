@@ -22,7 +22,7 @@ from small_city import (
 )
 
 from semsig_gis.core.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
-from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database
+from semsig_gis.exports.export import LAYERS, RASTERS, export_answer, export_database
 from semsig_gis.localization.regions import search_regions
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.core.errors import DatabaseError
 from semsig_gis.database.file import open_database
-from semsig_gis.exports import export_database
+from semsig_gis.exports.export import export_database
 from semsig_gis.exports.files import as_written, formula_safe
 
 if TYPE_CHECKING:

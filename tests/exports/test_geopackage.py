@@ -42,7 +42,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.identifiability.result import Identifiability
-from semsig_gis.exports import export_answer, export_database
+from semsig_gis.exports.export import export_answer, export_database
 from semsig_gis.exports.geopackage import read_geopackage
 from semsig_gis.exports.styles import CLASS_MARKERS, by_class
 from semsig_gis.localization.distance.method import Method

@@ -22,7 +22,7 @@ from map_pages import HOSTILE
 from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
 
 from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.exports import export_answer, export_database
+from semsig_gis.exports.export import export_answer, export_database
 from semsig_gis.exports.hexagons import hexagons_layer
 from semsig_gis.exports.layers import (
     answer_layers,

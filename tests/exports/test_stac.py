@@ -20,7 +20,7 @@ from small_city import small_city
 
 from semsig_gis.core.errors import DatabaseError, InputError
 from semsig_gis.database.file import save_database
-from semsig_gis.exports import export_item
+from semsig_gis.exports.export import export_item
 from semsig_gis.objects.table import save_objects
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ from semsig_gis.objects.guesses import (
 from semsig_gis.objects.load import assemble, read_files
 from semsig_gis.sources import reader
 from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.keywords import Keywords, Match, keywords, words_of
+from semsig_gis.sources.class_keywords import Keywords, Match, keywords, words_of
 from semsig_gis.sources.vector import LayerInfo
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from raw_layers import raw_layer
 
-from semsig_gis.objects.conflate import conflate
+from semsig_gis.objects.conflation import conflate
 from semsig_gis.objects.load import build_objects
 from semsig_gis.objects.table import StreetObjects
 from semsig_gis.reports.quality import quality_report

@@ -21,7 +21,7 @@ from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.reports.evaluation import evaluation_headline, paris_points
-from semsig_gis.reports.evaluation_page import evaluation_page
+from semsig_gis.reports.evaluation_html import evaluation_page
 from semsig_gis.reports.page import write_page
 
 if TYPE_CHECKING:

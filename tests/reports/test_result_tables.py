@@ -33,7 +33,7 @@ from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.method import LikelihoodMethod
 from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.objects.changes import ClassChange
-from semsig_gis.objects.conflate import ConflatedPair
+from semsig_gis.objects.conflation import ConflatedPair
 from semsig_gis.objects.load import LayerReport, UnreadLayer
 from semsig_gis.reports.database import database_tables
 from semsig_gis.reports.evaluation import (

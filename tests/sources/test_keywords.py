@@ -8,7 +8,7 @@ from sentences import refused
 from semsig_gis.core.errors import UnknownNameError
 from semsig_gis.core.taxonomy import WILDCARD, ObjectClass, Taxonomy
 from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.keywords import class_code
+from semsig_gis.sources.class_keywords import class_code
 
 TAXONOMY = load_catalog("openstreetmap").taxonomy
 WORDS = {

@@ -24,7 +24,7 @@ from semsig_gis.database.store import ObjectStore, save_with_store
 from semsig_gis.database.summary import database_summary
 from semsig_gis.evaluation.evaluate import versions
 from semsig_gis.evaluation.experiments.run import run_experiments
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count
 from semsig_gis.evaluation.spec import ExperimentSpec

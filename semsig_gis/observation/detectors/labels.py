@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from semsig_gis.core.errors import CatalogError, InputError, UnknownNameError, nearest_name
 from semsig_gis.core.taxonomy import MAX_HEIGHT_M, check_height
 from semsig_gis.sources.catalog import built_in_taxonomy, data_folder
-from semsig_gis.sources.keywords import class_code
+from semsig_gis.sources.class_keywords import class_code
 from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import check_keys, metres, parse_toml, texts
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.evaluation.paper.reproduction import BEST
 from semsig_gis.reports.shares import Share, share_values
 

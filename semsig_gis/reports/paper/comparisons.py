@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from semsig_gis.evaluation.paper.figures import READ_OFF
+from semsig_gis.evaluation.paper.published import READ_OFF
 from semsig_gis.evaluation.paper.reproduction import FUSIONS, MANY, PERCENTS, SINGLES, WEIGHTS
 from semsig_gis.reports.paper.cases import case_of
 from semsig_gis.reports.report_model import Section

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.paper.figures import READ_OFF
+from semsig_gis.evaluation.paper import published as paris
+from semsig_gis.evaluation.paper.published import READ_OFF
 from semsig_gis.evaluation.paper.reproduction import (
     BEST,
     FIRST_STAGE,

@@ -11,7 +11,7 @@ from worlds import QUERIES, TOWN, contents, save_town
 
 from semsig_gis.core.errors import InputError, SemsigError
 from semsig_gis.database.file import open_database, save_database
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.evaluation.paper.reproduction import paper_experiments, reproduce, time_queries
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.scores import score_cells

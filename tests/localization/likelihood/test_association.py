@@ -40,7 +40,7 @@ from semsig_gis.localization.likelihood.association import (
 from semsig_gis.localization.likelihood.explain import explain, explain_cell
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.off_centre import views_aside
-from semsig_gis.localization.likelihood.photo import LOST, PhotoTable, photo_loglik
+from semsig_gis.localization.likelihood.photo import OMITTED_SHARE, PhotoTable, photo_loglik
 from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, cell_noise, named_noise
 from semsig_gis.localization.noise.table import database_tables, query_bearings
 from semsig_gis.observation.view import FULL_VIEW, Photo, View
@@ -309,7 +309,7 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
             np.logaddexp.reduce((one + prior).reshape(-1, many * turns.shape[1]), axis=1)
             for one in (bounds, whole)
         )
-        assert sums == pytest.approx(expected, abs=LOST)
+        assert sums == pytest.approx(expected, abs=OMITTED_SHARE)
 
 
 def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:

@@ -32,7 +32,7 @@ from semsig_gis.localization.likelihood.priors import (
     raster_prior,
     weight_prior,
 )
-from semsig_gis.localization.route import LOST, Leg, moved_chances, route_posteriors
+from semsig_gis.localization.route import LOST_LEG_CHANCE, Leg, moved_chances, route_posteriors
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -280,8 +280,9 @@ def test_smoothing_is_the_sum_over_all_routes(seed: int, ways: list[Leg]) -> Non
     database = random_database(seed, cells=6)
     logliks = np.random.default_rng(seed).normal(0, 3, (len(ways) + 1, 6))
     steps = [
-        (1 - LOST) * np.stack([moved_chances(database, np.eye(6)[cell], leg) for cell in range(6)])
-        + LOST / 6
+        (1 - LOST_LEG_CHANCE)
+        * np.stack([moved_chances(database, np.eye(6)[cell], leg) for cell in range(6)])
+        + LOST_LEG_CHANCE / 6
         for leg in ways
     ]
     slow = np.zeros((len(ways) + 1, 6))
