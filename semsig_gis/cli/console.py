@@ -20,16 +20,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 import typer
 
 from semsig_gis import __version__
-from semsig_gis.core.defaults import DEFAULT_METHOD, PAPER_METHOD
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.text import visible
+from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, DatabaseError, InputError, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from semsig_gis.database.city import City
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.reports.tables import Table
+    from semsig_gis.database import City
+    from semsig_gis.evaluation import Identifiability
+    from semsig_gis.reports import Table
 
 
 VARIABLE = "SEMSIG_SUPERVISED"
@@ -377,7 +375,7 @@ def known_identifiability(city: City) -> Identifiability | None:
     try:
         if not city.has_columns:
             return None
-        from semsig_gis.evaluation.identifiability.result import open_identifiability
+        from semsig_gis.evaluation import open_identifiability
 
         return open_identifiability(city.database, city.path)
     except DatabaseError as error:

@@ -22,10 +22,10 @@ from semsig_gis.cli.console import (
     require_suffix,
     say,
 )
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.objects.load import Loaded, Selection
+    from semsig_gis.objects import Loaded, Selection
     from semsig_gis.sources.catalog import Catalog
     from semsig_gis.sources.filters import Rules
     from semsig_gis.sources.layers import LayerSpec
@@ -118,8 +118,7 @@ def load(
     as_json: AsJson = False,
 ) -> None:
     """Read files of open data into street objects."""
-    from semsig_gis.objects.load import assemble, choose_layers, read_files
-    from semsig_gis.objects.skipped_layers import passed_by, read_small
+    from semsig_gis.objects import assemble, choose_layers, passed_by, read_files, read_small
     from semsig_gis.sources.area import BOX, clip_layers, parse_area
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
     from semsig_gis.sources.detect import told_catalogs
@@ -216,8 +215,7 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """Download the street objects of an area."""
-    from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
-    from semsig_gis.objects.load import assemble, choose_layers
+    from semsig_gis.objects import assemble, choose_layers, fetch_layers, find_area, open_cache
     from semsig_gis.sources.catalog import load_catalog
 
     keep_inputs(out, buildings, streets, read=(name, area))
@@ -272,9 +270,8 @@ def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
 def _save_loaded(
     loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
 ) -> None:
-    from semsig_gis.objects.surroundings import save_surroundings
-    from semsig_gis.objects.table import save_objects
-    from semsig_gis.reports.quality import quality_report
+    from semsig_gis.objects import save_objects, save_surroundings
+    from semsig_gis.reports import quality_report
 
     notes = list(loaded.notes)
     save_objects(loaded.objects, out)
@@ -290,7 +287,7 @@ def _save_loaded(
     if as_json:
         print_json(report.to_dict())
     else:
-        from semsig_gis.reports.quality import quality_tables
+        from semsig_gis.reports import quality_tables
 
         # The notes are said below the tables, where they are seen, and not twice.
         print_tables(quality_tables(replace(report, notes=())))
@@ -309,7 +306,7 @@ def draft(
     ] = None,
 ) -> None:
     """Draft a catalogue for a vector file, for you to edit."""
-    from semsig_gis.objects.draft import draft_catalog
+    from semsig_gis.objects import draft_catalog
 
     say(draft_catalog(file, crs=crs), end="")
 
@@ -328,7 +325,7 @@ def sources(
     """List the catalogues, or the layers of one."""
     import dataclasses
 
-    from semsig_gis.core.plugins import installed_readers
+    from semsig_gis.core import installed_readers
     from semsig_gis.sources import READERS
     from semsig_gis.sources.catalog import catalog_names, load_catalog
 

@@ -8,16 +8,27 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from semsig_gis.core.effort import announce, require_memory
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, consecutive, split_ids
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec, distance_units_of
+from semsig_gis.core import (
+    BEARING_UNITS,
+    CrsError,
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    PackedIndex,
+    SignatureSpec,
+    announce,
+    cell_ids,
+    cells_near,
+    consecutive,
+    distance_units_of,
+    require_memory,
+    split_ids,
+)
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.sightings import ViewpointSpec, clockwise_order, sightings
 from semsig_gis.database.viewpoints import choose_viewpoints
-from semsig_gis.objects.table import StreetObjects, licenses_of
+from semsig_gis.objects import StreetObjects, licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -100,7 +111,7 @@ def build_database(
     np.True_
     """
     if not isinstance(objects, StreetObjects):
-        from semsig_gis.objects.from_geodataframe import objects_from_frame  # noqa: PLC0415 - it loads slowly
+        from semsig_gis.objects import objects_from_frame  # noqa: PLC0415 - it loads slowly
 
         objects = objects_from_frame(objects)
     footprints, streets = elements_of(footprints, "buildings"), elements_of(streets, "streets")
@@ -254,7 +265,7 @@ def elements_of(
     """Return what a table is, or what of OpenStreetMap's elements in it (see `elements_in`)."""
     if table is None:
         return None
-    from semsig_gis.objects.surroundings import elements_in  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.objects import elements_in  # noqa: PLC0415 - it loads slowly
 
     return elements_in(table, role)
 

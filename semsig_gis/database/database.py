@@ -18,12 +18,21 @@ from pyproj import CRS
 
 import semsig_gis
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed, bounds_text
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import cell_ids, consecutive, crs_label
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    DatabaseError,
+    Displayed,
+    InputError,
+    Signature,
+    bounds_text,
+    cell_ids,
+    consecutive,
+    crs_label,
+    quantize,
+)
 from semsig_gis.database.sightings import ViewpointSpec, Views
-from semsig_gis.storage.geoparquet import whole_numbers
+from semsig_gis.storage import whole_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -31,10 +40,7 @@ if TYPE_CHECKING:
     import geopandas as gpd
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.core.geometry import GridSpec
-    from semsig_gis.core.signature import SignatureSpec
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Axes, GridSpec, MapFrame, SignatureSpec, Taxonomy
     from semsig_gis.database.table import CellGeometry
 
     _Array = TypeVar("_Array", bound="NDArray[Any]")

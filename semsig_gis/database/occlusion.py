@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import Displayed, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core import FULL_TURN, InputError, nearest_name, require_number
 
 if TYPE_CHECKING:
     import shapely
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 BEARING_DECIMALS = 9

@@ -10,9 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
 
-from semsig_gis.core.errors import UnknownNameError, nearest_name
-from semsig_gis.core.geometry import LICENSES
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
+from semsig_gis.core import BEARING_UNITS, DISTANCE_UNITS, LICENSES, UnknownNameError, nearest_name
 
 if TYPE_CHECKING:
     import geopandas as gpd

@@ -19,20 +19,24 @@ import pyarrow.parquet as pq
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.effort import announce
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
+    HALF_DONE,
+    MOST_METRES,
+    DatabaseError,
+    EmptyResultError,
     GridSpec,
+    InputError,
+    SignatureSpec,
+    announce,
     cell_ids,
     cells_near,
+    check_workers,
     consecutive,
+    finish_tasks,
+    require_number,
     require_step,
     split_ids,
 )
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.temporary import HALF_DONE
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -55,12 +59,12 @@ from semsig_gis.database.occlusion import TOLERANCE_M
 from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
 from semsig_gis.database.viewpoints import require_surroundings
-from semsig_gis.objects.surroundings import read_surroundings
-from semsig_gis.objects.table import open_objects
-from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
-from semsig_gis.storage.runs import (
+from semsig_gis.objects import open_objects, read_surroundings
+from semsig_gis.storage import (
+    NOWHERE,
     PARTIAL,
     RunKind,
+    each_bounds,
     finish,
     partial_folder,
     read_json,

@@ -8,14 +8,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.geometry import GridSpec
+    from semsig_gis.core import GridSpec
     from semsig_gis.database.occlusion import Footprints
     from semsig_gis.database.sightings import ViewpointSpec
 

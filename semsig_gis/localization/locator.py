@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Literal, TypeAlias, overload
 
 import numpy as np
 
-from semsig_gis.core.defaults import DEFAULT_METHOD, LIKELIHOOD
-from semsig_gis.database.city import City
-from semsig_gis.database.database import join_databases
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD
+from semsig_gis.database import City, PartitionedDatabase, join_databases
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.search import DistanceLocator
 from semsig_gis.localization.likelihood.index import build_index
@@ -17,22 +15,21 @@ from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.likelihood.method import LikelihoodMethod
 from semsig_gis.localization.likelihood.priors import weight_prior
 from semsig_gis.localization.noise.model import NOISES, cell_noise
-from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.core import Signature
+    from semsig_gis.database import ObjectStore, SignatureDatabase
     from semsig_gis.localization.answers import Answer, Locator, Requirement
     from semsig_gis.localization.distance.search import Localization
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.locate import Location
     from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.observation.north import North
+    from semsig_gis.observation import North
 
-AnyMethod = Method | LikelihoodMethod
+AnyMethod: TypeAlias = Method | LikelihoodMethod
 
 
 def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMethod:

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import ROW_SPAN
+from semsig_gis.core import MOST_METRES, ROW_SPAN, InputError, require_number
 from semsig_gis.localization.likelihood.posterior import Posterior, posterior
 
 if TYPE_CHECKING:
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 LOST_LEG_CHANCE = 1e-6
 """Chance that a leg is quite wrong, and the next place anywhere."""

@@ -17,16 +17,17 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
+    MAX_CODE,
     CatalogError,
     CrsError,
     EmptyResultError,
+    ObjectClass,
     SemsigError,
     SourceError,
+    own_folder,
+    require_metric_crs,
 )
-from semsig_gis.core.geometry import require_metric_crs
-from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
-from semsig_gis.core.temporary import own_folder
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,

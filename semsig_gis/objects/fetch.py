@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from platformdirs import user_cache_path
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.sources import mapillary, overture
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
 from semsig_gis.sources.http.cache import Cache

@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING
 
 import geopandas as gpd
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, nearest_name
-from semsig_gis.core.geometry import LICENSES, SOURCE_ID
+from semsig_gis.core import (
+    LICENSES,
+    SOURCE_ID,
+    CrsError,
+    EmptyResultError,
+    InputError,
+    nearest_name,
+)
 from semsig_gis.objects.load import assemble, choose_layers
 from semsig_gis.objects.table import Licence
 from semsig_gis.sources import TAGS_READER

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from shapely.geometry.base import BaseGeometry
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.class_keywords import keywords, words_of
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.numbers import decimal

@@ -12,15 +12,17 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
     CLASS_CODE,
     CLASS_NAME,
     COUNT,
     LICENSES,
     SOURCE,
     SOURCE_ID,
+    CrsError,
+    Displayed,
+    EmptyResultError,
+    InputError,
     require_metric_crs,
 )
 from semsig_gis.objects.conflation import ConflationReport, conflate
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
     from semsig_gis.sources import RawLayer, RowCounts
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import Catalog

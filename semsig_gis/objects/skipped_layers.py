@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SemsigError
+from semsig_gis.core import SemsigError
 from semsig_gis.objects.load import read_files
 from semsig_gis.sources import MERGING, find_files
 

@@ -9,8 +9,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.core.geometry import CLASS_NAME, LICENSES
+from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources import file_reader, reader
 from semsig_gis.sources import vector as vector_file
@@ -20,13 +19,7 @@ from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm.features import frame_fields, frame_layers, tells_elements
 from semsig_gis.sources.parquet import SUFFIXES, read_parquet
 from semsig_gis.sources.rows import WGS84
-from semsig_gis.storage.geoparquet import (
-    CHECKED_PAGES,
-    GROUP_ROWS,
-    hilbert_order,
-    seal,
-)
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage import CHECKED_PAGES, GROUP_ROWS, hilbert_order, seal, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -8,15 +8,20 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import grid_convergence, signed_degrees, to_degrees
+from semsig_gis.core import (
+    InputError,
+    UnknownNameError,
+    grid_convergence,
+    nearest_name,
+    signed_degrees,
+    to_degrees,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import PartitionedDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import PartitionedDatabase, SignatureDatabase
 
 NorthName = Literal["grid", "true", "magnetic"]
 NORTHS: tuple[NorthName, ...] = get_args(NorthName)
@@ -143,7 +148,7 @@ def declination(
 
 def _places(database: SignatureDatabase | PartitionedDatabase) -> NDArray[np.float64]:
     """Return the middle and the corners of the box of the cells, shape (5, 2)."""
-    from semsig_gis.database.file import PartitionedDatabase  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.database import PartitionedDatabase  # noqa: PLC0415 - it loads slowly
 
     parts = database.parts() if isinstance(database, PartitionedDatabase) else [database]
     boxes = [(part.xy.min(axis=0), part.xy.max(axis=0)) for part in parts if len(part)]

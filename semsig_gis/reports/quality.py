@@ -15,9 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
-from semsig_gis.core.text import percent
+from semsig_gis.core import COUNT, Displayed, degree_bounds, percent, plane_distortion
 from semsig_gis.reports.tables import Table, brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
@@ -26,12 +24,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.geometry import Distortion
-    from semsig_gis.core.taxonomy import ObjectClass
-    from semsig_gis.database.update import UpdateReport
-    from semsig_gis.objects.conflation import ConflatedPair, ConflationReport
-    from semsig_gis.objects.load import LayerReport, LoadReport, UnreadLayer
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.core import Distortion, ObjectClass
+    from semsig_gis.database import UpdateReport
+    from semsig_gis.objects import (
+        ConflatedPair,
+        ConflationReport,
+        LayerReport,
+        LoadReport,
+        StreetObjects,
+        UnreadLayer,
+    )
 
 
 SQUARE_M = 100.0

@@ -10,9 +10,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, Protocol
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.core.plugins import installed_readers
+from semsig_gis.core import (
+    Displayed,
+    SourceError,
+    UnknownNameError,
+    installed_readers,
+    nearest_name,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

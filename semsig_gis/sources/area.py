@@ -14,8 +14,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
+from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
 from semsig_gis.sources import FILE_SUFFIXES
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.layers import LayerSpec

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.sources import file_reader, files_in, require_file
 from semsig_gis.sources.parquet import SUFFIXES, column_names
 

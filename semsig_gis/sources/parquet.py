@@ -9,9 +9,9 @@ import geopandas as gpd
 import pyarrow.parquet as pq
 import shapely
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources import require_file
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, UNREADABLE, require_intact
+from semsig_gis.storage import CHECKING_PAGES, UNREADABLE, require_intact
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

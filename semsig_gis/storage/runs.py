@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import HALF_DONE, own_folder, remove_abandoned
+from semsig_gis.core import HALF_DONE, InputError, own_folder, remove_abandoned
 from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import put_in_place, reason, write_whole
 

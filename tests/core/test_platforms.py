@@ -11,10 +11,8 @@ import filelock
 import pytest
 
 from semsig_gis import open_cache
-from semsig_gis.core.memory import address_space_left
-from semsig_gis.core.temporary import own_folder
-from semsig_gis.core.threads import cores
-from semsig_gis.storage.whole import alone_in, exchanged, whole_folder
+from semsig_gis.core import address_space_left, cores, own_folder
+from semsig_gis.storage import alone_in, exchanged, whole_folder
 
 if TYPE_CHECKING:
     from pathlib import Path

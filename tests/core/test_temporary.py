@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from semsig_gis.core import ASIDE, HALF_DONE, MACHINE, OWNER, own_folder, remove_abandoned
 from semsig_gis.core import temporary as scratch
-from semsig_gis.core.temporary import ASIDE, HALF_DONE, MACHINE, OWNER, own_folder, remove_abandoned
 
 if TYPE_CHECKING:
     from pathlib import Path

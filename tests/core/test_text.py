@@ -7,7 +7,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.text import visible
+from semsig_gis.core import visible
 
 
 @given(st.text(st.characters()))

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.threads import NotWantedError, each_in_order, share_rows, while_wanted
+from semsig_gis.core import InputError, NotWantedError, each_in_order, share_rows, while_wanted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

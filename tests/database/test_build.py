@@ -21,14 +21,25 @@ from worlds import (
     worlds,
 )
 
-from semsig_gis.core import effort
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database import build
-from semsig_gis.database.build import build_database, visible_objects
-from semsig_gis.database.sightings import Sightings, ViewpointSpec, bearings
+from semsig_gis.core import (
+    CrsError,
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    PackedIndex,
+    SignatureSpec,
+    cells_near,
+    effort,
+    wrap_degrees,
+)
+from semsig_gis.database import (
+    Sightings,
+    ViewpointSpec,
+    bearings,
+    build,
+    build_database,
+    visible_objects,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,13 +14,12 @@ import pyogrio
 import pytest
 from small_city import small_city, small_localization, small_location
 
-from semsig_gis.exports.export import export_answer
+from semsig_gis.exports import export_answer
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization import Localization, Location
 
 CITY, _ = small_city()
 LOCATION = small_location()

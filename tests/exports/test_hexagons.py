@@ -12,7 +12,7 @@ import pyogrio
 import pytest
 from small_city import chances_of, small_city, small_evaluation
 
-from semsig_gis.exports.export import export_database
+from semsig_gis.exports import export_database
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,7 +15,7 @@ from pyproj import Transformer
 from servers import Answer, Server, published
 from small_city import chances_of, small_city
 
-from semsig_gis.exports.export import export_database
+from semsig_gis.exports import export_database
 
 if TYPE_CHECKING:
     from collections.abc import Callable

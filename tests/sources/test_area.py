@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pyproj import Geod
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError, SemsigError
+from semsig_gis.core import CrsError, InputError, SemsigError
 from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.area import (
     clip_layer,

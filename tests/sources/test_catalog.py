@@ -14,8 +14,7 @@ import shapely
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, InputError, SourceError, UnknownNameError
-from semsig_gis.core.taxonomy import ObjectClass
+from semsig_gis.core import CatalogError, InputError, ObjectClass, SourceError, UnknownNameError
 from semsig_gis.sources import FILE_SUFFIXES, find_files
 from semsig_gis.sources.catalog import (
     Catalog,
@@ -30,7 +29,7 @@ from semsig_gis.sources.vector.member import DRIVERS
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
     Town = Callable[..., Path]
     Snapshot = Callable[[str, str], None]

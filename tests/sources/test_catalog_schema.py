@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from semsig_gis.core.errors import CatalogError
+from semsig_gis.core import CatalogError
 from semsig_gis.sources import READERS
 from semsig_gis.sources.catalog import (
     CATALOG_KEYS,

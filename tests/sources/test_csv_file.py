@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.services import layers as opendatasoft

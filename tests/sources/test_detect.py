@@ -11,7 +11,7 @@ import shapely
 from osm_xml import street_town, write_osm
 from sentences import refused, sentence
 
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.detect import told_catalogs
 
 if TYPE_CHECKING:

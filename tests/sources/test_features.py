@@ -10,7 +10,7 @@ import pytest
 import shapely
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources import file_reader, find_files
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.osm.features import frame_layers, read_layers, tells_elements

@@ -20,7 +20,7 @@ from sentences import assert_sentence, refused
 from servers import Answer, published, zipped
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.http import cache as _http_cache
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import (

@@ -9,7 +9,7 @@ import pytest
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.area import parse_area
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec

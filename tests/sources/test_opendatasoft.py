@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from sentences import refused
 from servers import Answer, published
 
-from semsig_gis.core.errors import CatalogError, CrsError, SourceError
+from semsig_gis.core import CatalogError, CrsError, SourceError
 from semsig_gis.sources.area import Area
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.services.layers import find_field, fold, read_layers

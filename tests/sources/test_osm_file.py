@@ -22,7 +22,7 @@ from osm_xml import node, relation, way, write_osm
 from osmium.osm.mutable import Node, Way
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.osm.elements import TagIndex, has_tags, relation_shape, way_shape

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core.errors import CatalogError, InputError, SourceError
+from semsig_gis.core import CatalogError, InputError, SourceError
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.area import Area, parse_area
 from semsig_gis.sources.catalog import load_catalog

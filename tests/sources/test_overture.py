@@ -12,7 +12,7 @@ import shapely
 from sentences import refused
 from stores import keep_in_bucket
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources import find_files
 from semsig_gis.sources.area import clip_layer, parse_area
 from semsig_gis.sources.catalog import load_catalog

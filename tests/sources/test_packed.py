@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.compression import HARMLESS_BYTES, require_modest
 from semsig_gis.sources.layers import LayerSpec
 from semsig_gis.sources.osm.file import read_layers

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError
-from semsig_gis.core.geometry import crs_label
+from semsig_gis.core import CatalogError, crs_label
 from semsig_gis.sources import reader
 from semsig_gis.sources.layers import ClassBy, LayerSpec, WidthBy
 from semsig_gis.sources.rows import (

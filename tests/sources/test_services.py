@@ -24,7 +24,7 @@ from stand_ins import (
     sent,
 )
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources import reader
 from semsig_gis.sources.area import Area, parse_area
 from semsig_gis.sources.http.fetch import HttpError

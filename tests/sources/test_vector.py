@@ -26,7 +26,7 @@ from pyogrio.raw import open_arrow
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
+from semsig_gis.core import CatalogError, CrsError, SourceError, UnknownNameError
 from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.layers import ClassBy, LayerSpec
 from semsig_gis.sources.vector import list_layers, read_layer

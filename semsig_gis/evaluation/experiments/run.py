@@ -19,11 +19,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from semsig_gis.core.effort import announce
-from semsig_gis.core.errors import DatabaseError, SourceError
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.database.city import City
-from semsig_gis.database.file import digest
+from semsig_gis.core import DatabaseError, SourceError, announce, check_workers, finish_tasks
+from semsig_gis.database import City, digest
 from semsig_gis.evaluation.evaluate import (
     PAIR_S,
     QUERY_S,
@@ -36,23 +33,31 @@ from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.localization.answers import DistanceMemo
-from semsig_gis.localization.locator import make_locator
-from semsig_gis.reports.evaluation import experiment_figures, experiment_markdown
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
-from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import toml_text
-from semsig_gis.storage.whole import whole_file, write_whole
+from semsig_gis.localization import DistanceMemo, make_locator
+from semsig_gis.reports import experiment_figures, experiment_markdown
+from semsig_gis.storage import (
+    CHECKING_PAGES,
+    RunKind,
+    finish,
+    partial_folder,
+    read_json,
+    read_text,
+    require_intact,
+    seal,
+    toml_text,
+    whole_file,
+    write_json,
+    write_whole,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import Query
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
-    from semsig_gis.localization.answers import Answer, Locator
+    from semsig_gis.localization import Answer, Locator
 
     # Experiments and the folders where their parts are put, by the folders for their results.
     Running = Mapping[Path, tuple["ExperimentWork", Path]]

@@ -6,7 +6,7 @@ import html
 import re
 from typing import Any
 
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 LONGEST = 200
 # Of OGC services: an ExceptionReport of OWS, or a ServiceExceptionReport of older ones.

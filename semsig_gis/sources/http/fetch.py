@@ -24,7 +24,7 @@ import requests
 import urllib3.exceptions
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.compression import bomb, swells
 from semsig_gis.sources.http.cache import Edition, Fetched
 from semsig_gis.sources.http.deadline import (

@@ -16,9 +16,7 @@ import shapely
 from osmium.filter import KeyFilter
 from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.temporary import own_folder
+from semsig_gis.core import HALF_TURN, CatalogError, SourceError, own_folder
 from semsig_gis.sources import require_file
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import require_modest

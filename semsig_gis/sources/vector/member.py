@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources import require_file
 from semsig_gis.sources.compression import bomb, swells
 

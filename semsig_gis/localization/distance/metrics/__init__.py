@@ -11,7 +11,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core import InputError, UnknownNameError, nearest_name
 from semsig_gis.localization.distance.metrics import edit, histogram, jaccard
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SequenceTable
+    from semsig_gis.database import SequenceTable
     from semsig_gis.localization.distance.metrics.edit import EditWeights
 
 

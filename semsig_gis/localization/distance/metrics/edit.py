@@ -14,15 +14,15 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.database import checked_sequence
+from semsig_gis.core import InputError
+from semsig_gis.database import checked_sequence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SequenceTable
+    from semsig_gis.database import SequenceTable
 
 STRIPE = 64  # words in a plane: enough work for a loop, little enough for the nearest cache
 BLOCK = 64 * STRIPE
