@@ -13,7 +13,7 @@ import numpy as np
 from semsig_gis.core import Signature, cell_ids, wrap_degrees
 from semsig_gis.database import views_at
 from semsig_gis.evaluation import distort, named_distortion
-from semsig_gis.localization import Leg
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison
 from semsig_gis.database import ViewpointSpec, build_database
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import Method
 from semsig_gis.maps import ambiguity_map, available, drift_map, evaluation_map, save_map
 from semsig_gis.objects import StreetObjects

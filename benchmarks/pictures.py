@@ -24,8 +24,7 @@ from benchmarks._cities import MONTPELLIER, made_up, real
 from benchmarks.maps import DRAWN, FRAMES, started
 from benchmarks.workbench import asked, photo_in, serving
 from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
-from semsig_gis.evaluation import identify
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate, identify
 from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
 from semsig_gis.maps import (
     ambiguity_map,

@@ -43,12 +43,12 @@ from semsig_gis.evaluation import (
 )
 from semsig_gis.localization import (
     REGION_SHARE,
-    Leg,
     LikelihoodLocator,
     NoiseSpec,
     build_index,
     cell_noise,
 )
+from semsig_gis.observation import Leg
 from semsig_gis.sources.synthetic.city import PARIS_LIKE as LIKE_PARIS
 from semsig_gis.sources.synthetic.city import CitySpec
 

@@ -38,7 +38,7 @@ from .objects.load import (
     choose_layers as choose_layers,
     read_files as read_files,
 )
-from .reports.quality import quality_report as quality_report
+from .objects.quality import quality_report as quality_report
 from .objects.surroundings import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,
@@ -118,7 +118,7 @@ from .localization.likelihood.priors import (
     raster_prior as raster_prior,
     weight_prior as weight_prior,
 )
-from .localization.route import Leg as Leg
+from .observation.leg import Leg as Leg
 from .evaluation.queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
 from .evaluation.queries.distortions import (
     Distortion as Distortion,
@@ -127,14 +127,14 @@ from .evaluation.queries.distortions import (
 )
 from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
-from .evaluation.evaluate import evaluate as evaluate
+from .evaluation.scoring import evaluate as evaluate
 from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,
     check_identifiability as check_identifiability,
 )
-from .evaluation.identifiability.identify import identify as identify
+from .evaluation.identifiability.analysis import identify as identify
 from .evaluation.identifiability.result import (
     Identifiability as Identifiability,
     open_identifiability as open_identifiability,
@@ -184,7 +184,7 @@ from .reports.scenes import (
     draw_scene as draw_scene,
     draw_scenes as draw_scenes,
 )
-from .reports.tables import Table as Table
+from .core.tables import Table as Table
 from .evaluation.experiments.run import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from worlds import World
 
+    from semsig_gis.core import Table
     from semsig_gis.localization import Noise
-    from semsig_gis.reports import Table
 
 TAXONOMY = paper_taxonomy()
 METHODS = [

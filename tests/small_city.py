@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.database import build_database
-from semsig_gis.evaluation import BANDS, ClassGain, Identifiability
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import BANDS, ClassGain, Identifiability, evaluate
 from semsig_gis.localization import Method, build_index, localize, locate, named_noise
 from semsig_gis.objects import Licence, build_objects
 from semsig_gis.sources.catalog import paper_taxonomy

@@ -25,9 +25,9 @@ from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, DatabaseError, InputEr
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
+    from semsig_gis.core import Table
     from semsig_gis.database import City
     from semsig_gis.evaluation import Identifiability
-    from semsig_gis.reports import Table
 
 
 VARIABLE = "SEMSIG_SUPERVISED"

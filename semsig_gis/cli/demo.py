@@ -32,8 +32,8 @@ def demo(
 ) -> None:
     """Run every step on a small made-up city, offline."""
     from semsig_gis.database import build_database, save_database
+    from semsig_gis.evaluation import evaluate as run
     from semsig_gis.evaluation import save_evaluation
-    from semsig_gis.evaluation.evaluate import evaluate as run
     from semsig_gis.exports import export_database
     from semsig_gis.maps import evaluation_map, objects_map, save_map
     from semsig_gis.objects import build_objects, save_objects

@@ -106,7 +106,7 @@ def evaluate(
 
     from semsig_gis.database import open_city
     from semsig_gis.evaluation import Distortion, parse_chain, save_evaluation
-    from semsig_gis.evaluation.evaluate import evaluate as run
+    from semsig_gis.evaluation import evaluate as run
     from semsig_gis.localization import Method, build_index
     from semsig_gis.reports import evaluation_headline, evaluation_tables
 
@@ -173,8 +173,7 @@ def experiment(
     as_json: AsJson = False,
 ) -> None:
     """Run the evaluations of an experiment, or resume them."""
-    from semsig_gis.evaluation import open_experiment_spec, run_experiment
-    from semsig_gis.reports import experiment_tables
+    from semsig_gis.evaluation import experiment_tables, open_experiment_spec, run_experiment
 
     opened = open_experiment_spec(spec)
     with progress("answering") as advance:

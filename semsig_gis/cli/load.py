@@ -270,8 +270,7 @@ def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
 def _save_loaded(
     loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
 ) -> None:
-    from semsig_gis.objects import save_objects, save_surroundings
-    from semsig_gis.reports import quality_report
+    from semsig_gis.objects import quality_report, save_objects, save_surroundings
 
     notes = list(loaded.notes)
     save_objects(loaded.objects, out)

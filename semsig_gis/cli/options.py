@@ -155,7 +155,10 @@ def seen_north(city: City, north: NorthText, date: str | None) -> North:
             f"--date was given with --north {north}, but only magnetic north changes with "
             "time; leave it out."
         )
-    return GRID_NORTH if north == "grid" else North.of(north, city.dataset, date=day)
+    if north == "grid":
+        return GRID_NORTH
+    dataset = city.dataset
+    return North.of(north, dataset.crs, dataset.bounds, date=day)
 
 
 @dataclass(frozen=True, kw_only=True)

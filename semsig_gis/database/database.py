@@ -16,7 +16,6 @@ import numpy as np
 import pyarrow as pa
 from pyproj import CRS
 
-import semsig_gis
 from semsig_gis import __version__
 from semsig_gis.core import (
     BEARING_UNITS,
@@ -29,6 +28,8 @@ from semsig_gis.core import (
     cell_ids,
     consecutive,
     crs_label,
+    map_with,
+    plot_with,
     quantize,
 )
 from semsig_gis.database.sightings import ViewpointSpec, Views
@@ -152,6 +153,11 @@ class SignatureDatabase(Displayed):
         """Viewpoint of every cell in metres, shape (n, 2)."""
         return frozen(self.grid.viewpoints(self.columns, self.rows))
 
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints in metres: west, south, east and north; not of no cells."""
+        return np.concatenate([self.xy.min(axis=0), self.xy.max(axis=0)])
+
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Number of objects that every cell sees, shape (n,)."""
@@ -266,11 +272,11 @@ class SignatureDatabase(Displayed):
         **look: Any,  # noqa: ANN401 - whatever matplotlib takes
     ) -> Axes:
         """Draw the objects that every cell sees, or another number (see `plot_database`)."""
-        return semsig_gis.plot_database(self, column, ax=ax, **look)
+        return plot_with("plot_database", self, column, ax=ax, **look)
 
     def explore(self) -> MapFrame:
         """Show the cells on a map in a notebook, by how many look the same."""
-        return semsig_gis.show_map(semsig_gis.ambiguity_map(self))
+        return map_with("ambiguity_map", self)
 
 
 def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:

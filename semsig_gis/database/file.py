@@ -459,6 +459,12 @@ class PartitionedDatabase(Displayed):
         """The metric coordinate reference system of the parts."""
         return next(self.parts()).crs
 
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints of all parts in metres: west, south, east and north."""
+        boxes = np.stack([part.bounds for part in self.parts() if len(part)])
+        return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+
     def row_numbers(self, cell_ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows that cells have in the database that `open_database` returns."""
         rows = np.zeros(len(cell_ids), np.int64)

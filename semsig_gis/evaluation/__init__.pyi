@@ -1,23 +1,105 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
-from .compare import changed_successes as changed_successes, common_cases as common_cases, compare_evaluations as compare_evaluations
-from .error_field import ENOUGH as ENOUGH, ErrorField as ErrorField, RADII as RADII, guess_error as guess_error
-from .evaluate import score_queries as score_queries, scored_tables as scored_tables
-from .experiments.run import ExperimentWork as ExperimentWork, Part as Part, open_results as open_results, run_experiment as run_experiment, run_experiments as run_experiments
-from .figures import AMBIGUITIES as AMBIGUITIES, LENGTHS as LENGTHS, calibration_bins as calibration_bins, coverage_curve as coverage_curve, district_labels as district_labels, figure_means as figure_means, grouped_means as grouped_means, percentile as percentile, plain_records as plain_records, query_figures as query_figures, range_labels as range_labels
-from .file import open_evaluation as open_evaluation, save_evaluation as save_evaluation, settings_from_dict as settings_from_dict, settings_to_dict as settings_to_dict, used_noises as used_noises
-from .identifiability.check import ChanceBin as ChanceBin, IdentifiabilityCheck as IdentifiabilityCheck, check_identifiability as check_identifiability
-from .identifiability.identify import identify as identify
-from .identifiability.lookalikes import check_radius as check_radius, find_lookalikes as find_lookalikes
-from .identifiability.result import BANDS as BANDS, ClassGain as ClassGain, Identifiability as Identifiability, identifiability_of as identifiability_of, open_identifiability as open_identifiability, save_identifiability as save_identifiability
-from .identifiability.symbol_tables import SymbolColumns as SymbolColumns, symbol_columns as symbol_columns
-from .identifiability.trials import draw_trials as draw_trials, leave_class_out as leave_class_out, trial_cells as trial_cells, try_cells as try_cells, try_without_classes as try_without_classes
+from .compare import changed_successes as changed_successes
+from .compare import common_cases as common_cases
+from .compare import compare_evaluations as compare_evaluations
+from .error_field import ENOUGH as ENOUGH
+from .error_field import RADII as RADII
+from .error_field import ErrorField as ErrorField
+from .error_field import guess_error as guess_error
+from .experiments.run import ExperimentWork as ExperimentWork
+from .experiments.run import Part as Part
+from .experiments.run import open_results as open_results
+from .experiments.run import run_experiment as run_experiment
+from .experiments.run import run_experiments as run_experiments
+from .experiments.tables import experiment_figures as experiment_figures
+from .experiments.tables import experiment_markdown as experiment_markdown
+from .experiments.tables import experiment_tables as experiment_tables
+from .figures import AMBIGUITIES as AMBIGUITIES
+from .figures import LENGTHS as LENGTHS
+from .figures import calibration_bins as calibration_bins
+from .figures import coverage_curve as coverage_curve
+from .figures import district_labels as district_labels
+from .figures import figure_means as figure_means
+from .figures import grouped_means as grouped_means
+from .figures import percentile as percentile
+from .figures import plain_records as plain_records
+from .figures import query_figures as query_figures
+from .figures import range_labels as range_labels
+from .file import open_evaluation as open_evaluation
+from .file import save_evaluation as save_evaluation
+from .file import settings_from_dict as settings_from_dict
+from .file import settings_to_dict as settings_to_dict
+from .file import used_noises as used_noises
+from .identifiability.analysis import identify as identify
+from .identifiability.check import ChanceBin as ChanceBin
+from .identifiability.check import IdentifiabilityCheck as IdentifiabilityCheck
+from .identifiability.check import check_identifiability as check_identifiability
+from .identifiability.lookalikes import check_radius as check_radius
+from .identifiability.lookalikes import find_lookalikes as find_lookalikes
+from .identifiability.result import BANDS as BANDS
+from .identifiability.result import ClassGain as ClassGain
+from .identifiability.result import Identifiability as Identifiability
+from .identifiability.result import identifiability_of as identifiability_of
+from .identifiability.result import open_identifiability as open_identifiability
+from .identifiability.result import save_identifiability as save_identifiability
+from .identifiability.symbol_tables import SymbolColumns as SymbolColumns
+from .identifiability.symbol_tables import symbol_columns as symbol_columns
+from .identifiability.trials import draw_trials as draw_trials
+from .identifiability.trials import leave_class_out as leave_class_out
+from .identifiability.trials import trial_cells as trial_cells
+from .identifiability.trials import try_cells as try_cells
+from .identifiability.trials import try_without_classes as try_without_classes
 from .paper import published as published
-from .paper.published import DATABASE as DATABASE, OCCURRENCES as OCCURRENCES, READ_OFF as READ_OFF
-from .paper.reproduction import BEST as BEST, FIRST_STAGE as FIRST_STAGE, FUSIONS as FUSIONS, LEVELS as LEVELS, MANY as MANY, OURS as OURS, PERCENTS as PERCENTS, READINGS as READINGS, Reproduction as Reproduction, SINGLES as SINGLES, WEIGHTS as WEIGHTS, paper_experiments as paper_experiments, reproduce as reproduce, time_queries as time_queries
-from .queries.distortion_text import NAMED_DISTORTIONS as NAMED_DISTORTIONS, QueryDistortion as QueryDistortion, chain_text as chain_text, parse_chain as parse_chain, ready_chain as ready_chain
-from .queries.distortions import BlockedSectors as BlockedSectors, ClassScores as ClassScores, CompassBias as CompassBias, DISTORTIONS as DISTORTIONS, Detector as Detector, Distortion as Distortion, FalseClass as FalseClass, FieldOfView as FieldOfView, HiddenBehind as HiddenBehind, MissingClasses as MissingClasses, Obstacles as Obstacles, RoughRanges as RoughRanges, distort as distort, named_distortion as named_distortion
-from .queries.draw import Query as Query, QuerySpec as QuerySpec, SeenFrom as SeenFrom, draw_queries as draw_queries
-from .queries.true_view import CitySights as CitySights, Sight as Sight
-from .result import Evaluation as Evaluation, PlotKind as PlotKind, machine as machine
-from .spec import Districts as Districts, ExperimentSpec as ExperimentSpec, open_experiment_spec as open_experiment_spec, parse_experiment as parse_experiment
+from .paper.published import DATABASE as DATABASE
+from .paper.published import OCCURRENCES as OCCURRENCES
+from .paper.published import READ_OFF as READ_OFF
+from .paper.reproduction import BEST as BEST
+from .paper.reproduction import FIRST_STAGE as FIRST_STAGE
+from .paper.reproduction import FUSIONS as FUSIONS
+from .paper.reproduction import LEVELS as LEVELS
+from .paper.reproduction import MANY as MANY
+from .paper.reproduction import OURS as OURS
+from .paper.reproduction import PERCENTS as PERCENTS
+from .paper.reproduction import READINGS as READINGS
+from .paper.reproduction import SINGLES as SINGLES
+from .paper.reproduction import WEIGHTS as WEIGHTS
+from .paper.reproduction import Reproduction as Reproduction
+from .paper.reproduction import paper_experiments as paper_experiments
+from .paper.reproduction import reproduce as reproduce
+from .paper.reproduction import time_queries as time_queries
+from .queries.distortion_text import NAMED_DISTORTIONS as NAMED_DISTORTIONS
+from .queries.distortion_text import QueryDistortion as QueryDistortion
+from .queries.distortion_text import chain_text as chain_text
+from .queries.distortion_text import parse_chain as parse_chain
+from .queries.distortion_text import ready_chain as ready_chain
+from .queries.distortions import DISTORTIONS as DISTORTIONS
+from .queries.distortions import BlockedSectors as BlockedSectors
+from .queries.distortions import ClassScores as ClassScores
+from .queries.distortions import CompassBias as CompassBias
+from .queries.distortions import Detector as Detector
+from .queries.distortions import Distortion as Distortion
+from .queries.distortions import FalseClass as FalseClass
+from .queries.distortions import FieldOfView as FieldOfView
+from .queries.distortions import HiddenBehind as HiddenBehind
+from .queries.distortions import MissingClasses as MissingClasses
+from .queries.distortions import Obstacles as Obstacles
+from .queries.distortions import RoughRanges as RoughRanges
+from .queries.distortions import distort as distort
+from .queries.distortions import named_distortion as named_distortion
+from .queries.draw import Query as Query
+from .queries.draw import QuerySpec as QuerySpec
+from .queries.draw import SeenFrom as SeenFrom
+from .queries.draw import draw_queries as draw_queries
+from .queries.true_view import CitySights as CitySights
+from .queries.true_view import Sight as Sight
+from .result import Evaluation as Evaluation
+from .result import PlotKind as PlotKind
+from .result import machine as machine
+from .scoring import evaluate as evaluate
+from .scoring import score_queries as score_queries
+from .scoring import scored_tables as scored_tables
+from .spec import Districts as Districts
+from .spec import ExperimentSpec as ExperimentSpec
+from .spec import open_experiment_spec as open_experiment_spec
+from .spec import parse_experiment as parse_experiment

@@ -41,7 +41,7 @@ def compare_evaluations(
     Returns
     -------
     DataFrame
-        One row a figure of `reports.evaluation.experiment_figures` that both have: ``figure``,
+        One row a figure of `experiments.tables.experiment_figures` that both have: ``figure``,
         ``first``, ``second``, ``difference`` (the second less the first), ``low`` and ``high`` (its
         95 % interval); NaN where one of them is infinite. The bootstrap is by pairs, so that what
         is hard for both methods does not blur the difference.

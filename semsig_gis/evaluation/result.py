@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-import semsig_gis
-from semsig_gis.core import Displayed, InputError, percent
+from semsig_gis.core import Displayed, InputError, map_with, percent, plot_with
 from semsig_gis.database import rows_of_result
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
@@ -170,11 +169,11 @@ class Evaluation(Displayed):
         self, kind: PlotKind = "errors", *, ax: Axes | None = None, label: str | None = None
     ) -> Axes:
         """Draw the curve of errors or of recall, or where queries failed (`plot_evaluation`)."""
-        return semsig_gis.plot_evaluation(self, kind, ax=ax, label=label)
+        return plot_with("plot_evaluation", self, kind, ax=ax, label=label)
 
     def explore(self, database: SignatureDatabase) -> MapFrame:
         """Show the queries on a map in a notebook (see `evaluation_map`)."""
-        return semsig_gis.show_map(semsig_gis.evaluation_map(self, database))
+        return map_with("evaluation_map", self, database)
 
     @property
     def query_bearings(self) -> list[list[float]]:

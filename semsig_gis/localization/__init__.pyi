@@ -1,31 +1,120 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
-from .answers import Answer as Answer, DistanceMemo as DistanceMemo, Locator as Locator, REGION_SHARE as REGION_SHARE, Ranking as Ranking, Requirement as Requirement
+from .answers import REGION_SHARE as REGION_SHARE
+from .answers import Answer as Answer
+from .answers import DistanceMemo as DistanceMemo
+from .answers import Locator as Locator
+from .answers import Ranking as Ranking
+from .answers import Requirement as Requirement
 from .distance.method import Method as Method
-from .distance.metrics import Distances as Distances, METRICS as METRICS, metric as metric
-from .distance.metrics.edit import BLOCK as BLOCK, BitPlanes as BitPlanes, EditWeights as EditWeights
+from .distance.metrics import METRICS as METRICS
+from .distance.metrics import Distances as Distances
+from .distance.metrics import metric as metric
+from .distance.metrics.edit import BLOCK as BLOCK
+from .distance.metrics.edit import BitPlanes as BitPlanes
+from .distance.metrics.edit import EditWeights as EditWeights
 from .distance.scores import score_cells as score_cells
-from .distance.search import DistanceLocator as DistanceLocator, Localization as Localization
-from .distance.ties import NEAR_METRES as NEAR_METRES, NEAR_PLACES as NEAR_PLACES, THRESHOLDS as THRESHOLDS, best_cells as best_cells, chance_within as chance_within, expected_best as expected_best, expected_recall as expected_recall, rank_range as rank_range, top_candidates as top_candidates
-from .likelihood.answer_rule import AnswerRule as AnswerRule, DEFAULT_RULE as DEFAULT_RULE, calibrate as calibrate, open_rule as open_rule, save_rule as save_rule
-from .likelihood.association import Association as Association, Detections as Detections, Pairs as Pairs, align_cells as align_cells, associate as associate, associate_pairs as associate_pairs, near_pairs as near_pairs, rerank as rerank
-from .likelihood.estimate import PlaceEstimate as PlaceEstimate, cell_estimate as cell_estimate, refined_estimate as refined_estimate
-from .likelihood.explain import Explanation as Explanation, UNKNOWN_NAME as UNKNOWN_NAME, VERDICTS as VERDICTS, explain as explain, explain_cell as explain_cell
+from .distance.search import DistanceLocator as DistanceLocator
+from .distance.search import Localization as Localization
+from .distance.ties import NEAR_METRES as NEAR_METRES
+from .distance.ties import NEAR_PLACES as NEAR_PLACES
+from .distance.ties import THRESHOLDS as THRESHOLDS
+from .distance.ties import best_cells as best_cells
+from .distance.ties import chance_within as chance_within
+from .distance.ties import expected_best as expected_best
+from .distance.ties import expected_recall as expected_recall
+from .distance.ties import rank_range as rank_range
+from .distance.ties import top_candidates as top_candidates
+from .likelihood.answer_rule import DEFAULT_RULE as DEFAULT_RULE
+from .likelihood.answer_rule import AnswerRule as AnswerRule
+from .likelihood.answer_rule import calibrate as calibrate
+from .likelihood.answer_rule import open_rule as open_rule
+from .likelihood.answer_rule import save_rule as save_rule
+from .likelihood.association import Association as Association
+from .likelihood.association import Detections as Detections
+from .likelihood.association import Pairs as Pairs
+from .likelihood.association import align_cells as align_cells
+from .likelihood.association import associate as associate
+from .likelihood.association import associate_pairs as associate_pairs
+from .likelihood.association import near_pairs as near_pairs
+from .likelihood.association import rerank as rerank
+from .likelihood.estimate import PlaceEstimate as PlaceEstimate
+from .likelihood.estimate import cell_estimate as cell_estimate
+from .likelihood.estimate import refined_estimate as refined_estimate
+from .likelihood.explain import UNKNOWN_NAME as UNKNOWN_NAME
+from .likelihood.explain import VERDICTS as VERDICTS
+from .likelihood.explain import Explanation as Explanation
+from .likelihood.explain import explain as explain
+from .likelihood.explain import explain_cell as explain_cell
 from .likelihood.incremental import TurnMemo as TurnMemo
-from .likelihood.index import CellScores as CellScores, LikelihoodIndex as LikelihoodIndex, TURNS as TURNS, build_index as build_index, index_fingerprint as index_fingerprint
+from .likelihood.index import TURNS as TURNS
+from .likelihood.index import CellScores as CellScores
+from .likelihood.index import LikelihoodIndex as LikelihoodIndex
+from .likelihood.index import build_index as build_index
+from .likelihood.index import index_fingerprint as index_fingerprint
 from .likelihood.kernels import promising_cells as promising_cells
-from .likelihood.locate import LikelihoodLocator as LikelihoodLocator, Location as Location, locate as locate, locate_route as locate_route
+from .likelihood.locate import LikelihoodLocator as LikelihoodLocator
+from .likelihood.locate import Location as Location
+from .likelihood.locate import locate as locate
+from .likelihood.locate import locate_route as locate_route
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import views_aside as views_aside
-from .likelihood.photo import OMITTED_SHARE as OMITTED_SHARE, PhotoTable as PhotoTable, photo_loglik as photo_loglik
-from .likelihood.posterior import KEPT as KEPT, Posterior as Posterior, Refinement as Refinement, open_posterior as open_posterior, posterior as posterior, prior_ratio as prior_ratio, refine as refine
-from .likelihood.priors import KnownPosition as KnownPosition, area_prior as area_prior, position_prior as position_prior, raster_prior as raster_prior, weight_prior as weight_prior
-from .locator import AnyMethod as AnyMethod, localize as localize, make_locator as make_locator, parse_method as parse_method
-from .noise.age import Drift as Drift, aged_noise as aged_noise, check_map_age as check_map_age, fresh_noise as fresh_noise, named_drift as named_drift, open_drift as open_drift
-from .noise.fit import ALL as ALL, drawn_rates as drawn_rates, estimated_rates as estimated_rates, expected_counts as expected_counts, gather_evidence as gather_evidence, model_change as model_change, next_model as next_model
-from .noise.learn import NoiseEstimate as NoiseEstimate, Sample as Sample, learn_noise as learn_noise, read_samples as read_samples
-from .noise.model import NOISES as NOISES, Noise as Noise, NoiseMixture as NoiseMixture, NoiseSpec as NoiseSpec, cell_noise as cell_noise, named_noise as named_noise, noise_from_dict as noise_from_dict, open_noise as open_noise, place_noise as place_noise, save_noise as save_noise
-from .noise.table import LONGEST_TABLE as LONGEST_TABLE, NoiseTable as NoiseTable, database_tables as database_tables, mean_table as mean_table, noise_tables as noise_tables, query_bearings as query_bearings
-from .regions import SearchRegions as SearchRegions, search_regions as search_regions
-from .route import LOST_LEG_CHANCE as LOST_LEG_CHANCE, Leg as Leg, moved_chances as moved_chances, route_posteriors as route_posteriors
-from .suggest import next_questions as next_questions, with_unplaced as with_unplaced
+from .likelihood.photo import OMITTED_SHARE as OMITTED_SHARE
+from .likelihood.photo import PhotoTable as PhotoTable
+from .likelihood.photo import photo_loglik as photo_loglik
+from .likelihood.posterior import KEPT as KEPT
+from .likelihood.posterior import Posterior as Posterior
+from .likelihood.posterior import Refinement as Refinement
+from .likelihood.posterior import open_posterior as open_posterior
+from .likelihood.posterior import posterior as posterior
+from .likelihood.posterior import prior_ratio as prior_ratio
+from .likelihood.posterior import refine as refine
+from .likelihood.priors import KnownPosition as KnownPosition
+from .likelihood.priors import area_prior as area_prior
+from .likelihood.priors import position_prior as position_prior
+from .likelihood.priors import raster_prior as raster_prior
+from .likelihood.priors import weight_prior as weight_prior
+from .likelihood.route import LOST as LOST
+from .likelihood.route import moved_chances as moved_chances
+from .likelihood.route import route_posteriors as route_posteriors
+from .locator import AnyMethod as AnyMethod
+from .locator import localize as localize
+from .locator import make_locator as make_locator
+from .locator import parse_method as parse_method
+from .noise.age import Drift as Drift
+from .noise.age import aged_noise as aged_noise
+from .noise.age import check_map_age as check_map_age
+from .noise.age import fresh_noise as fresh_noise
+from .noise.age import named_drift as named_drift
+from .noise.age import open_drift as open_drift
+from .noise.fit import ALL as ALL
+from .noise.fit import drawn_rates as drawn_rates
+from .noise.fit import estimated_rates as estimated_rates
+from .noise.fit import expected_counts as expected_counts
+from .noise.fit import gather_evidence as gather_evidence
+from .noise.fit import model_change as model_change
+from .noise.fit import next_model as next_model
+from .noise.learn import NoiseEstimate as NoiseEstimate
+from .noise.learn import Sample as Sample
+from .noise.learn import learn_noise as learn_noise
+from .noise.learn import read_samples as read_samples
+from .noise.model import NOISES as NOISES
+from .noise.model import Noise as Noise
+from .noise.model import NoiseMixture as NoiseMixture
+from .noise.model import NoiseSpec as NoiseSpec
+from .noise.model import cell_noise as cell_noise
+from .noise.model import named_noise as named_noise
+from .noise.model import noise_from_dict as noise_from_dict
+from .noise.model import open_noise as open_noise
+from .noise.model import place_noise as place_noise
+from .noise.model import save_noise as save_noise
+from .noise.table import LONGEST_TABLE as LONGEST_TABLE
+from .noise.table import NoiseTable as NoiseTable
+from .noise.table import database_tables as database_tables
+from .noise.table import mean_table as mean_table
+from .noise.table import noise_tables as noise_tables
+from .noise.table import query_bearings as query_bearings
+from .regions import SearchRegions as SearchRegions
+from .regions import search_regions as search_regions
+from .suggest import next_questions as next_questions
+from .suggest import with_unplaced as with_unplaced

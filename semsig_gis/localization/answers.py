@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import numpy as np
 
-import semsig_gis
-from semsig_gis.core import LICENSES, WILDCARD, Displayed, InputError, to_degrees
+from semsig_gis.core import LICENSES, WILDCARD, Displayed, InputError, plot_with, to_degrees
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ class Answer(Displayed):
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw where the query may have been seen (see `plot_answer`)."""
-        return semsig_gis.plot_answer(self, ax=ax, legend=legend)
+        return plot_with("plot_answer", self, ax=ax, legend=legend)
 
     def _candidate_records(self) -> list[dict[str, Any]]:
         """Return the candidates as plain values, with ``lon`` and ``lat`` to a centimetre."""

@@ -11,9 +11,9 @@ from platformdirs import user_cache_path
 from semsig_gis.core import InputError
 from semsig_gis.sources import mapillary, overture
 from semsig_gis.sources.area import clip_layer, names_place, parse_area
+from semsig_gis.sources.http.access_token import AccessToken
 from semsig_gis.sources.http.cache import Cache
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
-from semsig_gis.sources.http.secret import Secret
 from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.osm.overpass import find_place
 from semsig_gis.sources.services import pages
@@ -96,7 +96,7 @@ def fetch_layers(
         )
     layers: list[RawLayer] = []
     if catalog.token is not None and not http.offline:
-        http = replace(http, secret=Secret.of_environment(catalog.token))
+        http = replace(http, token=AccessToken.from_environment(catalog.token))
     service = TILED.get(catalog.reader)
     if service is not None:
         tiles = service.fetch_layers(
@@ -160,7 +160,7 @@ def open_cache(
     True
     """
     return Cache(Path(folder or user_cache_path("semsig", appauthor=False))), HttpSpec(
-        offline=offline, deadline_s=deadline_s, tell=tell
+        offline=offline, deadline_s=deadline_s, report=tell
     )
 
 

@@ -16,7 +16,7 @@ from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.osm.features import frame_fields, frame_layers, tells_elements
+from semsig_gis.sources.osm.features import frame_fields, frame_layers, has_element_columns
 from semsig_gis.sources.parquet import SUFFIXES, read_parquet
 from semsig_gis.sources.rows import WGS84
 from semsig_gis.storage import CHECKED_PAGES, GROUP_ROWS, hilbert_order, seal, whole_file
@@ -124,7 +124,7 @@ def elements_in(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) 
 
     InputError if there are none.
     """
-    if not tells_elements(frame_fields(table)):
+    if not has_element_columns(frame_fields(table)):
         return table
     (layer,) = frame_layers(table, [load_catalog("openstreetmap").layer(role)])
     if layer.table.empty:

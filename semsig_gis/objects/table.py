@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-import semsig_gis
 from semsig_gis import __version__
 from semsig_gis.core import (
     CLASS_CODE,
@@ -27,6 +26,8 @@ from semsig_gis.core import (
     Taxonomy,
     bounds_text,
     crs_label,
+    map_with,
+    plot_with,
 )
 from semsig_gis.storage import (
     BBOX,
@@ -180,11 +181,11 @@ class StreetObjects(Displayed):
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw the objects with the signs of their classes (see `plot_objects`)."""
-        return semsig_gis.plot_objects(self, ax=ax, legend=legend)
+        return plot_with("plot_objects", self, ax=ax, legend=legend)
 
     def explore(self) -> MapFrame:
         """Show the objects on a map in a notebook (see `objects_map`)."""
-        return semsig_gis.show_map(semsig_gis.objects_map(self))
+        return map_with("objects_map", self)
 
 
 class _OpenedObjects(StreetObjects):

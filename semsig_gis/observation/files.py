@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import InputError
-from semsig_gis.localization import Leg
+from semsig_gis.observation.leg import Leg
 from semsig_gis.observation.north import GRID_NORTH
 from semsig_gis.observation.sentences import RADIUS_M, parse_view, require_seen, unplaced_codes
 from semsig_gis.observation.track import STEP_ERROR_M, parse_time

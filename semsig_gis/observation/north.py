@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
@@ -18,10 +19,10 @@ from semsig_gis.core import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
+    from pyproj import CRS
 
     from semsig_gis.core import Signature
-    from semsig_gis.database import PartitionedDatabase, SignatureDatabase
 
 NorthName = Literal["grid", "true", "magnetic"]
 NORTHS: tuple[NorthName, ...] = get_args(NorthName)
@@ -49,7 +50,8 @@ class North:
     Examples
     --------
     >>> import datetime as dt
-    >>> north = North.of("magnetic", demo_database, date=dt.date(2024, 5, 1))
+    >>> crs, bounds = demo_database.crs, demo_database.bounds
+    >>> north = North.of("magnetic", crs, bounds, date=dt.date(2024, 5, 1))
     >>> round(north.turn, 1), round(north.spread, 3)
     (1.9, 0.001)
     """
@@ -63,14 +65,16 @@ class North:
     def of(
         cls,
         name: NorthName,
-        database: SignatureDatabase | PartitionedDatabase,
+        crs: CRS,
+        bounds: ArrayLike | None = None,
         *,
         date: dt.date | None = None,
     ) -> Self:
-        """Return the north of a city: the convergence of the grid and the declination there.
+        """Return the north of a city, from the grid convergence and the declination there.
 
-        The magnetic north is that of a `date`, by default of today. UnknownNameError if there is
-        no such north; InputError if a date is given for another, or lies outside `MODELLED`.
+        `crs` and `bounds` (west, south, east, north in metres) are those of its database. Magnetic
+        north is that of `date`, by default of today. Raises UnknownNameError for an unknown name;
+        InputError if a date is given for another north, or lies outside `MODELLED`.
         """
         if name not in NORTHS:
             raise UnknownNameError(
@@ -83,15 +87,20 @@ class North:
             )
         if name == "grid":
             return cls()
-        places = _places(database)
-        turns = -grid_convergence(database.crs, places)
+        if bounds is None:
+            crs, bounds = _from_database(crs)
+        # The middle of the city, then its corners.
+        west, south, east, north = np.asarray(bounds, dtype=np.float64)
+        middle = (west + east) / 2.0, (south + north) / 2.0
+        places = np.array([middle, (west, south), (east, south), (east, north), (west, north)])
+        turns = -grid_convergence(crs, places)
         if name == "magnetic":
             date = dt.datetime.now().astimezone().date() if date is None else date
-            degrees = to_degrees(database.crs).transform(*places.T)
-            turns = turns + declination(*degrees, date)
-        middle = float(signed_degrees(turns[0]))
-        spread = float(np.abs(signed_degrees(turns - middle)).max())
-        return cls(name=name, turn=middle, spread=spread, date=date)
+            lon, lat = to_degrees(crs).transform(places[:, 0], places[:, 1])
+            turns = turns + declination(lon, lat, date)
+        turn = float(signed_degrees(turns[0]))
+        spread = float(np.abs(signed_degrees(turns - turn)).max())
+        return cls(name=name, turn=turn, spread=spread, date=date)
 
     def __str__(self) -> str:
         """Return its name in words, with the date where it matters."""
@@ -146,12 +155,12 @@ def declination(
     return np.asarray(np.degrees(np.arctan2(east, north))).reshape(-1)
 
 
-def _places(database: SignatureDatabase | PartitionedDatabase) -> NDArray[np.float64]:
-    """Return the middle and the corners of the box of the cells, shape (5, 2)."""
-    from semsig_gis.database import PartitionedDatabase  # noqa: PLC0415 - it loads slowly
-
-    parts = database.parts() if isinstance(database, PartitionedDatabase) else [database]
-    boxes = [(part.xy.min(axis=0), part.xy.max(axis=0)) for part in parts if len(part)]
-    low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
-    corners = [low, (high[0], low[1]), high, (low[0], high[1])]
-    return np.array([(low + high) / 2.0, *corners])
+def _from_database(database: Any) -> tuple[CRS, ArrayLike]:  # noqa: ANN401 - of a package above
+    """Return the CRS and the bounds of a database, which `North.of` took up to version 0.1."""
+    warnings.warn(
+        "North.of(name, database) is North.of(name, database.crs, database.bounds) now; "
+        "version 0.3.0 removes the old form.",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return database.crs, database.bounds

@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis import __version__
-from semsig_gis.core import FULL_TURN, percent
+from semsig_gis.core import FULL_TURN, Table, figure, percent
 from semsig_gis.evaluation import machine
 from semsig_gis.reports.database import class_label
 from semsig_gis.reports.report_model import Curve, Number, Plot, Report, Section
-from semsig_gis.reports.tables import Table, figure, short_percent
+from semsig_gis.reports.tables import short_percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -12,12 +12,12 @@ import numpy as np
 
 from semsig_gis.core import InputError, UnknownNameError, nearest_name, wrap_degrees
 from semsig_gis.evaluation import SeenFrom
-from semsig_gis.localization import Leg
 from semsig_gis.observation import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
     METRE_DIGITS,
     Camera,
+    Leg,
     View,
     parse_view,
     placed,

@@ -211,7 +211,8 @@ class Workbench:
             notes.append("It is twice as wide as high, so it is treated as a full panorama.")
         heading = shot.heading
         if heading is not None and shot.north is not None:
-            north = North.of("magnetic" if shot.north == "magnetic" else "true", self.database)
+            crs, bounds = self.database.crs, self.database.bounds
+            north = North.of("magnetic" if shot.north == "magnetic" else "true", crs, bounds)
             heading = float(wrap_degrees(heading + north.turn))
             notes.append(
                 f"Its compass says that it looks at {shot.heading:.0f}° from {shot.north} north, "

@@ -16,7 +16,7 @@ from osm_xml import node, relation, way, write_osm
 from osmium.osm import WAY, Area, Node, Relation, Way
 
 from semsig_gis.database import build_database
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.objects import build_objects, choose_layers, read_surroundings
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog

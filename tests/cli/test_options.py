@@ -20,8 +20,8 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import TileSpec, ViewpointSpec
 from semsig_gis.evaluation import QuerySpec, check_radius, parse_chain
-from semsig_gis.localization import Leg, LikelihoodMethod, NoiseSpec, named_noise
-from semsig_gis.observation import check_north
+from semsig_gis.localization import LikelihoodMethod, NoiseSpec, named_noise
+from semsig_gis.observation import Leg, check_north
 from semsig_gis.sources.synthetic.city import CitySpec
 
 if TYPE_CHECKING:

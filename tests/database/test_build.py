@@ -29,7 +29,7 @@ from semsig_gis.core import (
     PackedIndex,
     SignatureSpec,
     cells_near,
-    effort,
+    resources,
     wrap_degrees,
 )
 from semsig_gis.database import (
@@ -252,7 +252,7 @@ def test_as_many_pairs_are_expected_as_there_are(town: World, radius: float, ste
 def test_what_the_memory_does_not_hold_is_not_begun(
     town: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(effort, "free_memory", lambda: 120_000_000)
+    monkeypatch.setattr(resources, "free_memory", lambda: 120_000_000)
     build_database(town.street_objects)
     with refused(InputError, "sightings", "0.1 GB are free", "smaller tiles"):
         build_database(town.street_objects, spec=SignatureSpec(3000.0))

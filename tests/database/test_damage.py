@@ -15,8 +15,7 @@ from worlds import ARRAYS, CORNER, random_town
 
 from semsig_gis.core import DatabaseError, SemsigError
 from semsig_gis.database import build_tiles, database_specs, open_database, save_database
-from semsig_gis.evaluation import open_evaluation, save_evaluation
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate, open_evaluation, save_evaluation
 from semsig_gis.objects import (
     objects_specs,
     open_objects,

@@ -18,6 +18,7 @@ from semsig_gis.evaluation import (
     NAMED_DISTORTIONS,
     Detector,
     QuerySpec,
+    evaluate,
     machine,
     open_evaluation,
     parse_chain,
@@ -26,7 +27,6 @@ from semsig_gis.evaluation import (
     settings_to_dict,
     used_noises,
 )
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.localization import EditWeights, LikelihoodMethod, Method, NoiseSpec
 from semsig_gis.storage import read_geoparquet, write_geoparquet
 

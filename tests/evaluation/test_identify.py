@@ -35,7 +35,7 @@ from semsig_gis.evaluation import (
     try_cells,
 )
 from semsig_gis.evaluation.identifiability import result as identifiability_file
-from semsig_gis.evaluation.identifiability.identify import _places
+from semsig_gis.evaluation.identifiability.analysis import _places
 from semsig_gis.localization import NoiseSpec, build_index, named_noise
 from semsig_gis.observation import Photo
 

@@ -45,8 +45,7 @@ from semsig_gis.core import (
     quantize,
 )
 from semsig_gis.database import ViewpointSpec, build_database
-from semsig_gis.evaluation import Identifiability
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import Identifiability, evaluate
 from semsig_gis.exports import (
     CLASS_MARKERS,
     by_class,

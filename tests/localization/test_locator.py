@@ -12,7 +12,7 @@ from worlds import random_town, save_town
 import semsig_gis
 from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, InputError
 from semsig_gis.database import open_city
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import (
     LikelihoodMethod,
     Method,

@@ -17,7 +17,7 @@ from sentences import refused
 from small_city import small_city, small_evaluation
 
 from semsig_gis.core import FAILURES, OUTCOMES, InputError
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import Method
 from semsig_gis.maps import OUTLINES, evaluation_map, page_of_map
 

@@ -12,7 +12,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 from small_city import small_city, small_evaluation
 
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import build_index, named_noise
 from semsig_gis.maps import evaluation_map
 

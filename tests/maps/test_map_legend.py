@@ -14,8 +14,7 @@ from small_city import chances_of, small_city
 import semsig_gis
 from semsig_gis.core import Signature, Taxonomy, percent
 from semsig_gis.database import CellChanges
-from semsig_gis.evaluation import MissingClasses
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import MissingClasses, evaluate
 from semsig_gis.localization import AnswerRule, Method, build_index, localize, locate, named_noise
 from semsig_gis.maps import (
     ambiguity_legend,

@@ -37,8 +37,7 @@ from semsig_gis.core import (
     Taxonomy,
 )
 from semsig_gis.database import ObjectStore, build_database
-from semsig_gis.evaluation import MissingClasses, QuerySpec
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import MissingClasses, QuerySpec, evaluate
 from semsig_gis.localization import Method, build_index, localize, locate, named_noise
 from semsig_gis.maps import (
     ambiguity_map,

@@ -22,11 +22,12 @@ from semsig_gis.objects import (
     open_cache,
     open_objects,
     passed_by,
+    quality_report,
     read_files,
     read_small,
     save_objects,
 )
-from semsig_gis.reports import quality_report, quality_tables
+from semsig_gis.reports import quality_tables
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
 from semsig_gis.sources.layers import ClassBy, LayerSpec

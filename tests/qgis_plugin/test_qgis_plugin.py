@@ -36,9 +36,9 @@ DATA = Path(__file__).with_name("data")  # three lamps, and their catalogue
 # The command with few simulated queries.
 QUICK = """
 import functools
-from semsig_gis.evaluation.identifiability import identify as identifying
+from semsig_gis.evaluation.identifiability import analysis
 from semsig_gis.cli import main
-identifying.identify = functools.partial(identifying.identify, trials=60, class_trials=5)
+analysis.identify = functools.partial(analysis.identify, trials=60, class_trials=5)
 main()
 """
 

@@ -15,8 +15,7 @@ from sentences import refused
 from worlds import random_town
 
 from semsig_gis.core import InputError
-from semsig_gis.evaluation import parse_chain
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate, parse_chain
 from semsig_gis.localization import Method, build_index, named_noise
 from semsig_gis.reports import evaluation_headline, evaluation_page, paris_points, write_page
 

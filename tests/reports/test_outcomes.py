@@ -8,7 +8,7 @@ from reports import HARM, LONG, outcome_map, texts
 from worlds import random_town
 
 from semsig_gis.core import OUTCOMES
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.reports import draw_map, outcomes
 
 CITY = random_town().database

@@ -22,23 +22,28 @@ from semsig_gis.evaluation import (
     IdentifiabilityCheck,
     QuerySpec,
     check_identifiability,
+    evaluate,
+    experiment_figures,
+    experiment_markdown,
+    experiment_tables,
     identify,
     parse_chain,
 )
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.localization import LikelihoodMethod, Method, build_index, named_noise
-from semsig_gis.objects import ClassChange, ConflatedPair, LayerReport, UnreadLayer
-from semsig_gis.reports import (
+from semsig_gis.objects import (
+    ClassChange,
     ClassQuality,
+    ConflatedPair,
+    LayerReport,
     QualityReport,
+    UnreadLayer,
+)
+from semsig_gis.reports import (
     check_tables,
     comparison_sentence,
     comparison_table,
     database_tables,
     evaluation_tables,
-    experiment_figures,
-    experiment_markdown,
-    experiment_tables,
     identifiability_page,
     identifiability_tables,
     quality_tables,
@@ -51,8 +56,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from semsig_gis.core import Table
     from semsig_gis.localization import LikelihoodIndex
-    from semsig_gis.reports import Table
 
 SIX = six_cells()
 LONG = replace(

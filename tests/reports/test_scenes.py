@@ -15,7 +15,7 @@ from sentences import refused
 from worlds import random_town
 
 from semsig_gis.core import InputError, class_signs
-from semsig_gis.evaluation.evaluate import evaluate
+from semsig_gis.evaluation import evaluate
 from semsig_gis.reports import (
     SceneObject,
     cell_scene,

@@ -6,15 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core import percent
+from semsig_gis.core import Table, figure, interval, percent
 from semsig_gis.reports import (
     WIDEST,
     Number,
-    Table,
     brief_notes,
     distortion_rows,
-    figure,
-    interval,
     note_tables,
     number_table,
 )

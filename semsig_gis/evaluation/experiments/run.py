@@ -21,7 +21,11 @@ import pyarrow.parquet as pq
 
 from semsig_gis.core import DatabaseError, SourceError, announce, check_workers, finish_tasks
 from semsig_gis.database import City, digest
-from semsig_gis.evaluation.evaluate import (
+from semsig_gis.evaluation.experiments.tables import experiment_figures, experiment_markdown
+from semsig_gis.evaluation.figures import district_labels
+from semsig_gis.evaluation.file import open_evaluation, save_evaluation
+from semsig_gis.evaluation.queries.draw import check_count, draw_queries
+from semsig_gis.evaluation.scoring import (
     PAIR_S,
     QUERY_S,
     make_evaluation,
@@ -29,12 +33,8 @@ from semsig_gis.evaluation.evaluate import (
     scored_tables,
     versions,
 )
-from semsig_gis.evaluation.figures import district_labels
-from semsig_gis.evaluation.file import open_evaluation, save_evaluation
-from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.localization import DistanceMemo, make_locator
-from semsig_gis.reports import experiment_figures, experiment_markdown
 from semsig_gis.storage import (
     CHECKING_PAGES,
     RunKind,

@@ -24,11 +24,11 @@ from semsig_gis.database import (
     save_database,
     save_with_store,
 )
-from semsig_gis.evaluation.evaluate import versions
 from semsig_gis.evaluation.experiments.run import run_experiments
 from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count
+from semsig_gis.evaluation.scoring import versions
 from semsig_gis.evaluation.spec import ExperimentSpec
 from semsig_gis.localization import Method, parse_method, score_cells
 from semsig_gis.objects import build_objects

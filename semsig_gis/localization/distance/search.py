@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import semsig_gis
-from semsig_gis.core import EmptyResultError, crs_label
+from semsig_gis.core import EmptyResultError, crs_label, map_with
 from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_result
 from semsig_gis.localization.answers import (
     Answer,
@@ -97,7 +96,7 @@ class Localization(Answer):
 
     def explore(self, database: SignatureDatabase) -> MapFrame:
         """Show the candidates on a map in a notebook (see `localization_map`)."""
-        return semsig_gis.show_map(semsig_gis.localization_map(self, database))
+        return map_with("localization_map", self, database)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values that JSON can hold, candidates as a list of records.

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-import semsig_gis
-from semsig_gis.core import InputError, cell_ids, crs_label, percent, to_degrees
+from semsig_gis.core import InputError, cell_ids, crs_label, map_with, percent, to_degrees
 from semsig_gis.localization.answers import (
     REGION_SHARE,
     Answer,
@@ -36,8 +35,8 @@ from semsig_gis.localization.likelihood.posterior import (
     prior_ratio,
     refine,
 )
+from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
-from semsig_gis.localization.route import route_posteriors
 from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
@@ -54,8 +53,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.incremental import TurnMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.posterior import Refinement
-    from semsig_gis.localization.route import Leg
-    from semsig_gis.observation import North
+    from semsig_gis.observation import Leg, North
 
 DISAGREEMENT = 0.01
 """Ratio of a prior (see `posterior.prior_ratio`) at or below which an answer warns of it."""
@@ -159,7 +157,7 @@ class Location(Answer):
 
     def explore(self) -> MapFrame:
         """Show where it may have been seen on a map in a notebook (see `location_map`)."""
-        return semsig_gis.show_map(semsig_gis.location_map(self))
+        return map_with("location_map", self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the chances of all cells as plain values that JSON can hold.

@@ -422,7 +422,7 @@ class _Servers:
                 TOO_MANY,
             )
         if wait:
-            spec.tell(f"{host_of(address)} has no free slot for {wait:.0f} s")
+            spec.report(f"{host_of(address)} has no free slot for {wait:.0f} s")
             spec.sleep(wait + NO_SLOT_MARGIN_S)
 
 

@@ -15,9 +15,9 @@ from semsig_gis.core import CatalogError, SourceError, nearest_name
 from semsig_gis.sources.http.errors import error_text
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
-    RETRIED,
+    RETRY_STATUSES,
     HttpError,
-    PassingError,
+    TransientError,
     fetch,
     host_of,
 )
@@ -47,7 +47,7 @@ SERVICES = {
     "socrata": "socrata",
     "wfs": "wfs",
 }
-NAMES_TOLD = 12
+NAMES_LISTED = 12
 NOT_FOUND = 404
 BLANKS = b"\xef\xbb\xbf \r\n\t"
 HTML = re.compile(rb"<(!doctype\s+)?html", re.IGNORECASE)
@@ -127,7 +127,7 @@ class Client:
             )
         at_home = urlsplit(query.url)[:2] == urlsplit(self.endpoint)[:2]
         spec = dataclasses.replace(
-            self.spec, hosts=hosts, secret=self.spec.secret if at_home else None
+            self.spec, hosts=hosts, token=self.spec.token if at_home else None
         )
         file = fetch(
             query.url,
@@ -213,8 +213,8 @@ class Client:
     def unknown(self, names: Iterable[str], *, what: str, name: str = "") -> CatalogError:
         """Return the error for a dataset that the service does not have, with those it has."""
         names, name = list(names), name or self.dataset
-        listed = ", ".join(names[:NAMES_TOLD]) or "none"
-        rest = f" and {len(names) - NAMES_TOLD:,} more" if len(names) > NAMES_TOLD else ""
+        listed = ", ".join(names[:NAMES_LISTED]) or "none"
+        rest = f" and {len(names) - NAMES_LISTED:,} more" if len(names) > NAMES_LISTED else ""
         return CatalogError(
             f"{host_of(self.endpoint)} has no {what} {name!r}, which the catalogue names for layer "
             f"{self.layer.name!r}{nearest_name(name, names)}; it has {listed}{rest}; correct "
@@ -260,7 +260,7 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
     """Return JSON that a service sent.
 
     SourceError if it is something else, such as a web page, HttpError if it is the service's word
-    for an error, PassingError where a later answer may be better.
+    for an error, TransientError where a later answer may be better.
     """
     refuse_markup(content, url)
     host = host_of(url)
@@ -268,14 +268,14 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
         reply = parse_json(content.decode("utf-8-sig"))
     except ValueError as error:
         what = "sent JSON that is not whole"
-        raise PassingError(what) from error
+        raise TransientError(what) from error
     failed = reply.get("error") if isinstance(reply, dict) else None
     if failed:
         code = failed.get("code") if isinstance(failed, dict) else None
         status = code if isinstance(code, int) else 0
         what = f"answered with the error {error_text(content) or status}"
-        if status in RETRIED:
-            raise PassingError(what, status)
+        if status in RETRY_STATUSES:
+            raise TransientError(what, status)
         raise HttpError(f"{host} {what} to {url}; correct it.", status)
     return reply
 
@@ -307,7 +307,7 @@ def xml_root(content: bytes, url: str) -> ET.Element:
             return parse_xml(content)
         except ValueError as error:
             what = "sent XML that is not whole"
-            raise PassingError(what) from error
+            raise TransientError(what) from error
     what = "a web page" if HTML.match(begin) else "something else"
     raise SourceError(f"{host} sent {what} where XML was expected; check the address {url}.")
 

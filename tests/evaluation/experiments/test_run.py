@@ -25,13 +25,13 @@ from semsig_gis.evaluation import (
     Districts,
     ExperimentWork,
     Part,
+    evaluate,
     open_results,
     parse_experiment,
     run_experiment,
     run_experiments,
     score_queries,
 )
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.evaluation.experiments import run
 from semsig_gis.localization import Method, parse_method
 

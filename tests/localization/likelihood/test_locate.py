@@ -18,7 +18,6 @@ from semsig_gis.core import ObjectIndex, Signature
 from semsig_gis.database import Footprints, ObjectStore, views_at
 from semsig_gis.localization import (
     AnswerRule,
-    Leg,
     NoiseSpec,
     PlaceEstimate,
     Posterior,
@@ -34,7 +33,7 @@ from semsig_gis.localization import (
     refine,
     refined_estimate,
 )
-from semsig_gis.observation import View
+from semsig_gis.observation import Leg, View
 
 if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects

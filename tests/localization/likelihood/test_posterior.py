@@ -19,10 +19,9 @@ from sentences import refused
 
 from semsig_gis.core import CrsError, InputError
 from semsig_gis.localization import (
-    LOST_LEG_CHANCE,
+    LOST,
     AnswerRule,
     KnownPosition,
-    Leg,
     area_prior,
     calibrate,
     moved_chances,
@@ -35,6 +34,7 @@ from semsig_gis.localization import (
     save_rule,
     weight_prior,
 )
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -282,9 +282,8 @@ def test_smoothing_is_the_sum_over_all_routes(seed: int, ways: list[Leg]) -> Non
     database = random_database(seed, cells=6)
     logliks = np.random.default_rng(seed).normal(0, 3, (len(ways) + 1, 6))
     steps = [
-        (1 - LOST_LEG_CHANCE)
-        * np.stack([moved_chances(database, np.eye(6)[cell], leg) for cell in range(6)])
-        + LOST_LEG_CHANCE / 6
+        (1 - LOST) * np.stack([moved_chances(database, np.eye(6)[cell], leg) for cell in range(6)])
+        + LOST / 6
         for leg in ways
     ]
     slow = np.zeros((len(ways) + 1, 6))

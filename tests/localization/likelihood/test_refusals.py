@@ -16,7 +16,6 @@ from semsig_gis.database import ObjectStore
 from semsig_gis.localization import (
     AnswerRule,
     CellScores,
-    Leg,
     NoiseSpec,
     Sample,
     align_cells,
@@ -37,6 +36,7 @@ from semsig_gis.localization import (
     route_posteriors,
     weight_prior,
 )
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Callable

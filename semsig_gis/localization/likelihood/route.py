@@ -7,13 +7,13 @@ view leaves open. A step that is known to some metres blurs the chances before t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core import MOST_METRES, ROW_SPAN, InputError, require_number
+from semsig_gis.core import ROW_SPAN, InputError
 from semsig_gis.localization.likelihood.posterior import Posterior, posterior
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,45 +22,11 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
 
-LOST_LEG_CHANCE = 1e-6
+LOST = 1e-6
 """Chance that a leg is quite wrong, and the next place anywhere."""
 LEAST_CHANCE = 1e-12  # cells below this, against the likeliest, do not move
 LEAST_SHARE = 1e-6  # of the blur that is left out
-MOST_SIGMA = 1000
 REACH = 6.0  # standard deviations
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
-    """The way from one place to the next.
-
-    Parameters
-    ----------
-    dx, dy : float
-        Metres to grid east and grid north, at most 1,000,000 each way, or InputError.
-    sigma : float, default 0
-        Standard deviation of each of them, in metres; 0 to 1000, or InputError.
-
-    Examples
-    --------
-    >>> Leg.towards(90.0, 20.0).dx
-    20.0
-    """
-
-    dx: float
-    dy: float
-    sigma: float = 0.0
-
-    def __post_init__(self) -> None:  # noqa: D105
-        for value in (self.dx, self.dy):
-            require_number("leg", value, least=-MOST_METRES, most=MOST_METRES, unit="metres")
-        require_number("deviation of a leg", self.sigma, least=0, most=MOST_SIGMA, unit="metres")
-
-    @classmethod
-    def towards(cls, bearing: float, distance: float, *, sigma: float = 0.0) -> Leg:
-        """Return the leg of so many metres in a direction, in degrees clockwise from grid north."""
-        angle = math.radians(bearing)
-        return cls(dx=distance * math.sin(angle), dy=distance * math.cos(angle), sigma=sigma)
 
 
 def route_posteriors(
@@ -88,7 +54,7 @@ def route_posteriors(
     forward = [likely[0]]
     for here, leg in zip(likely[1:], legs, strict=True):
         came = moved_chances(database, forward[-1], leg)
-        both = here * ((1.0 - LOST_LEG_CHANCE) * came + LOST_LEG_CHANCE / size)
+        both = here * ((1.0 - LOST) * came + LOST / size)
         forward.append(both / both.sum())
     backward = np.ones(size)
     chances = [forward[-1]]
@@ -97,7 +63,7 @@ def route_posteriors(
         ahead = likely[row + 1] * backward
         ahead /= ahead.sum()
         back = moved_chances(database, ahead, Leg(dx=-leg.dx, dy=-leg.dy, sigma=leg.sigma))
-        backward = (1.0 - LOST_LEG_CHANCE) * back + LOST_LEG_CHANCE / size
+        backward = (1.0 - LOST) * back + LOST / size
         both = forward[row] * backward
         chances.append(both / both.sum())
     return tuple(Posterior(database=database, chances=view) for view in reversed(chances))

@@ -23,8 +23,8 @@ from semsig_gis.evaluation import (
     common_cases,
     compare_evaluations,
     draw_queries,
+    evaluate,
 )
-from semsig_gis.evaluation.evaluate import evaluate
 from semsig_gis.localization import (
     NEAR_PLACES,
     THRESHOLDS,
