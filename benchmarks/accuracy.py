@@ -33,7 +33,7 @@ from benchmarks._cities import PARIS_LIKE as PARIS
 from semsig_gis.core import ObjectIndex
 from semsig_gis.database import build_database
 from semsig_gis.localization import Method, build_index, calibrate, cell_noise, named_noise
-from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
+from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

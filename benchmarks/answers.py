@@ -19,7 +19,7 @@ from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database import ObjectStore, save_database
 from semsig_gis.localization import build_index, cell_noise, locate, named_noise
-from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
+from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

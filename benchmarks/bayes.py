@@ -28,7 +28,7 @@ from semsig_gis.database import views_in
 from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
 from semsig_gis.localization import LikelihoodLocator, build_index, database_tables
 from semsig_gis.observation import View
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

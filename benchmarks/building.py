@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
 from semsig_gis.database import build_database, open_database, save_database
-from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
+from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

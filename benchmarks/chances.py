@@ -44,7 +44,7 @@ from semsig_gis.localization import (
     named_noise,
 )
 from semsig_gis.objects import compare_objects
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

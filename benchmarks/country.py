@@ -27,8 +27,7 @@ from semsig_gis.database import (
     update_tiles,
 )
 from semsig_gis.objects import build_objects, open_objects, save_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

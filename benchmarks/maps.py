@@ -17,11 +17,7 @@ from semsig_gis.evaluation import evaluate
 from semsig_gis.localization import Method
 from semsig_gis.maps import ambiguity_map, available, drift_map, evaluation_map, save_map
 from semsig_gis.objects import StreetObjects
-from semsig_gis.sources.synthetic.city import (
-    PARIS_LIKE,
-    CitySpec,
-    synthetic_surroundings,
-)
+from semsig_gis.sources import PARIS_LIKE, CitySpec, synthetic_surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -19,7 +19,7 @@ from semsig_gis.core import BEARING_UNITS, GridSpec, SignatureSpec
 from semsig_gis.database import SignatureDatabase
 from semsig_gis.evaluation import published as paris
 from semsig_gis.localization import Method, score_cells
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -39,7 +39,7 @@ from semsig_gis.maps import (
     save_map,
 )
 from semsig_gis.objects import StreetObjects
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -49,8 +49,8 @@ from semsig_gis.localization import (
     cell_noise,
 )
 from semsig_gis.observation import Leg
-from semsig_gis.sources.synthetic.city import PARIS_LIKE as LIKE_PARIS
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import PARIS_LIKE as LIKE_PARIS
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -16,7 +16,7 @@ from semsig_gis.core import BEARING_UNITS, GridSpec, ObjectClass, Signature, Sig
 from semsig_gis.database import SignatureDatabase
 from semsig_gis.evaluation import distort, named_distortion
 from semsig_gis.localization import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -20,7 +20,7 @@ from semsig_gis.reports import (
     SceneObject,
     Section,
 )
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 FORMULA = '=cmd|"/C calc"!A0'
 HARM = f"{FORMULA} $\\frac{{}}$ _x_ ![a](http://example.org/a.png)\0\r\n# | {HOSTILE}"

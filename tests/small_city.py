@@ -12,8 +12,7 @@ from semsig_gis.database import build_database
 from semsig_gis.evaluation import BANDS, ClassGain, Identifiability, evaluate
 from semsig_gis.localization import Method, build_index, localize, locate, named_noise
 from semsig_gis.objects import Licence, build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase

@@ -24,7 +24,7 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import ObjectStore, build_database, save_with_store
 from semsig_gis.objects import Licence, StreetObjects
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

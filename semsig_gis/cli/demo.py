@@ -38,8 +38,7 @@ def demo(
     from semsig_gis.maps import evaluation_map, objects_map, save_map
     from semsig_gis.objects import build_objects, save_objects
     from semsig_gis.reports import evaluation_tables
-    from semsig_gis.sources.catalog import paper_taxonomy
-    from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
     layers = synthetic_city(CitySpec(seed=seed))
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
@@ -88,10 +87,10 @@ def synthesize(
 ) -> None:
     """Make up a city: street objects, buildings and streets."""
     from semsig_gis.objects import build_objects, save_objects, save_surroundings
-    from semsig_gis.sources.catalog import paper_taxonomy
-    from semsig_gis.sources.synthetic.city import (
+    from semsig_gis.sources import (
         PARIS_LIKE,
         CitySpec,
+        paper_taxonomy,
         synthetic_city,
         synthetic_surroundings,
     )

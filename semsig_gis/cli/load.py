@@ -26,14 +26,12 @@ from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.objects import Loaded, Selection
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.filters import Rules
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources import Catalog, LayerSpec, Rules
 
 
 def _catalogs(incomplete: str) -> list[str]:
     """Return the catalogues whose names begin so, for a shell that completes a line."""
-    from semsig_gis.sources.catalog import catalog_names
+    from semsig_gis.sources import catalog_names
 
     return [name for name in catalog_names() if name.startswith(incomplete)]
 
@@ -119,9 +117,14 @@ def load(
 ) -> None:
     """Read files of open data into street objects."""
     from semsig_gis.objects import assemble, choose_layers, passed_by, read_files, read_small
-    from semsig_gis.sources.area import BOX, clip_layers, parse_area
-    from semsig_gis.sources.catalog import combine_catalogs, load_catalog
-    from semsig_gis.sources.detect import told_catalogs
+    from semsig_gis.sources import (
+        BOX,
+        clip_layers,
+        combine_catalogs,
+        load_catalog,
+        parse_area,
+        told_catalogs,
+    )
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
@@ -216,7 +219,7 @@ def fetch(
 ) -> None:
     """Download the street objects of an area."""
     from semsig_gis.objects import assemble, choose_layers, fetch_layers, find_area, open_cache
-    from semsig_gis.sources.catalog import load_catalog
+    from semsig_gis.sources import load_catalog
 
     keep_inputs(out, buildings, streets, read=(name, area))
     require_suffix(".parquet", out, buildings, streets)
@@ -325,8 +328,7 @@ def sources(
     import dataclasses
 
     from semsig_gis.core import installed_readers
-    from semsig_gis.sources import READERS
-    from semsig_gis.sources.catalog import catalog_names, load_catalog
+    from semsig_gis.sources import READERS, catalog_names, load_catalog
 
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]

@@ -318,13 +318,7 @@ class SearchOptions:
 
         The noise is the `usual_noise` unless another one was asked for.
         """
-        from semsig_gis.localization import (
-            DEFAULT_RULE,
-            LikelihoodLocator,
-            build_index,
-            cell_noise,
-            open_rule,
-        )
+        from semsig_gis.localization import DEFAULT_RULE, LikelihoodMethod, make_locator, open_rule
         from semsig_gis.observation import GRID_NORTH
 
         if self.on_grid and self.refine:
@@ -348,14 +342,15 @@ class SearchOptions:
             map_age=self.map_age,
             drift_report=self.drift_report,
         )
-        if not self.on_grid:
-            noise = cell_noise(noise, city.database.grid.step)
+        method = LikelihoodMethod(
+            noise=noise, refined=bool(refined), on_grid=self.on_grid, north_sigma=sigma
+        )
         log_prior, known = self._prior(city.database)
         needed = bool(self.refine)
         store = object_store(city, self.objects, needed=needed) if needs_objects else None
-        return LikelihoodLocator(
-            index=build_index(city.database, noise),
-            north_sigma=sigma,
+        return make_locator(
+            city,
+            method,
             log_prior=log_prior,
             rule=rule,
             top=top,

@@ -177,7 +177,7 @@ def view(
 def _taxonomy(database: Path | None) -> Taxonomy:
     """Return the classes that are meant; built-in ones are as tall as elsewhere, if not said."""
     if database is None:
-        from semsig_gis.sources.catalog import built_in_taxonomy
+        from semsig_gis.sources import built_in_taxonomy
 
         return built_in_taxonomy()
     from semsig_gis.database import open_city

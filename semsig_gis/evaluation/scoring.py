@@ -32,8 +32,6 @@ from semsig_gis.localization import (
     NEAR_METRES,
     NEAR_PLACES,
     THRESHOLDS,
-    DistanceLocator,
-    LikelihoodLocator,
     LikelihoodMethod,
     Method,
     best_cells,
@@ -151,10 +149,10 @@ def evaluate(
             used = replace(used, on_grid=True)
         locator = make_locator(database, used)
     elif isinstance(method, Method):
-        used, locator = method, DistanceLocator(database=database, method=method)
+        used, locator = method, make_locator(database, method)
     elif method.database is database:
         used = LikelihoodMethod(noise=method.noise, on_grid=True)
-        locator = LikelihoodLocator(index=method)
+        locator = make_locator(database, used, index=method)
     else:
         raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."

@@ -2,10 +2,8 @@
 
 from .answers import REGION_SHARE as REGION_SHARE
 from .answers import Answer as Answer
-from .answers import DistanceMemo as DistanceMemo
-from .answers import Locator as Locator
 from .answers import Ranking as Ranking
-from .answers import Requirement as Requirement
+from .distance.memo import DistanceMemo as DistanceMemo
 from .distance.method import Method as Method
 from .distance.metrics import METRICS as METRICS
 from .distance.metrics import Distances as Distances
@@ -78,8 +76,10 @@ from .likelihood.route import LOST as LOST
 from .likelihood.route import moved_chances as moved_chances
 from .likelihood.route import route_posteriors as route_posteriors
 from .locator import AnyMethod as AnyMethod
+from .locator import Locator as Locator
 from .locator import localize as localize
 from .locator import make_locator as make_locator
+from .locator import method_index as method_index
 from .locator import parse_method as parse_method
 from .noise.age import Drift as Drift
 from .noise.age import aged_noise as aged_noise
@@ -116,5 +116,6 @@ from .noise.table import noise_tables as noise_tables
 from .noise.table import query_bearings as query_bearings
 from .regions import SearchRegions as SearchRegions
 from .regions import search_regions as search_regions
+from .requirement import Requirement as Requirement
 from .suggest import next_questions as next_questions
 from .suggest import with_unplaced as with_unplaced

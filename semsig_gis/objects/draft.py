@@ -38,13 +38,20 @@ from semsig_gis.objects.guesses import (
     samples_of,
 )
 from semsig_gis.objects.load import assemble, read_files
-from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.class_keywords import words_of
-from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.filters import ANY_VALUE, BETWEEN_SLASHES, Condition
-from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.rows import WGS84, off_the_globe
+from semsig_gis.sources import (
+    ANY_VALUE,
+    BETWEEN_SLASHES,
+    NO_GEOMETRY,
+    WGS84,
+    Condition,
+    LayerSpec,
+    catalog_names,
+    load_catalog,
+    off_the_globe,
+    paper_taxonomy,
+    reader,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

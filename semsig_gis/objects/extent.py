@@ -30,7 +30,7 @@ from semsig_gis.core import (
     split_ids,
     wrap_degrees,
 )
-from semsig_gis.sources.rows import LATITUDE_LIMIT, WGS84, fits_the_globe
+from semsig_gis.sources import LATITUDE_LIMIT, WGS84, fits_the_globe
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

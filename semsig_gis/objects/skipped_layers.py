@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources import Catalog, LayerSpec, RawLayer
 
 # Files that are read in about a second.
 SMALL_BYTES = 2**21

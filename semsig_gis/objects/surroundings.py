@@ -11,14 +11,22 @@ import shapely
 
 from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
-from semsig_gis.sources import file_reader, reader
+from semsig_gis.sources import (
+    NUMBERS,
+    SUFFIXES,
+    WGS84,
+    LayerSpec,
+    file_reader,
+    frame_fields,
+    frame_layers,
+    has_element_columns,
+    join_areas,
+    load_catalog,
+    parse_area,
+    read_parquet,
+    reader,
+)
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.osm.features import frame_fields, frame_layers, has_element_columns
-from semsig_gis.sources.parquet import SUFFIXES, read_parquet
-from semsig_gis.sources.rows import WGS84
 from semsig_gis.storage import CHECKED_PAGES, GROUP_ROWS, hilbert_order, seal, whole_file
 
 if TYPE_CHECKING:
@@ -26,8 +34,7 @@ if TYPE_CHECKING:
 
     from pyproj import CRS
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import GeometryKind
+    from semsig_gis.sources import GeometryKind, RawLayer
 
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}

@@ -135,7 +135,7 @@ def said_row(text: str, taxonomy: Taxonomy) -> Row:
     One word is symbols if each of its letters is one and it is no word for a class, or if it has
     capitals alone, so that ``DDBQ`` is refused for its ``Q``.
     """
-    from semsig_gis.sources.class_keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     word = text.strip()
     symbols = {"?", *(item.symbol for item in taxonomy.classes)}
@@ -272,7 +272,7 @@ def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...],
     sentence, *others = unplaced_parts(text)
     if not any(others):
         return sentence, (), ()
-    from semsig_gis.sources.class_keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     seen, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
     return sentence, seen, absent
@@ -307,14 +307,14 @@ def _class(told: object, taxonomy: Taxonomy) -> str | Row:
         raise InputError(
             f"the class of a detection is {told!r}; give a symbol, a word or scores by word."
         )
-    from semsig_gis.sources.class_keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     return taxonomy.decode([class_code(told, taxonomy)])
 
 
 def _scores(told: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
     """Return the chance of each class code; what is left to one is for any class."""
-    from semsig_gis.sources.class_keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     scores = np.zeros(CLASSES)
     for word, chance in told.items():

@@ -32,10 +32,10 @@ from semsig_gis.exports import export_answer
 from semsig_gis.localization import (
     NOISES,
     KnownPosition,
-    LikelihoodLocator,
+    LikelihoodMethod,
     TurnMemo,
-    build_index,
-    cell_noise,
+    make_locator,
+    method_index,
     next_questions,
     position_prior,
     with_unplaced,
@@ -74,7 +74,13 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Taxonomy
     from semsig_gis.database import City, ObjectStore, SignatureDatabase
-    from semsig_gis.localization import CellScores, LikelihoodIndex, Location, Noise
+    from semsig_gis.localization import (
+        CellScores,
+        LikelihoodIndex,
+        LikelihoodLocator,
+        Location,
+        Noise,
+    )
 
 MOST_UPLOAD = 25 * 2**20
 """Bytes of a picture, or of a question."""
@@ -336,22 +342,25 @@ class Workbench:
         """Return what views of a question are compared with."""
         key = self._noise(question), question.seen_from
         if key not in self._indexes:
-            noise = self.noises[key[0]]
-            if question.seen_from == "anywhere":
-                noise = cell_noise(noise, self.database.grid.step)
-            self._indexes[key] = build_index(self.database, noise)
+            self._indexes[key] = method_index(self.database, self._method(question))
         return self._indexes[key]
+
+    def _method(self, question: Question) -> LikelihoodMethod:
+        """Return the method of a question."""
+        noise = self.noises[self._noise(question)]
+        return LikelihoodMethod(noise=noise, on_grid=question.seen_from == "cells")
 
     def _locator(self, question: Question) -> LikelihoodLocator:
         """Return what answers a question."""
-        locator = LikelihoodLocator(
+        locator = make_locator(
+            self.database,
+            self._method(question),
             index=self._index(question),
             store=self.store,
-            refined=None if question.seen_from == "anywhere" else False,
             top=question.top,
             explained=question.top,
-            memo=self._memo,
         )
+        locator = replace(locator, memo=self._memo)
         if self._is_quick(question):
             locator = replace(locator, refined=False, quick=True, explained=QUICKLY_EXPLAINED)
         if question.near is not None:

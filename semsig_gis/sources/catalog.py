@@ -23,14 +23,14 @@ from semsig_gis.core import (
     nearest_name,
     require_metric_crs,
 )
-from semsig_gis.sources.layers import conditions_of, layer_of, require_class
+from semsig_gis.sources.layer_spec import conditions_of, layer_of, require_class
 from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from importlib.resources.abc import Traversable
 
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 # Shipped beside the catalogues: the paper's classes, words by which drafts are made, and more.

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache, CacheEntry
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
 
     Boxes = Sequence[tuple[float, float, float, float]]
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import shapely
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources import require_file
+from semsig_gis.sources.paths import require_file
 from semsig_gis.storage import CHECKING_PAGES, UNREADABLE, require_intact
 
 if TYPE_CHECKING:

@@ -28,9 +28,9 @@ from semsig_gis.core import (
     crs_label,
     nearest_name,
 )
-from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
-from semsig_gis.sources.layers import MAX_WIDTH_M, MIN_WIDTH_M
+from semsig_gis.sources.layer import RawLayer, RowCounts
+from semsig_gis.sources.layer_spec import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.numbers import decimal
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.sources.filters import Value
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 WGS84 = CRS.from_epsg(4326)

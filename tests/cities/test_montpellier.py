@@ -15,9 +15,7 @@ from worlds import assert_same
 from semsig_gis.core import GridSpec
 from semsig_gis.database import build_database, open_database, save_database
 from semsig_gis.objects import build_objects, choose_layers, quality_report
-from semsig_gis.sources import find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.vector import read_layer
+from semsig_gis.sources import find_files, load_catalog, read_layer
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -18,9 +18,7 @@ from osmium.osm import WAY, Area, Node, Relation, Way
 from semsig_gis.database import build_database
 from semsig_gis.evaluation import evaluate
 from semsig_gis.objects import build_objects, choose_layers, read_surroundings
-from semsig_gis.sources import find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.osm.file import read_layers
+from semsig_gis.sources import find_files, load_catalog, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

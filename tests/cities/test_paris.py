@@ -12,8 +12,7 @@ import pytest
 import shapely
 
 from semsig_gis.objects import build_objects
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources import RowCounts, load_catalog, paper_taxonomy
 from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from sentences import sentence
 
 from benchmarks.rendered import Scene
 from semsig_gis.observation import Camera, Photo, View, read_queries
-from semsig_gis.sources.catalog import built_in_taxonomy
+from semsig_gis.sources import built_in_taxonomy
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -22,7 +22,7 @@ from semsig_gis.database import TileSpec, ViewpointSpec
 from semsig_gis.evaluation import QuerySpec, check_radius, parse_chain
 from semsig_gis.localization import LikelihoodMethod, NoiseSpec, named_noise
 from semsig_gis.observation import Leg, check_north
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -44,7 +44,7 @@ from semsig_gis import (
 from semsig_gis.core import Displayed
 from semsig_gis.objects import assemble
 from semsig_gis.reports import Scene
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from pathlib import Path

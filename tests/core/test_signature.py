@@ -19,7 +19,7 @@ from semsig_gis.core import (
     quantize,
 )
 from semsig_gis.database import Sightings, clockwise_order
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

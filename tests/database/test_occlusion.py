@@ -12,7 +12,7 @@ from sentences import refused
 
 from semsig_gis.core import InputError
 from semsig_gis.database import Footprints, buildings_near, hidden, occlusion
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources import load_catalog
 from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:

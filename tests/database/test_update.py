@@ -44,7 +44,7 @@ from semsig_gis.database import (
     update_tiles,
 )
 from semsig_gis.objects import Licence, assemble, choose_layers, read_files, save_objects
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -55,7 +55,7 @@ from semsig_gis.exports import (
 )
 from semsig_gis.localization import Method
 from semsig_gis.objects import Licence, StreetObjects, open_objects, save_objects
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from semsig_gis.database import CellGeometry

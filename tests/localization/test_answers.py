@@ -15,7 +15,7 @@ from sentences import refused
 from semsig_gis.core import WILDCARD, InputError, UnknownNameError
 from semsig_gis.database import SequenceTable
 from semsig_gis.localization import DistanceMemo, Requirement
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -54,7 +54,7 @@ from semsig_gis.maps import (
     to_latlon,
 )
 from semsig_gis.objects import Licence, StreetObjects
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Callable

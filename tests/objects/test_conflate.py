@@ -16,8 +16,7 @@ from worlds import TAXONOMY, objects_of
 
 from semsig_gis.core import InputError, UnknownNameError
 from semsig_gis.objects import Licence, build_objects, conflate, open_objects, save_objects
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.vector import read_layer
+from semsig_gis.sources import load_catalog, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -32,18 +32,24 @@ from semsig_gis.objects import (
     guess_position,
     read_files,
 )
-from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.class_keywords import Keywords, Match, keywords, words_of
-from semsig_gis.sources.vector import LayerInfo
+from semsig_gis.sources import (
+    Keywords,
+    LayerInfo,
+    Match,
+    catalog_names,
+    keywords,
+    load_catalog,
+    paper_taxonomy,
+    reader,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from semsig_gis.core import ObjectClass
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.sources import Catalog, RawLayer
 
 # What a person would take of the comments.
 OFFERED = re.compile(r"# (?=\[\[classes|(?:where|class_by|\w*id\w*|code|symbol|name|title) = )")

@@ -19,8 +19,7 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import build_database
 from semsig_gis.objects import assemble, settle_extent
-from semsig_gis.sources.catalog import Catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources import Catalog, LayerSpec, paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

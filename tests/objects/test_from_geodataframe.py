@@ -17,8 +17,7 @@ from sentences import refused
 from semsig_gis.core import CrsError, EmptyResultError, InputError
 from semsig_gis.database import ObjectStore, ViewpointSpec, build_database
 from semsig_gis.objects import assemble, choose_layers, objects_from_frame, read_files
-from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources import Catalog, LayerSpec, load_catalog, paper_taxonomy
 
 if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase

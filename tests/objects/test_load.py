@@ -28,11 +28,17 @@ from semsig_gis.objects import (
     save_objects,
 )
 from semsig_gis.reports import quality_tables
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources import (
+    Catalog,
+    ClassBy,
+    LayerSpec,
+    RowCounts,
+    RowRules,
+    Rows,
+    load_catalog,
+    paper_taxonomy,
+)
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.rows import RowRules, Rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -14,7 +14,7 @@ from pyproj import CRS
 from raw_layers import raw_layer
 
 from semsig_gis.objects import StreetObjects, build_objects, conflate, quality_report
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

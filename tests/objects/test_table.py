@@ -29,8 +29,7 @@ from semsig_gis.objects import (
     open_objects,
     save_objects,
 )
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.sources import RowCounts, load_catalog, paper_taxonomy
 from semsig_gis.storage import geo_metadata, write_geoparquet
 
 if TYPE_CHECKING:

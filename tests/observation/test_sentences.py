@@ -14,7 +14,7 @@ from sentences import refused
 
 from semsig_gis.core import SemsigError
 from semsig_gis.observation import GUESS_ERROR, Photo, parse_view
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from semsig_gis.observation import View

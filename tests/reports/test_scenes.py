@@ -25,7 +25,7 @@ from semsig_gis.reports import (
     failure_pairs,
 )
 from semsig_gis.reports.scenes import _round_length
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation

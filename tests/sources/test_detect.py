@@ -12,7 +12,7 @@ from osm_xml import street_town, write_osm
 from sentences import refused, sentence
 
 from semsig_gis.core import InputError, SourceError
-from semsig_gis.sources.detect import told_catalogs
+from semsig_gis.sources import told_catalogs
 
 if TYPE_CHECKING:
     from pathlib import Path

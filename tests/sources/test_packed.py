@@ -11,10 +11,7 @@ import pytest
 from sentences import refused
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.compression import HARMLESS_BYTES, require_modest
-from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.osm.file import read_layers
-from semsig_gis.sources.vector import read_layer
+from semsig_gis.sources import HARMLESS_BYTES, LayerSpec, read_layer, read_layers, require_modest
 
 if TYPE_CHECKING:
     from pathlib import Path

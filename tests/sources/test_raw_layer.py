@@ -15,12 +15,14 @@ from pyproj import CRS
 from sentences import refused
 
 from semsig_gis.core import CatalogError, crs_label
-from semsig_gis.sources import reader
-from semsig_gis.sources.layers import ClassBy, LayerSpec, WidthBy
-from semsig_gis.sources.rows import (
+from semsig_gis.sources import (
+    ClassBy,
+    LayerSpec,
     RowRules,
     Rows,
+    WidthBy,
     off_the_globe,
+    reader,
     usable_crs,
 )
 
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from semsig_gis.sources.rows import Sifted
+    from semsig_gis.sources import Sifted
 
 
 DATA = Path(__file__).with_name("data")

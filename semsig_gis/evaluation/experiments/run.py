@@ -337,11 +337,9 @@ class ExperimentWork:
     def _locator(self, name: str) -> Locator[Answer]:
         """Return a method with all that it needs."""
         if name not in self._locators:
-            self._locators[name] = make_locator(
-                self.database,
-                self.spec.methods[name],
-                store=lambda: self._city(self.spec.database).store,
-            )
+            method = self.spec.methods[name]
+            store = self._city(self.spec.database).store if method.refined else None
+            self._locators[name] = make_locator(self.database, method, store=store)
         return self._locators[name]
 
     def _city(self, name: str) -> City:

@@ -32,10 +32,10 @@ from semsig_gis.evaluation.scoring import versions
 from semsig_gis.evaluation.spec import ExperimentSpec
 from semsig_gis.localization import Method, parse_method, score_cells
 from semsig_gis.objects import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import (
+from semsig_gis.sources import (
     PARIS_LIKE,
     CitySpec,
+    paper_taxonomy,
     synthetic_city,
     synthetic_streets,
 )

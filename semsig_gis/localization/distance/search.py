@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import MapFrame, Signature
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.localization.answers import DistanceMemo, Requirement
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
+    from semsig_gis.localization.requirement import Requirement
     from semsig_gis.observation import North
 
 

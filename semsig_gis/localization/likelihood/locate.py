@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import MapFrame, Signature
     from semsig_gis.database import ObjectStore, SignatureDatabase
-    from semsig_gis.localization.answers import DistanceMemo
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
     from semsig_gis.localization.likelihood.explain import Explanation
@@ -456,7 +456,7 @@ class LocateOptions(TypedDict, total=False):
     rule: AnswerRule
     top: int
     store: ObjectStore | None
-    refined: bool
+    refined: bool | None
     explained: int
     known: Mapping[str, Any]
     north: North

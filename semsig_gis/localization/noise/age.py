@@ -14,7 +14,7 @@ import numpy as np
 from semsig_gis.core import Displayed, InputError
 from semsig_gis.localization.noise.fit import LEAST, MOST, drawn_rates
 from semsig_gis.objects import ClassChange
-from semsig_gis.sources.catalog import data_folder
+from semsig_gis.sources import data_folder
 from semsig_gis.storage import parse_toml, read_values
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from semsig_gis.core import (
     check_height,
     nearest_name,
 )
-from semsig_gis.sources.catalog import built_in_taxonomy, data_folder
-from semsig_gis.sources.class_keywords import class_code
+from semsig_gis.sources import built_in_taxonomy, class_code, data_folder
 from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projectio
 from semsig_gis.observation.detectors.exif import read_exif
 from semsig_gis.observation.detectors.pictures import Shot
 from semsig_gis.observation.view import CLASSES, MOST_RANGE_ERROR, Photo, View
-from semsig_gis.sources.catalog import built_in_taxonomy
+from semsig_gis.sources import built_in_taxonomy
 from semsig_gis.storage import read_rows, row_value
 
 if TYPE_CHECKING:

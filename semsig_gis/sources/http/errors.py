@@ -17,7 +17,7 @@ EXCEPTION_CODE = re.compile(r"\bexceptionCode=\"([^\"]*)\"")
 MESSAGES = ("message", "description", "detail", "error", "title")
 
 
-def error_text(body: bytes) -> str:
+def error_text(body: bytes | bytearray) -> str:
     """Return the error message in the body of an answer, or "" if it is not an error."""
     text = body.decode("utf-8", errors="replace").strip("\ufeff \r\n\t")
     if text.startswith("<"):

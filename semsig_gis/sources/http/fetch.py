@@ -226,26 +226,24 @@ def check_status(response: requests.Response) -> None:
 
 def _detail(response: requests.Response) -> str:
     """Return the error message of a service in parentheses, or ""."""
-    body = b""
+    body = bytearray()
     with contextlib.suppress(TransientError):
-        body = _first_bytes(response)
+        _read_start(response, body)
     with contextlib.suppress(zlib.error):
-        if response.headers.get("Content-Encoding", "") == "gzip":
-            body = zlib.decompressobj(wbits=31).decompress(body, BLOCK_BYTES)
-        text = error_text(body)
-        if text:
-            return f" ({text})"
+        packed = response.headers.get("Content-Encoding", "") == "gzip"
+        text = error_text(
+            zlib.decompressobj(wbits=31).decompress(body, BLOCK_BYTES) if packed else body
+        )
+        return f" ({text})" if text else ""
     return ""
 
 
-def _first_bytes(response: requests.Response) -> bytes:
-    """Return a little more than the first `BLOCK_BYTES` of a body."""
-    body = b""
+def _read_start(response: requests.Response, body: bytearray) -> None:
+    """Append a little more than the first `BLOCK_BYTES` of a response to `body`."""
     for block in raw_blocks(response):
         body += block
         if len(body) > BLOCK_BYTES:
             break
-    return body
 
 
 def raw_blocks(response: requests.Response) -> Iterator[bytes]:
@@ -370,14 +368,14 @@ def fetch(
 def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
     """Request a short text once, without the cache, and return up to 64 KiB of it."""
     check_url(url)
-    request = Request(url)
+    request, body = Request(url), bytearray()
     try:
         with (
             open_session(spec.deadline()) as session,
             open_response(session, request, {}, spec) as response,
         ):
             check_status(response)
-            body = _first_bytes(response)
+            _read_start(response, body)
     except DeadlineError as error:
         raise _deadline_error(url, spec) from error
     except TransientError as error:

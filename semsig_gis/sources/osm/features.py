@@ -33,10 +33,12 @@ from semsig_gis.storage import parse_toml
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
     from semsig_gis.sources.rows import Position
 
+# What a file is by its name, and what pyosmium calls it.
+FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
 SUFFIXES = frozenset({*DRIVERS, *parquet.SUFFIXES, ".zip"} - {".csv"})
 # Columns of all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
 MAPS = ("tags", "other_tags", "@other_tags")

@@ -15,7 +15,7 @@ from semsig_gis.evaluation import paper_experiments, reproduce, time_queries
 from semsig_gis.evaluation import published as paris
 from semsig_gis.localization import Method, score_cells
 from semsig_gis.reports import reproduction_report
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable

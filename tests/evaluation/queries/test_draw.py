@@ -18,7 +18,7 @@ from semsig_gis.core import InputError, Taxonomy
 from semsig_gis.database import ObjectStore, ViewpointSpec, build_database
 from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
 from semsig_gis.objects import assemble, choose_layers, read_files
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -28,8 +28,7 @@ from semsig_gis.localization import (
     open_drift,
 )
 from semsig_gis.objects import ClassChange, build_objects, compare_objects
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.sources import CitySpec, load_catalog, paper_taxonomy, synthetic_city
 
 if TYPE_CHECKING:
     from pathlib import Path

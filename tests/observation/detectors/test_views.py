@@ -23,7 +23,7 @@ from semsig_gis.observation import (
     parse_queries,
     read_shots,
 )
-from semsig_gis.sources.catalog import built_in_taxonomy, paper_taxonomy
+from semsig_gis.sources import built_in_taxonomy, paper_taxonomy
 
 if TYPE_CHECKING:
     from pathlib import Path
