@@ -121,15 +121,15 @@ def load(
         BOX,
         clip_layers,
         combine_catalogs,
+        detect_catalogs,
         load_catalog,
         parse_area,
-        told_catalogs,
     )
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
     if not names:
-        told, lines = told_catalogs(files)
+        told, lines = detect_catalogs(files)
         names = list(told)
         for line in lines:
             remark(line)

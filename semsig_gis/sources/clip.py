@@ -13,11 +13,11 @@ import numpy as np
 import shapely
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
-from semsig_gis.sources import vector as vector_file
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES
 from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
+from semsig_gis.sources.vector import file as vector_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 from semsig_gis.core import SourceError, UnknownNameError, installed_readers, nearest_name
 from semsig_gis.sources.osm import features
 from semsig_gis.sources.paths import files_in
+from semsig_gis.sources.probe import probe_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -31,7 +32,7 @@ READERS = {
     "overpass": "osm.overpass",
     "overture": "overture",
     "socrata": "services.layers",
-    "vector_file": "vector",
+    "vector_file": "vector.file",
     "wfs": "services.layers",
 }
 
@@ -62,13 +63,17 @@ def reader(name: str) -> Reader:
 
 
 def file_reader(path: Path, *, sure: bool = False) -> str | None:
-    """Return the reader of a file of OpenStreetMap by its name, or by what is in it.
+    """Return the reader of a file of OpenStreetMap by its name or content, or None.
 
-    None if it is none; if `sure`, it has to say which elements of the map it holds, beside tags.
+    With `sure`, a table needs columns that identify its elements, not only columns of tags.
     """
     if path.name.lower().endswith(tuple(features.FORMATS)):
         return "osm_file"
-    return features.file_reader(path, sure=sure)
+    probe = probe_file(path)
+    if probe.format == "overpass":
+        return "overpass"
+    is_osm = features.has_element_columns if sure else features.has_tag_columns
+    return "osm_features" if any(map(is_osm, probe.columns)) else None
 
 
 def find_files(

@@ -28,7 +28,7 @@ from sentences import refused
 
 from semsig_gis.core import CatalogError, CrsError, SourceError, UnknownNameError
 from semsig_gis.sources import ClassBy, LayerSpec, list_layers, read_layer
-from semsig_gis.sources import vector as vector_file
+from semsig_gis.sources.vector import file as vector_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -24,10 +24,10 @@ from semsig_gis.sources import parquet
 from semsig_gis.sources.catalog import data_folder, load_catalog
 from semsig_gis.sources.filters import as_text
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, feature_shape
-from semsig_gis.sources.parquet import column_names, read_parquet
+from semsig_gis.sources.parquet import read_parquet
+from semsig_gis.sources.probe import probe_file
 from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs
-from semsig_gis.sources.vector import layer_fields, read_tables
-from semsig_gis.sources.vector.member import DRIVERS
+from semsig_gis.sources.vector.file import read_tables, spatial_layers
 from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 # What a file is by its name, and what pyosmium calls it.
 FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
-SUFFIXES = frozenset({*DRIVERS, *parquet.SUFFIXES, ".zip"} - {".csv"})
 # Columns of all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
 MAPS = ("tags", "other_tags", "@other_tags")
 PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"\s*=>\s*(?:"((?:[^"\\]|\\.)*)"|NULL)')
@@ -64,7 +63,6 @@ KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 CLASS, CODE = "fclass", "code"
 # What no element is without and still not told by most tables.
 TYPE, AREA, MULTIPOLYGON = "type", "area", "multipolygon"
-OVERPASS_START = 4096
 Name = tuple["ElementKind | None", str]
 
 
@@ -152,24 +150,6 @@ def has_tag_columns(fields: Iterable[str]) -> bool:
     return bool(fields & {*MAPS, *_index().keys} or fields.issuperset((CLASS, CODE)))
 
 
-def file_reader(path: Path, *, sure: bool = False) -> str | None:
-    """Return the reader of a file of elements by what is in it, None where it has no tags.
-
-    If `sure`, the file has to say which elements they are, too.
-    """
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES or not path.is_file():
-        return None
-    if suffix == ".json":
-        with path.open("rb") as stream:
-            start = stream.read(OVERPASS_START)
-        if b'"elements"' in start and b'"Feature' not in start:
-            return "overpass"
-    names = [column_names(path)] if suffix in parquet.SUFFIXES else layer_fields(path)
-    tells = has_element_columns if sure else has_tag_columns
-    return "osm_features" if any(map(tells, names)) else None
-
-
 def frame_fields(frame: gpd.GeoDataFrame) -> list[str]:
     """Return the columns of a table by name, those of its index among them."""
     return [str(name) for name in (*frame.index.names, *frame.columns) if name is not None]
@@ -207,8 +187,10 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
             frame = frame.set_crs(parse_crs(crs))
         yield frame_table(frame)
         return
+    # A file that the probe does not open as a vector file is refused here with its error.
+    layers = probe_file(path).layers or spatial_layers(path)
     for table in read_tables(
-        path, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
+        layers, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
     ):
         rows = table.rows
         values = zip(*rows.values, strict=True) if rows.values else [()] * len(table.fields)

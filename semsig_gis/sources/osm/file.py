@@ -18,7 +18,7 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
 from semsig_gis.core import HALF_TURN, CatalogError, SourceError, own_folder
 from semsig_gis.sources.area import Area, join_areas
-from semsig_gis.sources.compression import require_modest
+from semsig_gis.sources.compression import check_compression_ratio
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
 from semsig_gis.sources.osm.features import FORMATS
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
@@ -128,7 +128,7 @@ def _file(path: Path) -> osmium.io.File:
         raise SourceError(f"{path} is not an OpenStreetMap file; give one of {', '.join(FORMATS)}.")
     if path.stat().st_size == 0:
         raise SourceError(f"{path} is empty; download it again.")
-    require_modest(path)
+    check_compression_ratio(path)
     # The whole path, because libosmium takes "-" for standard input and "http:" for an address.
     return osmium.io.File(str(path.absolute()), kind)
 

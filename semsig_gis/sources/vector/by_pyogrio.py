@@ -52,7 +52,7 @@ pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
 
 @dataclass(frozen=True, slots=True)
-class Layer:
+class LayerDescription:
     """What GDAL says of a layer: kind of geometry, fields, CRS (empty if none), rows, bounds.
 
     `bounds` are west, south, east, north in the unit of the CRS, None where nothing has a geometry.
@@ -84,7 +84,7 @@ def _listening(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
             pyogrio.set_gdal_config_options({CRS_SEARCH: before})
 
 
-def describe(member: Member) -> Layer:
+def describe(member: Member) -> LayerDescription:
     """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind."""
     member.require_sound()
     try:
@@ -99,7 +99,7 @@ def describe(member: Member) -> Layer:
         raise unreadable(member, error) from error
     if info["driver"] != member.driver:
         raise not_of_its_kind(member)
-    return Layer(
+    return LayerDescription(
         geometry=info["geometry_type"] or NO_GEOMETRY,
         fields=tuple(info["fields"]),
         crs=info["crs"] or "",

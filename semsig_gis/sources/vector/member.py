@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.compression import bomb, swells
+from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.paths import require_file
 
 CSV = "CSV"
@@ -140,9 +140,9 @@ def _archived(path: Path) -> tuple[str, ...]:
         with zipfile.ZipFile(path) as archive:
             items = [item for item in archive.infolist() if not item.is_dir()]
             for item in items:
-                if swells(item.compress_size, item.file_size):
+                if ratio_too_high(item.compress_size, item.file_size):
                     what = f"{item.filename} in {path}"
-                    raise bomb(what)
+                    raise decompression_bomb_error(what)
             names = [item.filename for item in items]
             broken = archive.testzip()
     except SourceError:
