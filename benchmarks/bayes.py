@@ -24,7 +24,7 @@ from scipy.stats import norm
 from benchmarks._cities import MADE_UP, made_up, made_up_streets
 from benchmarks.views import DEGREES, NOISE
 from semsig_gis.core import FULL_TURN, signed_degrees, wilson_interval
-from semsig_gis.database import views_in
+from semsig_gis.database import visible_objects_in
 from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
 from semsig_gis.localization import LikelihoodLocator, build_index, database_tables
 from semsig_gis.observation import View
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Signature
-    from semsig_gis.database import SignatureDatabase, Views
+    from semsig_gis.database import SignatureDatabase, VisibleObjects
     from semsig_gis.evaluation import Query
     from semsig_gis.localization import NoiseTable
     from semsig_gis.observation import Photo
@@ -105,8 +105,8 @@ class ExactPosterior:
     database: SignatureDatabase
 
     @cached_property
-    def _views(self) -> Views:
-        return views_in(self.database, np.arange(len(self.database)))
+    def _views(self) -> VisibleObjects:
+        return visible_objects_in(self.database, np.arange(len(self.database)))
 
     @cached_property
     def _table(self) -> NoiseTable:

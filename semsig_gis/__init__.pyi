@@ -74,7 +74,7 @@ from .database.update import (
     update_file as update_file,
     update_tiles as update_tiles,
 )
-from .database.sightings import ViewpointSpec as ViewpointSpec
+from .database.viewpoints import ViewpointSpec as ViewpointSpec
 from .localization.distance.method import Method as Method
 from .localization.distance.scores import score_cells as score_cells
 from .localization.distance.search import Localization as Localization

@@ -26,7 +26,7 @@ from semsig_gis.core import (
     split_ids,
 )
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.database.viewpoints import ViewpointSpec
 from semsig_gis.storage import (
     geo_metadata,
     parse_json,

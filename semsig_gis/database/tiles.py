@@ -56,9 +56,8 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
-from semsig_gis.database.viewpoints import require_surroundings
+from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
 from semsig_gis.objects import open_objects, read_surroundings
 from semsig_gis.storage import (
     NOWHERE,

@@ -39,7 +39,7 @@ from semsig_gis.database.file import (
     read_manifest,
 )
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
-from semsig_gis.database.sightings import sightings
+from semsig_gis.database.sightings import measure_sightings
 from semsig_gis.database.store import save_with_store, stored_inputs
 from semsig_gis.database.tile_inputs import folder_beside
 from semsig_gis.database.tiles import (
@@ -538,7 +538,7 @@ def _cells_in_range(
     columns, rows = cells_near(places, grid=database.grid, radius=reach)
     viewpoints = database.grid.viewpoints(columns, rows)
     pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
-    near = np.unique(sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
+    near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
     return columns[near], rows[near]
 
 

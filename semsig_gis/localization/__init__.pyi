@@ -57,7 +57,6 @@ from .likelihood.locate import locate as locate
 from .likelihood.locate import locate_route as locate_route
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import views_aside as views_aside
-from .likelihood.photo import OMITTED_SHARE as OMITTED_SHARE
 from .likelihood.photo import PhotoTable as PhotoTable
 from .likelihood.photo import photo_loglik as photo_loglik
 from .likelihood.posterior import KEPT as KEPT

@@ -25,7 +25,7 @@ from semsig_gis.core import (
     nearest_name,
     wrap_degrees,
 )
-from semsig_gis.database import views_at
+from semsig_gis.database import visible_objects_at
 from semsig_gis.evaluation import CitySights, Sight, ready_chain
 from semsig_gis.evaluation import Detector as FailingDetector
 from semsig_gis.exports import export_answer
@@ -477,7 +477,7 @@ class Workbench:
         """Return what is seen from a place, or from the middle of its cell."""
         if self.store is None:
             return Sight.of_cell(self.database, cell)
-        views = views_at(
+        views = visible_objects_at(
             self.store.objects,
             place,
             index=self.store.index,

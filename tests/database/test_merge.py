@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
-    from semsig_gis.database import Mode
+    from semsig_gis.database import ViewpointMode
     from semsig_gis.objects import StreetObjects
 
 EAST = float(CORNER[0])
@@ -64,7 +64,7 @@ STREETS = surroundings(
 def city(
     objects: StreetObjects,
     path: Path,
-    mode: Mode,
+    mode: ViewpointMode,
     west: float,
     east: float,
     **specs: Any,  # noqa: ANN401
@@ -100,7 +100,7 @@ def objects() -> StreetObjects:
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
 @pytest.mark.parametrize(("end", "start"), [(200, 200), (230, 170), (120, 300), (400, 0)])
 def test_a_merger_is_built_from_both(
-    objects: StreetObjects, tmp_path: Path, mode: Mode, end: float, start: float
+    objects: StreetObjects, tmp_path: Path, mode: ViewpointMode, end: float, start: float
 ) -> None:
     west = city(objects, tmp_path / "west.parquet", mode, 0, end)
     east = city(objects, tmp_path / "east.parquet", mode, start, 400)
@@ -144,7 +144,7 @@ def test_tiles_are_merged_into_a_file(objects: StreetObjects, tmp_path: Path) ->
     assert_same(open_database(region), open_database(expected))
 
 
-def _whole(objects: StreetObjects, mode: Mode) -> tuple[Any, ObjectStore]:
+def _whole(objects: StreetObjects, mode: ViewpointMode) -> tuple[Any, ObjectStore]:
     around: dict[str, Any] = {
         "footprints": None if mode == "all" else HOUSES,
         "streets": STREETS if mode == "streets" else None,

@@ -50,7 +50,7 @@ from semsig_gis.objects import open_objects, read_surroundings, save_objects, sa
 
 if TYPE_CHECKING:
     from semsig_gis.core import SemsigError
-    from semsig_gis.database import Mode, Part, SignatureDatabase, TilePlan
+    from semsig_gis.database import Part, SignatureDatabase, TilePlan, ViewpointMode
 
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:
@@ -140,7 +140,7 @@ def houses_and_streets() -> dict[str, gpd.GeoDataFrame]:
     [("all", ".parquet"), ("outdoor", ".parquet"), ("streets", ".parquet"), ("streets", ".gpkg")],
 )
 def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
-    town: World, tmp_path: Path, mode: Mode, suffix: str
+    town: World, tmp_path: Path, mode: ViewpointMode, suffix: str
 ) -> None:
     # A lamp where there is no building and no street near.
     town = World((*town.objects, (CORNER[0] + 900, CORNER[1] + 900, CODES[0])))

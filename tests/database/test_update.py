@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     from worlds import World
 
-    from semsig_gis.database import Mode, SignatureDatabase, UpdateReport
+    from semsig_gis.database import SignatureDatabase, UpdateReport, ViewpointMode
     from semsig_gis.objects import Loaded, StreetObjects
 
 # Two classes that are seen from further than the others, and one from nearer.
@@ -164,7 +164,7 @@ def check_report(report: UpdateReport, before: SignatureDatabase, after: Signatu
 @example(seed=2, size=120, edits=[30], houses=True, mode="streets", area=True)
 @example(seed=11, size=250, edits=[20] * 10, houses=True, mode="streets", area=False)
 def test_an_update_is_a_rebuild(
-    *, seed: int, size: int, edits: list[int], houses: bool, mode: Mode, area: bool
+    *, seed: int, size: int, edits: list[int], houses: bool, mode: ViewpointMode, area: bool
 ) -> None:
     rng = np.random.default_rng(seed)
     table = random_table(rng, size)
@@ -200,7 +200,7 @@ def test_an_update_is_a_rebuild(
 
 
 @pytest.mark.parametrize("mode", ["outdoor", "streets"])
-def test_far_from_buildings_and_streets(mode: Mode) -> None:
+def test_far_from_buildings_and_streets(mode: ViewpointMode) -> None:
     rng = np.random.default_rng(3)
     town, hamlet = random_table(rng, 80), random_table(rng, 30)
     hamlet[["x", "y"]] += 2000.0
@@ -332,7 +332,9 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
 @example(seed=1, side=130.0, edits=3, mode="streets")
 @example(seed=2, side=130.0, edits=0, mode="all")
 @settings(max_examples=3)
-def test_an_update_of_tiles_is_a_rebuild(*, seed: int, side: float, edits: int, mode: Mode) -> None:
+def test_an_update_of_tiles_is_a_rebuild(
+    *, seed: int, side: float, edits: int, mode: ViewpointMode
+) -> None:
     rng = np.random.default_rng(seed)
     table = random_table(rng, 60)
     options: dict[str, Any] = {
@@ -474,7 +476,7 @@ def monaco(geodata: Path, year: int) -> Loaded:
 
 
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
-def test_a_year_in_monaco(geodata: Path, tmp_path: Path, mode: Mode) -> None:
+def test_a_year_in_monaco(geodata: Path, tmp_path: Path, mode: ViewpointMode) -> None:
     before, after = monaco(geodata, 2021), monaco(geodata, 2022)
     given: dict[str, Any] = {"footprints": before.buildings, "streets": before.streets}
     given = {} if mode == "all" else given

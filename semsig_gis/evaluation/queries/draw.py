@@ -22,7 +22,7 @@ from semsig_gis.core import (
     nearest_name,
     require_number,
 )
-from semsig_gis.database import views_at
+from semsig_gis.database import visible_objects_at
 from semsig_gis.evaluation.queries.distortion_text import ready_chain
 from semsig_gis.evaluation.queries.distortions import DISTORTIONS
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
@@ -223,7 +223,7 @@ def _seen(
         cells = cells[numbers.start : numbers.stop]
         return city.xy[cells], (Sight.of_cell(city, cell) for cell in cells.tolist())
     places = _places(city, cells, spec.number, seed, store)[numbers.start : numbers.stop]
-    views = views_at(
+    views = visible_objects_at(
         store.objects,
         places,
         index=store.index,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import SOURCE, SOURCE_ID, WILDCARD, Displayed, signed_degrees, wrap_degrees
-from semsig_gis.database import views_at, views_in
+from semsig_gis.database import visible_objects_at, visible_objects_in
 from semsig_gis.localization.likelihood.association import Detections, associate, near_pairs
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables, query_bearings
 from semsig_gis.observation import GRID_NORTH, Photo, View
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.core import ObjectIndex, Signature, Taxonomy
-    from semsig_gis.database import Footprints, SignatureDatabase, Views
+    from semsig_gis.database import Footprints, SignatureDatabase, VisibleObjects
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.objects import StreetObjects
     from semsig_gis.observation import North
@@ -152,7 +152,7 @@ def explain(
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
-    view = views_at(objects, place, index=index, radius=radius, footprints=footprints)
+    view = visible_objects_at(objects, place, index=index, radius=radius, footprints=footprints)
     codes = np.flatnonzero(np.bincount(objects.codes)).astype(np.uint8)
     scene = _Scene((x, y), view, codes, objects.taxonomy, objects.crs, radius, objects)
     return scene.explanation(query, noise, heading)
@@ -172,7 +172,7 @@ def explain_cell(
     ``source`` and ``source_id`` are missing, and places of objects are good to some decimetres.
     """
     x, y = database.xy[cell].tolist()
-    view = views_in(database, np.array([cell]))
+    view = visible_objects_in(database, np.array([cell]))
     codes, radius = database.present_codes, database.spec.radius
     scene = _Scene((x, y), view, codes, database.taxonomy, database.crs, radius)
     return scene.explanation(query, noise, heading)
@@ -196,7 +196,7 @@ class _Scene:
     """What is seen from a place, of the classes that the city has."""
 
     xy: tuple[float, float]
-    view: Views
+    view: VisibleObjects
     codes: NDArray[np.uint8]
     taxonomy: Taxonomy
     crs: CRS

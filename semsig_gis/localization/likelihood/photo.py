@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database import Views
+    from semsig_gis.database import VisibleObjects
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.observation import View
 
 PLACES_A_PART = 32  # that are worth a thread
 FIRST = 128  # places of which the others must not stay too far behind
-OMITTED_SHARE = 3e-3  # of a sum, that all terms together may be off which are not worked out
+LOST = 3e-3  # of a sum, that all terms together may be off which are not worked out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -116,7 +116,7 @@ class PhotoTable:
 
 def photo_loglik(
     photo: PhotoTable,
-    views: Views,
+    views: VisibleObjects,
     tables: Sequence[NoiseTable],
     weights: NDArray[np.float64],
     *,
@@ -130,7 +130,7 @@ def photo_loglik(
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
     So many places after each other are a `group`, of which only the sum is needed, with a
     `log_prior` of places and turns; or only the `whole` sum is, and likely places come first. What
-    is next to nothing in it (`OMITTED_SHARE`) is not worked out: it gets a bound of its likelihood.
+    is next to nothing in it (`LOST`) is not worked out: it gets a bound of its likelihood.
     """
     from semsig_gis.localization.likelihood.association_kernels import align  # noqa: PLC0415 - numba loads slowly
 
@@ -149,7 +149,7 @@ def photo_loglik(
     work = partial(
         align,
         group=group,
-        margin=math.log(summed / OMITTED_SHARE),
+        margin=math.log(summed / LOST),
         log_weights=np.log(weights),
         log_prior=prior,
         offsets=views.offsets,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core import Displayed, InputError, cell_ids, percent, signed_degrees
-from semsig_gis.database import views_at
+from semsig_gis.database import visible_objects_at
 from semsig_gis.localization.likelihood.association import turn_logs
 from semsig_gis.localization.likelihood.index import own_sigma
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
@@ -392,7 +392,9 @@ def refine(
         parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
         prior, turned = np.repeat(prior, 4), np.repeat(turned, 4, axis=1)
         size /= 2.0
-        views = views_at(objects, parts, index=index, radius=radius, footprints=footprints)
+        views = visible_objects_at(
+            objects, parts, index=index, radius=radius, footprints=footprints
+        )
         wide = [
             replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
             for table in tables

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Signature, Taxonomy
-    from semsig_gis.database import Views
+    from semsig_gis.database import VisibleObjects
     from semsig_gis.localization.likelihood.association import Association, Pairs
 
 
@@ -69,7 +69,7 @@ class Evidence:
 
     names: list[str]
     start: NoiseTable
-    views: Views
+    views: VisibleObjects
     seen: Detections
     pairs: Pairs
 
@@ -129,7 +129,7 @@ class Counts:
 
 
 def gather_evidence(
-    views: Views,
+    views: VisibleObjects,
     detected: Sequence[Signature],
     *,
     taxonomy: Taxonomy,

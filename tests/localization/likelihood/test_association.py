@@ -26,9 +26,8 @@ from view_oracle import bearing_density, cell_loglik, random_view
 from worlds import CODES, World, random_town
 
 from semsig_gis.core import ObjectIndex, Signature
-from semsig_gis.database import views_in
+from semsig_gis.database import visible_objects_in
 from semsig_gis.localization import (
-    OMITTED_SHARE,
     Detections,
     NoiseMixture,
     NoiseSpec,
@@ -49,6 +48,7 @@ from semsig_gis.localization import (
     rerank,
     views_aside,
 )
+from semsig_gis.localization.likelihood.photo import LOST
 from semsig_gis.observation import FULL_VIEW, Photo, View
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def test_pairs_weigh_as_one_at_a_time(seed: int, size: int, noise: NoiseSpec, si
     database = random_database(seed)
     query = random_query(database, seed, size=size)
     (table,), _ = database_tables(database, noise)
-    views, starts = views_in(database, np.array([0])), np.array([0, size])
+    views, starts = visible_objects_in(database, np.array([0])), np.array([0, size])
     pairs = near_pairs(views.offsets, views.bearings, starts, query_bearings(query))
     found = associated_views(database, query, noise)
     weights = slow_weights(table, database, query, 0)
@@ -178,7 +178,7 @@ def associated_views(
     """Associate what the photos of a query show with what the first cell sees."""
     (table,), _ = database_tables(database, noise)
     seen = Detections.of([query], table)
-    views = views_in(database, np.zeros(len(seen.photos), np.int64))
+    views = visible_objects_in(database, np.zeros(len(seen.photos), np.int64))
     return associate(
         table,
         views,
@@ -312,7 +312,7 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
             np.logaddexp.reduce((one + prior).reshape(-1, many * turns.shape[1]), axis=1)
             for one in (bounds, whole)
         )
-        assert sums == pytest.approx(expected, abs=OMITTED_SHARE)
+        assert sums == pytest.approx(expected, abs=LOST)
 
 
 def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:

@@ -15,7 +15,7 @@ from noisy_cells import database_of, noisy_town, parts_of, random_database, turn
 from worlds import CODES, CORNER, World, random_town
 
 from semsig_gis.core import ObjectIndex, Signature
-from semsig_gis.database import Footprints, ObjectStore, views_at
+from semsig_gis.database import Footprints, ObjectStore, visible_objects_at
 from semsig_gis.localization import (
     AnswerRule,
     NoiseSpec,
@@ -51,7 +51,7 @@ PLACE = CORNER + np.array([103.0, 97.0])
 
 def seen_from(xy: np.ndarray, *, objects: StreetObjects = STORE.objects) -> Signature:
     """Return what there is to see from a place, without a mistake."""
-    view = views_at(objects, xy[None], index=ObjectIndex(objects.xy), radius=30.0)
+    view = visible_objects_at(objects, xy[None], index=ObjectIndex(objects.xy), radius=30.0)
     return Signature(view.codes, view.bearings)
 
 

@@ -15,7 +15,7 @@ from sentences import refused
 from worlds import CODES, World
 
 from semsig_gis.core import InputError, Signature, wilson_interval
-from semsig_gis.database import views_in
+from semsig_gis.database import visible_objects_in
 from semsig_gis.localization import (
     ALL,
     Sample,
@@ -68,7 +68,7 @@ def detector(seed: int, seen: list[tuple[int, float]]) -> Signature:
 
 
 def simulated(database: SignatureDatabase, count: int, *, seed: int = 0) -> list[Sample]:
-    views = views_in(database, np.arange(len(database)))
+    views = visible_objects_in(database, np.arange(len(database)))
     samples = []
     for number in range(count):
         cell = number % len(database)
@@ -227,7 +227,7 @@ def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
 def photographed(count: int, *, seed: int = 0) -> NoiseEstimate:
     """Learn from photos from the cells of a random city."""
     database = random_database(seed, cells=100, longest=14)
-    views = views_in(database, np.arange(len(database)))
+    views = visible_objects_in(database, np.arange(len(database)))
     samples = []
     for number in range(count):
         cell = number % len(database)
@@ -321,7 +321,7 @@ def test_counts_add_up(seed: int) -> None:
         query = random_query(database, seed + cell, size=cell % 7)
         codes, bearings = parts_of(query)
         detected.append(Signature(codes[codes > 0], bearings[codes > 0]))
-    views = views_in(database, np.arange(20))
+    views = visible_objects_in(database, np.arange(20))
     evidence = gather_evidence(views, detected, taxonomy=TAXONOMY, position_sigma=2.0)
     model = evidence.start
     counts = expected_counts(evidence, model)
@@ -341,7 +341,9 @@ def test_rounds_raise_the_likelihood() -> None:
     database = random_database(3, cells=60, longest=5)
     rng = np.random.default_rng(0)
     detected = [distorted(database, cell, rng) for cell in range(60)]
-    evidence = gather_evidence(views_in(database, np.arange(60)), detected, taxonomy=TAXONOMY)
+    evidence = gather_evidence(
+        visible_objects_in(database, np.arange(60)), detected, taxonomy=TAXONOMY
+    )
     model = evidence.start
     before = -math.inf
     for _ in range(8):
@@ -356,7 +358,7 @@ def test_rounds_raise_the_likelihood() -> None:
 
 def test_where_every_association_is_certain_the_intervals_are_the_text_books() -> None:
     database = random_database(0, cells=300, longest=1, classes=1)
-    views = views_in(database, np.arange(300))
+    views = visible_objects_in(database, np.arange(300))
     seen = [
         Signature(views.codes[[row]], (views.bearings[[row]] + 1.0 - 2.0 * (row % 2)) % 360)
         if row % 10

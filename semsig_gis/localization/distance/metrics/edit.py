@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database import SequenceTable
+    from semsig_gis.database.sequences import SequenceTable
 
 STRIPE = 64  # words in a plane: enough work for a loop, little enough for the nearest cache
 BLOCK = 64 * STRIPE
