@@ -332,7 +332,7 @@ def sources(
 
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]
-        readers = sorted({*READERS, *installed_readers(taken=READERS)})
+        readers = sorted({*READERS, *installed_readers(reserved=READERS)})
         if as_json:
             print_json({"catalogs": [_listed(c) for c in catalogs], "readers": readers})
             return

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import HALF_DONE, InputError, is_abandoned, remove_abandoned
+from semsig_gis.core import TEMPORARY_PREFIX, InputError, is_abandoned, remove_abandoned
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import store_path, waiting_store
 from semsig_gis.storage import alone_in, reason
@@ -97,7 +97,7 @@ def _found(city: City) -> Iterator[tuple[Path, str]]:
     for name in sorted({str(city.path.absolute()), str(file)}):  # a link had its own
         for index in sorted(glob.glob(f"{glob.escape(name)}.*.likelihood")):  # noqa: PTH207
             yield Path(index), INDEX
-    for folder in sorted(file.parent.glob(f"{HALF_DONE}*")):
+    for folder in sorted(file.parent.glob(f"{TEMPORARY_PREFIX}*")):
         if folder.is_dir():
             yield folder, LEFT if is_abandoned(folder) else AT_WORK
 

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core import HALF_WIDTH, SourceError, own_folder
+from semsig_gis.core import HALF_WIDTH, SourceError, temporary_folder
 from semsig_gis.database.file import INPUTS, digest
 from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
 from semsig_gis.storage import CHECKING_PAGES, NOWHERE, whole_file
@@ -56,7 +56,7 @@ def folder_beside(out: str | Path) -> Iterator[Path]:
     """Give a folder beside a result, for what its workers read; it is removed after the block."""
     parent = Path(os.path.realpath(out)).parent
     parent.mkdir(parents=True, exist_ok=True)
-    with own_folder(parent) as folder:
+    with temporary_folder(parent) as folder:
         yield folder
 
 

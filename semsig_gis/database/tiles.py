@@ -20,8 +20,8 @@ import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core import (
-    HALF_DONE,
     MOST_METRES,
+    TEMPORARY_PREFIX,
     DatabaseError,
     EmptyResultError,
     GridSpec,
@@ -269,7 +269,7 @@ def build_parts(
         failed = finish_tasks(
             work,
             left,
-            done=note_part,
+            on_success=note_part,
             workers=workers,
             scheduler=scheduler,
             files=[*filter(None, (plan.folder, plan.objects, plan.buildings, plan.streets))],
@@ -525,7 +525,7 @@ def _require_replaceable(target: Path) -> None:
         if target.exists() and not target.is_file():
             raise InputError(f"{target} is a device or a pipe; give the name of a folder to write.")
         return
-    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
+    others = {path.name for path in target.iterdir() if not path.name.startswith(TEMPORARY_PREFIX)}
     if MANIFEST in others:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:

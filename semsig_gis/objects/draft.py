@@ -25,8 +25,8 @@ from semsig_gis.core import (
     ObjectClass,
     SemsigError,
     SourceError,
-    own_folder,
     require_metric_crs,
+    temporary_folder,
 )
 from semsig_gis.objects.guesses import (
     VECTOR,
@@ -161,7 +161,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
 
 def _require_loads(text: str, path: Path) -> None:
     """Refuse a draft by which its own file does not load, with what a load says of it."""
-    with own_folder(Path(tempfile.gettempdir())) as folder:
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
         file.write_text(text, encoding="utf-8")
         try:

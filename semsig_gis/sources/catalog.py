@@ -170,7 +170,7 @@ def catalog_names() -> tuple[str, ...]:
 def _sources() -> dict[str, Path | Traversable]:
     """Return the file of every catalogue by name."""
     shipped = _shipped()
-    return {**shipped, **installed_catalogs(taken=shipped)}
+    return {**shipped, **installed_catalogs(reserved=shipped)}
 
 
 def _shipped() -> dict[str, Path | Traversable]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core import HALF_DONE, InputError, own_folder, remove_abandoned
+from semsig_gis.core import TEMPORARY_PREFIX, InputError, remove_abandoned, temporary_folder
 from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import put_in_place, reason, write_whole
 
@@ -83,7 +83,7 @@ class RunKind:
             raise InputError(
                 f"{folder} cannot be read ({reason(error)}); choose another folder."
             ) from error
-        return {name for name in names if not name.startswith(HALF_DONE)}
+        return {name for name in names if not name.startswith(TEMPORARY_PREFIX)}
 
     def _read(self, folder: Path, entries: set[str]) -> Recipe:
         try:
@@ -134,7 +134,7 @@ def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
             for path in folder.iterdir():
                 if path.name not in keep:
                     _remove(path)
-            with own_folder(target.parent) as box:
+            with temporary_folder(target.parent) as box:
                 put_in_place(folder, target, box=box)
     except OSError as error:
         raise InputError(

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core import ASIDE, InputError, locked, own_folder
+from semsig_gis.core import BACKUP_FOLDER, InputError, locked, temporary_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,7 +31,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     with contextlib.ExitStack() as stack:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            folder = stack.enter_context(own_folder(target.parent))
+            folder = stack.enter_context(temporary_folder(target.parent))
         except OSError as error:
             raise InputError(
                 f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
@@ -81,7 +81,7 @@ def _box(target: Path) -> Iterator[Path]:
     """Give a temporary folder beside a folder that is being written."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with own_folder(target.parent) as box:
+        with temporary_folder(target.parent) as box:
             yield box
     except OSError as error:
         raise InputError(
@@ -96,7 +96,7 @@ def put_in_place(new: Path, place: Path, *, box: Path) -> None:
     The place is never empty where the system lets two folders change places. Else a run that is
     killed in between leaves the old one aside, from where `remove_abandoned` puts it back.
     """
-    aside = box / ASIDE / place.name
+    aside = box / BACKUP_FOLDER / place.name
     aside.parent.mkdir()
     if exchanged(new, place):
         new.rename(aside)

@@ -166,4 +166,4 @@ def test_a_name_that_is_taken_is_an_error(install: Callable[..., None]) -> None:
     with refused(CatalogError, "'city'", "by north and by south", "uninstall"):
         installed_catalogs()
     with refused(SourceError, "'osm_file'", "semsig_gis itself", "by east"):
-        installed_readers(taken=["osm_file"])
+        installed_readers(reserved=["osm_file"])

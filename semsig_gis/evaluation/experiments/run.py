@@ -539,7 +539,7 @@ def _answer(
     failed = finish_tasks(
         answer,
         list(sizes),
-        done=count_answers,
+        on_success=count_answers,
         workers=workers,
         scheduler=scheduler,
         files=[work.folder.resolve() / work.spec.database for work, _ in running.values()],

@@ -16,7 +16,7 @@ import shapely
 from osmium.filter import KeyFilter
 from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
-from semsig_gis.core import HALF_TURN, CatalogError, SourceError, own_folder
+from semsig_gis.core import HALF_TURN, CatalogError, SourceError, temporary_folder
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import check_compression_ratio
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
@@ -115,7 +115,7 @@ def _as_one(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[o
     if len(files) == 1:
         yield from files.values()
         return
-    with own_folder(Path(tempfile.gettempdir())) as folder:
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
         yield merge_extracts(files, index, folder / "merged.opl")
 
 

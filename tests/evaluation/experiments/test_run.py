@@ -20,7 +20,7 @@ from pandas.testing import assert_frame_equal
 from sentences import refused
 from worlds import CORNER, TOWN, World, contents, save_town
 
-from semsig_gis.core import MACHINE, DatabaseError, InputError, SemsigError
+from semsig_gis.core import MACHINE_PREFIX, DatabaseError, InputError, SemsigError
 from semsig_gis.evaluation import (
     Districts,
     ExperimentWork,
@@ -258,7 +258,7 @@ def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_p
     first, second, *_ = sorted(parts.iterdir())
     first.write_bytes(first.read_bytes()[:-50])
     pd.read_parquet(second).iloc[1:].to_parquet(second)
-    (parts / f"{MACHINE}left").mkdir()
+    (parts / f"{MACHINE_PREFIX}left").mkdir()
     run_to_the_end(folder, tmp_path, results)
 
 
