@@ -93,7 +93,7 @@ def build(
     from semsig_gis.core import GridSpec, SignatureSpec
     from semsig_gis.database import ViewpointSpec, open_city
     from semsig_gis.objects import open_objects, read_area
-    from semsig_gis.storage import NOWHERE
+    from semsig_gis.storage import EMPTY_BOX
 
     if streets is not None and viewpoints != "streets":
         raise InputError("--streets is used only with --viewpoints streets; give both or neither.")
@@ -106,7 +106,7 @@ def build(
             width=street_width / 2,
             area=None
             if area is None
-            else read_area(area, crs=open_objects(objects, box=NOWHERE).crs),
+            else read_area(area, crs=open_objects(objects, box=EMPTY_BOX).crs),
         ),
     }
     if tile is None and not workers and scheduler is None:

@@ -21,6 +21,7 @@ import typer
 
 from semsig_gis import __version__
 from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, DatabaseError, InputError, visible
+from semsig_gis.localization import METRIC_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -303,7 +304,7 @@ MethodText = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help="Rank by likelihood, or by distance as TYPES+ANGLES (edit, histogram, jaccard), "
+        help=f"Rank by likelihood, or by distance as TYPES+ANGLES ({', '.join(METRIC_NAMES)}), "
         "types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
         f":weights=INSERT/DELETE/SUBSTITUTE.  [default: {DEFAULT_METHOD}]",
         show_default=False,

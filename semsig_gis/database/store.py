@@ -42,7 +42,7 @@ from semsig_gis.database.viewpoints import reproject, select_elements
 from semsig_gis.objects import licenses_of, open_objects, save_objects
 from semsig_gis.storage import (
     UNREADABLE,
-    alone_in,
+    folder_locked,
     move_folder,
     parse_json,
     read_whole,
@@ -201,7 +201,7 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
                 raise InputError(str(error).replace(str(partial), str(path))) from error
             new = partial.with_name(final.name)
             _write(store, new, fingerprint=digest(partial))
-            stack.enter_context(alone_in(final.parent))
+            stack.enter_context(folder_locked(final.parent))
             _settle(Path(path))  # what waits there may be needed until the new database is in place
             move_folder(new, _waiting(final))
         move_folder(_waiting(final), final)
@@ -391,7 +391,7 @@ def current_store(database: Path) -> Path:
     final = store_path(database)
     if not _awaited(database):
         return final
-    with contextlib.suppress(InputError), alone_in(final.parent) as alone:
+    with contextlib.suppress(InputError), folder_locked(final.parent) as alone:
         if alone:
             _settle(database)
     return _waiting(final) if _awaited(database) else final

@@ -60,10 +60,10 @@ from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, 
 from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
 from semsig_gis.objects import open_objects, read_surroundings
 from semsig_gis.storage import (
-    NOWHERE,
+    EMPTY_BOX,
     PARTIAL,
     RunKind,
-    each_bounds,
+    bounds_by_group,
     finish,
     partial_folder,
     read_json,
@@ -368,7 +368,7 @@ def plan_tiles(
     places: dict[Input, str | Path | None]
     places = {"objects": objects, "buildings": buildings, "streets": along}
     paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
-    nothing = open_objects(paths["objects"], box=NOWHERE)
+    nothing = open_objects(paths["objects"], box=EMPTY_BOX)
     reach = float(nothing.taxonomy.ranges(spec.radius).max())
     require_step(grid, reach)
     require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
@@ -417,7 +417,7 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
             f"at least {reach / MOST_REACHED:g} m."
         )
     objects: Counter[int] = Counter()
-    for bounds in each_bounds(path):
+    for bounds in bounds_by_group(path):
         widened = bounds + np.array([-reach, -reach, reach, reach])
         places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
         boxes, count = np.unique(places, axis=0, return_counts=True)

@@ -5,10 +5,11 @@ from .answers import Answer as Answer
 from .answers import Ranking as Ranking
 from .distance.memo import DistanceMemo as DistanceMemo
 from .distance.method import Method as Method
+from .distance.metric_names import METRIC_NAMES as METRIC_NAMES
 from .distance.metrics import METRICS as METRICS
 from .distance.metrics import Distances as Distances
 from .distance.metrics import metric as metric
-from .distance.metrics.edit import BLOCK as BLOCK
+from .distance.metrics.edit import BLOCK_SEQUENCES as BLOCK_SEQUENCES
 from .distance.metrics.edit import BitPlanes as BitPlanes
 from .distance.metrics.edit import EditWeights as EditWeights
 from .distance.scores import score_cells as score_cells

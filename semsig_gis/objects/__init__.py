@@ -1,4 +1,4 @@
-"""Raw layers become one clean table of street objects."""
+"""Load raw layers into one checked table of street objects."""
 
 import lazy_loader
 

@@ -27,7 +27,13 @@ from semsig_gis.sources import (
     reader,
 )
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.storage import CHECKED_PAGES, GROUP_ROWS, hilbert_order, seal, whole_file
+from semsig_gis.storage import (
+    GROUP_ROWS,
+    WRITE_CHECKSUMS,
+    add_footer_checksum,
+    hilbert_order,
+    whole_file,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -74,9 +80,9 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
             schema_version="1.1.0",
             write_covering_bbox=True,
             row_group_size=GROUP_ROWS,
-            **CHECKED_PAGES,
+            **WRITE_CHECKSUMS,
         )
-        seal(partial)
+        add_footer_checksum(partial)
 
 
 def read_surroundings(

@@ -1,4 +1,4 @@
-"""The way between two places of a route."""
+"""Legs: the displacements between the places of a route."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MOST_SIGMA_M = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
-    """The way from one place of a route to the next.
+    """The displacement from one place of a route to the next.
 
     Parameters
     ----------

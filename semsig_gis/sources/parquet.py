@@ -11,7 +11,7 @@ import shapely
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.paths import require_file
-from semsig_gis.storage import CHECKING_PAGES, UNREADABLE, require_intact
+from semsig_gis.storage import UNREADABLE, VERIFY_CHECKSUMS, check_footer_checksum
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -44,14 +44,14 @@ def read_parquet(
     """
     require_file(path, f"a file of {kind}")
     try:
-        require_intact(path)
+        check_footer_checksum(path)
         names = None
         if columns is not None:
             schema = pq.read_schema(path)
             geometry = json.loads(schema.metadata[b"geo"])["primary_column"]
             names = [name for name in schema.names if name in columns or name == geometry]
         return gpd.read_parquet(
-            path, columns=names, bbox=None if box is None else tuple(box), **CHECKING_PAGES
+            path, columns=names, bbox=None if box is None else tuple(box), **VERIFY_CHECKSUMS
         )
     except shapely.errors.ShapelyError as error:
         cause = str(error).partition(": ")[2] or str(error)

@@ -1,4 +1,4 @@
-"""Files that appear whole, runs that resume, tables that carry their specs."""
+"""Atomic files and folders, resumable runs, GeoParquet, rasters, TOML and rows of text."""
 
 import lazy_loader
 

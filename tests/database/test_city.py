@@ -407,7 +407,7 @@ def test_what_waits_for_its_database_is_put_in_its_place(
     waiting = stored.with_name("city.objects.next")
     store_path(stored).rename(waiting)
     with monkeypatch.context() as patch:  # where nobody knows who else does so
-        patch.setattr(store_module, "alone_in", lambda _: nullcontext(enter_result=False))
+        patch.setattr(store_module, "folder_locked", lambda _: nullcontext(enter_result=False))
         assert_fits(open_store(stored), TOWN)
         assert City(stored).store_path == waiting
     with monkeypatch.context() as patch:

@@ -390,7 +390,7 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
         return rename(self, to)
 
     with monkeypatch.context() as patch:
-        patch.setattr("semsig_gis.storage.whole.exchanged", lambda *_: False)
+        patch.setattr("semsig_gis.storage.whole.exchange", lambda *_: False)
         patch.setattr(Path, "rename", refuse)
         with refused(InputError, str(target), "Permission denied", "run the same command again"):
             publish(folder, [part])

@@ -36,14 +36,14 @@ from semsig_gis.evaluation.scoring import (
 from semsig_gis.evaluation.spec import Case, parse_experiment
 from semsig_gis.localization import DistanceMemo, make_locator
 from semsig_gis.storage import (
-    CHECKING_PAGES,
+    VERIFY_CHECKSUMS,
     RunKind,
+    add_footer_checksum,
+    check_footer_checksum,
     finish,
     partial_folder,
     read_json,
     read_text,
-    require_intact,
-    seal,
     toml_text,
     whole_file,
     write_json,
@@ -262,7 +262,7 @@ class ExperimentWork:
             for name, scored in self._scored(names, queries):
                 with whole_file(missing[name]) as half:
                     scored.to_parquet(half, write_page_checksum=True)
-                    seal(half)
+                    add_footer_checksum(half)
 
     def _scored(
         self, names: Sequence[str], queries: Sequence[Query]
@@ -303,7 +303,7 @@ class ExperimentWork:
         for distortion, method in product(self.spec.distortions, self.spec.methods):
             parts = [part for part in self.parts if part.distortion == distortion]
             files = [_part_file(place, part, method) for part in parts]
-            tables = [pq.read_table(file, **CHECKING_PAGES) for file in files]
+            tables = [pq.read_table(file, **VERIFY_CHECKSUMS) for file in files]
             scored = pa.concat_tables(tables, promote_options="default").to_pandas()
             for top in self.spec.top:
                 case = Case(distortion=distortion, method=method, top=top)
@@ -355,8 +355,8 @@ def _is_whole(file: Path, *, rows: int) -> bool:
     if not file.is_file():
         return False
     try:
-        require_intact(file)
-        return bool(pq.read_table(file, **CHECKING_PAGES).num_rows == rows)
+        check_footer_checksum(file)
+        return bool(pq.read_table(file, **VERIFY_CHECKSUMS).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False
 
