@@ -88,9 +88,9 @@ from .probe import probe_file as probe_file
 from .rows import LATITUDE_LIMIT as LATITUDE_LIMIT
 from .rows import LONGITUDE_LIMIT as LONGITUDE_LIMIT
 from .rows import WGS84 as WGS84
+from .rows import FilteredRows as FilteredRows
 from .rows import RowRules as RowRules
 from .rows import Rows as Rows
-from .rows import Sifted as Sifted
 from .rows import fits_the_globe as fits_the_globe
 from .rows import off_the_globe as off_the_globe
 from .rows import raw_layer as raw_layer

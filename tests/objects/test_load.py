@@ -96,9 +96,9 @@ def test_the_classes_of_the_paper_are_not_taken_from_others() -> None:
         rows.read += 1
         rows.add([text], text, (0.0, 0.0))
     assert own.classes == ("taxi_station",)
-    sifted = rules.sift(rows)
-    assert sifted.table["source_id"].tolist() == ["Taxi"]
-    assert sifted.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
+    filtered = rules.apply(rows)
+    assert filtered.table["source_id"].tolist() == ["Taxi"]
+    assert filtered.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
 
 
 def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None:

@@ -309,7 +309,7 @@ def test_rows_of_one_id_that_are_apart_are_told(read_as: Read) -> None:
     assert xy(layer) == [(2.1, 48.1), (2.0, 48.0)]
     assert (layer.counts.filtered, layer.counts.duplicates) == (1, 2)
     assert layer.notes == (
-        "1 rows have the id of a row that stands elsewhere; the first one's place is used",
+        "1 rows have the id of a row at another place; the place of the first row is used",
     )
 
 
