@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import HALF_TURN
+from semsig_gis.core import HALF_TURN, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

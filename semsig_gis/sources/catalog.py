@@ -9,20 +9,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
+    MAX_HEIGHT_M,
+    MAX_RANGE_M,
     CatalogError,
     CrsError,
+    Displayed,
     InputError,
+    ObjectClass,
+    Taxonomy,
     UnknownNameError,
+    installed_catalogs,
     nearest_name,
+    require_metric_crs,
 )
-from semsig_gis.core.geometry import require_metric_crs
-from semsig_gis.core.plugins import installed_catalogs
-from semsig_gis.core.taxonomy import MAX_HEIGHT_M, MAX_RANGE_M, ObjectClass, Taxonomy
 from semsig_gis.sources.layer_spec import conditions_of, layer_of, require_class
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import check_keys, metres, parse_toml, texts
+from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

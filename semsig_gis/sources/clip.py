@@ -12,8 +12,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
+from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING
 
 from charset_normalizer import from_bytes
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -8,8 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.core.plugins import installed_readers
+from semsig_gis.core import SourceError, UnknownNameError, installed_readers, nearest_name
 from semsig_gis.sources.osm import features
 from semsig_gis.sources.paths import files_in
 from semsig_gis.sources.probe import probe_file

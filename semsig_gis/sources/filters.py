@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import CatalogError
+from semsig_gis.core import CatalogError
 from semsig_gis.sources.numbers import decimal
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.core.display import Displayed
+from semsig_gis.core import Displayed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

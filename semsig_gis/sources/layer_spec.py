@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import (
-    CatalogError,
-    UnknownNameError,
-)
+from semsig_gis.core import CatalogError, UnknownNameError
 from semsig_gis.sources.filters import COMPARES, Condition, Value
-from semsig_gis.storage.toml import check_keys, metres, one_of, texts
+from semsig_gis.storage import check_keys, metres, one_of, texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
     from semsig_gis.sources.filters import Rules
 
 

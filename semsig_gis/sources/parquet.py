@@ -9,9 +9,9 @@ import geopandas as gpd
 import pyarrow.parquet as pq
 import shapely
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.paths import require_file
-from semsig_gis.storage.geoparquet import UNREADABLE, VERIFY_CHECKSUMS, check_footer_checksum
+from semsig_gis.storage import UNREADABLE, VERIFY_CHECKSUMS, check_footer_checksum
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

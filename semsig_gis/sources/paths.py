@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -17,8 +17,17 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
-from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, NAME, SOURCE_ID, crs_label
+from semsig_gis.core import (
+    CLASS_NAME,
+    GEOMETRY,
+    HALF_WIDTH,
+    NAME,
+    SOURCE_ID,
+    CatalogError,
+    CrsError,
+    crs_label,
+    nearest_name,
+)
 from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
 from semsig_gis.sources.layer import RawLayer, RowCounts
 from semsig_gis.sources.layer_spec import MAX_WIDTH_M, MIN_WIDTH_M

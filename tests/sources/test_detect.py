@@ -12,9 +12,8 @@ import shapely
 from osm_xml import street_town, write_osm
 from sentences import refused, sentence
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.detect import detect_catalogs
-from semsig_gis.sources.probe import probe_file
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import detect_catalogs, probe_file
 
 if TYPE_CHECKING:
     from pathlib import Path

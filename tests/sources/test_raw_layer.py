@@ -14,14 +14,15 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError
-from semsig_gis.core.geometry import crs_label
-from semsig_gis.sources import reader
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec, WidthBy
-from semsig_gis.sources.rows import (
+from semsig_gis.core import CatalogError, crs_label
+from semsig_gis.sources import (
+    ClassBy,
+    LayerSpec,
     RowRules,
     Rows,
+    WidthBy,
     off_the_globe,
+    reader,
     usable_crs,
 )
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from semsig_gis.sources.rows import FilteredRows
+    from semsig_gis.sources import FilteredRows
 
 
 DATA = Path(__file__).with_name("data")

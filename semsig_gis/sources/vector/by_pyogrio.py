@@ -16,7 +16,7 @@ import pyogrio
 import shapely
 from pyogrio.raw import open_arrow, read
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.rows import Rows
 from semsig_gis.sources.vector.member import (

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import crs_label
+from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.rows import (
     WGS84,
@@ -33,7 +32,7 @@ from semsig_gis.sources.vector.by_pyogrio import (
     read_whole,
 )
 from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.paths import require_file
 
@@ -20,7 +20,7 @@ GEOJSON = "GeoJSON"
 SHAPEFILE = "ESRI Shapefile"
 CONTAINER = "GPKG"  # the only driver with several layers in a file
 # The only drivers that may open a file: GDAL has about 80, and some of them follow links.
-DRIVERS = {
+DRIVERS: dict[str, str] = {
     ".csv": CSV,
     ".fgb": "FlatGeobuf",
     ".geojson": GEOJSON,

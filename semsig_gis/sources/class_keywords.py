@@ -9,14 +9,13 @@ import unicodedata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import UnknownNameError, nearest_name
-from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
 from semsig_gis.sources.catalog import data_folder, load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
 # Word boundaries in camel case, such as ArbresAlign and WCPublic.
 CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
