@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 import shapely
 
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.services.gml import parse_xml
+from semsig_gis.sources import LayerSpec, parse_xml
 from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:

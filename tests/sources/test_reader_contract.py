@@ -12,9 +12,8 @@ import pytest
 import shapely
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.sources import mapillary, overture
-from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.core import CrsError, SourceError
+from semsig_gis.sources import LayerSpec, mapillary, overture
 from semsig_gis.sources.osm import features, file, overpass
 from semsig_gis.sources.services import layers as services
 
