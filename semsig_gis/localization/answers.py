@@ -11,12 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import LICENSES, to_degrees
-from semsig_gis.core.presentation import plot_with
-from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.view import View
+from semsig_gis.core import LICENSES, Displayed, InputError, plot_with, to_degrees
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,11 +22,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.display import Axes
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.observation.north import North
+    from semsig_gis.core import Axes, Signature, Taxonomy
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.observation import North
 
 
 REGION_SHARE = 0.9

@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, Unpack,
 
 import numpy as np
 
-from semsig_gis.core.defaults import DEFAULT_METHOD, LIKELIHOOD
-from semsig_gis.database.city import City
-from semsig_gis.database.database import join_databases
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD
+from semsig_gis.database import City, PartitionedDatabase, join_databases
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import NOISES, cell_noise
-from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.answers import Ranking
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
@@ -32,10 +30,11 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.method import LikelihoodMethod
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.requirement import Requirement
-    from semsig_gis.observation.north import North
+    from semsig_gis.observation import North
 
-    AnyMethod: TypeAlias = Method | LikelihoodMethod
     Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
+
+AnyMethod: TypeAlias = "Method | LikelihoodMethod"
 
 # Imports of one kind of method are in functions: they take 0.1 s for each kind, and a process
 # answers by one of them.

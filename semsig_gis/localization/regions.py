@@ -10,16 +10,14 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.text import percent
+from semsig_gis.core import Displayed, InputError, percent
 from semsig_gis.localization.answers import REGION_SHARE
 from semsig_gis.localization.likelihood.posterior import Posterior
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.answers import Answer
 
 CHANCES = ["chance", "searched_chance"]  # columns of the likelihood method only

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core import WILDCARD, InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import SequenceTable
 
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
 _AMOUNT = re.compile(r"(\d*)\s*(\S)")

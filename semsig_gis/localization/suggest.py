@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import ObjectClass
+    from semsig_gis.core import ObjectClass, Signature
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.locate import LikelihoodLocator, Location
 

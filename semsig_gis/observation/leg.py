@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from semsig_gis.core.checks import MOST_METRES, require_number
+from semsig_gis.core import MOST_METRES, require_number
 
 MOST_SIGMA_M = 1000
 

@@ -9,14 +9,20 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import grid_convergence, signed_degrees, to_degrees
+from semsig_gis.core import (
+    InputError,
+    UnknownNameError,
+    grid_convergence,
+    nearest_name,
+    signed_degrees,
+    to_degrees,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
 
 NorthName = Literal["grid", "true", "magnetic"]
 NORTHS: tuple[NorthName, ...] = get_args(NorthName)

@@ -11,21 +11,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.geometry import wrap_degrees
-from semsig_gis.core.signature import Signature, SignatureSpec, wrapped_bearings
-from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
+from semsig_gis.core import (
+    MAX_RANGE_M,
+    WILDCARD,
+    InputError,
+    Signature,
+    SignatureSpec,
+    UnknownNameError,
+    wrap_degrees,
+    wrapped_bearings,
+)
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
-from semsig_gis.sources.keywords import class_code
-from semsig_gis.storage.rows import row_value
+from semsig_gis.sources import class_code
+from semsig_gis.storage import row_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.storage.rows import Row
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.storage import Row
 
 SEEN = ("types", "bearings", "detections", "see", "photos")
 """Keys of a row that describe the observed objects; at least one is required."""

@@ -21,7 +21,7 @@ from servers import Answer, Server
 from stand_ins import STAND_INS
 
 from semsig_gis import __version__
-from semsig_gis.database.file import open_database
+from semsig_gis.database import open_database
 
 if TYPE_CHECKING:
     from stand_ins import StandIn

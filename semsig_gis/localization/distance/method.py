@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core import InputError, SemsigError
 from semsig_gis.localization.distance.metrics import metric
 from semsig_gis.localization.distance.metrics.edit import EditWeights
 
 if TYPE_CHECKING:
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
 
 
 TYPES, ANGLES, BOTH = "types", "angles", "types+angles"

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import WILDCARD
+from semsig_gis.database import PartitionedDatabase
 from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.distance.method import ANGLES, BOTH, FUSION, TYPES
 from semsig_gis.localization.distance.metrics import metric
@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SequenceTable, SignatureDatabase
     from semsig_gis.localization.distance.method import Method
 
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]

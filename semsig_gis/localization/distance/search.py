@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.core.geometry import crs_label
-from semsig_gis.core.presentation import map_with
-from semsig_gis.database.database import join_databases, rows_of_result
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import EmptyResultError, crs_label, map_with
+from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_result
 from semsig_gis.localization.answers import (
     Answer,
     Ranking,
@@ -24,21 +21,19 @@ from semsig_gis.localization.answers import (
 from semsig_gis.localization.distance.method import FUSION
 from semsig_gis.localization.distance.scores import score_cells, score_parts
 from semsig_gis.localization.distance.ties import top_candidates
-from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.view import View
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import MapFrame
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import MapFrame, Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
     from semsig_gis.localization.requirement import Requirement
-    from semsig_gis.observation.north import North
+    from semsig_gis.observation import North
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import ROW_SPAN
+from semsig_gis.core import ROW_SPAN, InputError
 from semsig_gis.localization.likelihood.posterior import Posterior, posterior
-from semsig_gis.observation.leg import Leg
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 LOST = 1e-6
 """Probability that a leg is wrong and the next place is anywhere."""

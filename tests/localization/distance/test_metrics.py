@@ -15,15 +15,15 @@ from hypothesis import strategies as st
 from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.sequences import SequenceTable
-from semsig_gis.localization.distance.metrics import METRICS, edit, metric
-from semsig_gis.localization.distance.metrics.edit import BLOCK_SEQUENCES, BitPlanes, EditWeights
+from semsig_gis.core import InputError
+from semsig_gis.database import SequenceTable
+from semsig_gis.localization import BLOCK_SEQUENCES, METRICS, BitPlanes, EditWeights, metric
+from semsig_gis.localization.distance.metrics import edit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.localization.distance.metrics import Distances
+    from semsig_gis.localization import Distances
 
     Bytes = NDArray[np.uint8]
 

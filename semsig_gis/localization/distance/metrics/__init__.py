@@ -12,7 +12,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core import InputError, UnknownNameError, nearest_name
 from semsig_gis.localization.distance.metric_names import METRIC_NAMES
 from semsig_gis.localization.distance.metrics import edit
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
     from semsig_gis.localization.distance.metrics.edit import EditWeights
 
 

@@ -14,15 +14,15 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.sequences import checked_sequence
+from semsig_gis.core import InputError
+from semsig_gis.database import checked_sequence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
 
 PLANE_WORDS = 64  # enough work for a loop, and a plane still fits the first-level cache
 BLOCK_SEQUENCES = 64 * PLANE_WORDS
