@@ -152,7 +152,9 @@ def names_that_exist(content: dict[str, Any]) -> bool:
     systems = {layer.get("crs", "EPSG:4326") for layer in layers}
     fields = [item.get("rows", [0, 0]) for item in layers]
     ordered = all(least <= most for least, most in fields)
-    return names <= classes and systems == {"EPSG:4326"} and ordered and "metric_crs" not in content
+    free = all(item["code"] > 11 for item in content.get("classes", ()))  # not a code of the paper
+    valid = names <= classes and systems == {"EPSG:4326"} and ordered and free
+    return valid and "metric_crs" not in content
 
 
 @settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
