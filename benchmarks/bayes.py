@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.sightings import Views
-    from semsig_gis.evaluation.queries.draw import Query
+    from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.observation.view import Photo
 
@@ -215,7 +215,9 @@ def _row(database: SignatureDatabase, degrees: int, wanted: int, *, ranges: bool
     }
 
 
-def _queries(database: SignatureDatabase, degrees: int, *, ranges: bool) -> Iterator[Query]:
+def _queries(
+    database: SignatureDatabase, degrees: int, *, ranges: bool
+) -> Iterator[SimulatedQuery]:
     """Yield queries from cells that are seen by the noise and have one to fourteen detections."""
     told = f"ranges:{100 * RANGE_ERROR:g}, " if ranges else ""
     chain = parse_chain(f"detector:views, {told}view:{degrees}", noises={NOISE.name: NOISE})

@@ -34,7 +34,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.database.store import ObjectStore
 from semsig_gis.evaluation.figures import calibration_bins, plain_records
-from semsig_gis.evaluation.queries.distortion_text import parse_chain, ready_chain
+from semsig_gis.evaluation.queries.distortion_text import parse_chain, prepare_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 from semsig_gis.localization.answers import REGION_SHARE
@@ -237,7 +237,7 @@ def _single(
 def _walks(database: SignatureDatabase, line: Line) -> Iterator[_Question]:
     """Yield straight ways along cells, each photo with a direction and a compass of its own."""
     rng = np.random.default_rng(0)
-    spoil = ready_chain(line.chain, CitySights.of(database))
+    spoil = prepare_chain(line.chain, CitySights.of(database))
     for start in rng.permutation(len(database)).tolist():
         cells = straight_walk(database, start, line.photos, np.random.default_rng([start, 1]))
         if cells:

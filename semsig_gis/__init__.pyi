@@ -128,7 +128,7 @@ from .evaluation.queries.distortions import (
 from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.scoring import evaluate as evaluate
-from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
+from .evaluation.error_maps import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,

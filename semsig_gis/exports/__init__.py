@@ -23,7 +23,7 @@ from semsig_gis.core.errors import (
 )
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import require_same_place
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation.error_maps import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
 from semsig_gis.exports.files import write_csv, write_flatgeobuf, write_geojson, write_geoparquet

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.error_field import ErrorField
+    from semsig_gis.evaluation.error_maps import ErrorField
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.exports.styles import Classes
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from semsig_gis.core.symbology import ERROR_BREAKS, FAILURES, OUTCOMES
 from semsig_gis.core.text import percent
-from semsig_gis.evaluation.error_field import ENOUGH, error_field
+from semsig_gis.evaluation.error_maps import ENOUGH_QUERIES, error_field
 from semsig_gis.evaluation.queries.distortion_text import chain_text
 from semsig_gis.evaluation.result import Evaluation
 from semsig_gis.maps.image import mercator_places, packed
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.error_field import ErrorField
+    from semsig_gis.evaluation.error_maps import ErrorField
     from semsig_gis.observation.view import View
 
 QUERY_FIELDS = (
@@ -297,7 +297,7 @@ def _field(
         "height": height,
         "breaks": [1.0 + SHARES * least if least else 0.0 for least in FAILURES],
         "colours": list(FAILURES.values()),
-        "enough": SPOKEN * ENOUGH,
+        "enough": SPOKEN * ENOUGH_QUERIES,
     }
     return arrays, about
 
@@ -321,7 +321,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
         f"{class_bar(list(FAILURES.values()), limits)}"
-        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries count</p>'
+        f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
     return (
         "<summary>Localization errors</summary>"

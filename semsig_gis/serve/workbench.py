@@ -18,8 +18,8 @@ from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, ne
 from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
 from semsig_gis.core.symbology import SHADES, VERDICTS, class_signs
 from semsig_gis.database.sightings import views_at
-from semsig_gis.evaluation.queries.distortion_text import ready_chain
-from semsig_gis.evaluation.queries.distortions import Detector as FailingDetector
+from semsig_gis.evaluation.queries.distortion_text import prepare_chain
+from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 from semsig_gis.exports import export_answer
 from semsig_gis.localization.likelihood.incremental import TurnMemo
@@ -425,11 +425,11 @@ class Workbench:
         noise = told.get("noise")
         chain = []
         if noise is not None:
-            chain.append(FailingDetector(noise=self.noises[self._known_noise(noise)]))
+            chain.append(SimulatedDetector(noise=self.noises[self._known_noise(noise)]))
         seed = told.get("seed", 0)
         if not isinstance(seed, int) or not 0 <= seed <= 10**18:
             raise InputError(f"a seed was given as {seed!r}; give a whole number from 0 to 10**18.")
-        seen = ready_chain(chain, CitySights.of(database))(sight, seed, 0)
+        seen = prepare_chain(chain, CitySights.of(database))(sight, seed, 0)
         return {
             "view": {
                 "compass": self._compass(seen),

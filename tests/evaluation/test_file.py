@@ -22,7 +22,7 @@ from semsig_gis.evaluation.file import (
     used_noises,
 )
 from semsig_gis.evaluation.queries.distortion_text import NAMED_DISTORTIONS, parse_chain
-from semsig_gis.evaluation.queries.distortions import Detector
+from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.result import machine
 from semsig_gis.evaluation.scoring import evaluate
@@ -49,9 +49,11 @@ EVALUATION = evaluate(
     number=st.integers(1, 99),
 )
 def test_settings_survive_json(
-    noise: NoiseSpec, kind: str, others: list[Detector], number: int
+    noise: NoiseSpec, kind: str, others: list[SimulatedDetector], number: int
 ) -> None:
-    asked = QuerySpec(number=number, seeds=(3, 0), distortions=(*others, Detector(noise=noise)))
+    asked = QuerySpec(
+        number=number, seeds=(3, 0), distortions=(*others, SimulatedDetector(noise=noise))
+    )
     by_chance = LikelihoodMethod(noise=noise, refined=True)
     method = by_chance if kind == "likelihood" else Method(keep=5, weights=EditWeights(insert=2))
     values = json.loads(json.dumps(settings_to_dict(method, asked), allow_nan=False))

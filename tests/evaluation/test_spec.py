@@ -11,7 +11,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import SemsigError
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.distortions import Detector
+from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.spec import (
     Districts,
     ExperimentSpec,
@@ -59,7 +59,7 @@ def experiments(draw: st.DrawFn) -> ExperimentSpec:
     if draw(st.booleans()):
         spec = replace(spec, methods={**spec.methods, "own": LikelihoodMethod(noise=own)})
     if draw(st.booleans()):
-        chain = (Detector(noise=own, half=9.5),)
+        chain = (SimulatedDetector(noise=own, half=9.5),)
         spec = replace(spec, distortions={**spec.distortions, "own": chain})
     return spec
 
@@ -154,6 +154,6 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 def test_two_noise_models_of_one_name(name: str) -> None:
     one, other = (NoiseSpec(clutter=value, name=name) for value in (1.0, 2.0))
     methods = {"a": LikelihoodMethod(noise=one)}
-    distortions = {"b": (Detector(noise=other),)}
+    distortions = {"b": (SimulatedDetector(noise=other),)}
     with refused(SemsigError, name, "a name of its own"):
         ExperimentSpec(database="city.parquet", methods=methods, distortions=distortions)

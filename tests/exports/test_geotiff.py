@@ -19,7 +19,7 @@ from small_city import chances_of, small_city, small_evaluation, small_location
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import GridSpec
 from semsig_gis.core.symbology import ERROR_BREAKS, FAILURES
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation.error_maps import error_field
 from semsig_gis.exports import export_answer, export_database
 from semsig_gis.exports.rasters import (
     CLEAR,

@@ -29,7 +29,7 @@ from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.scoring import (
-    PAIR_S,
+    QUERY_CELL_S,
     QUERY_S,
     make_evaluation,
     score_queries,
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.queries.draw import Query
+    from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
     from semsig_gis.localization.answers import Answer, Locator
@@ -260,7 +260,7 @@ class ExperimentWork:
                     seal(half)
 
     def _scored(
-        self, names: Sequence[str], queries: Sequence[Query]
+        self, names: Sequence[str], queries: Sequence[SimulatedQuery]
     ) -> Iterator[tuple[str, pd.DataFrame]]:
         """Yield the scored answers of some methods that share what they measure."""
         scores: dict[str, dict[int, list[dict[str, Any]]]] = {
@@ -318,7 +318,7 @@ class ExperimentWork:
         """How many queries each distortion has."""
         return self.spec.queries * len(self.spec.seeds)
 
-    def _queries(self, distortion: str, part: slice) -> list[Query]:
+    def _queries(self, distortion: str, part: slice) -> list[SimulatedQuery]:
         """Return some of the queries after a distortion."""
         seen = self._city(self._seen_city)
         return draw_queries(
@@ -522,7 +522,7 @@ def _answer(
     done, total = 0, sum(sizes.values())
     if scheduler is None:
         seconds = sum(
-            size * (QUERY_S + PAIR_S * len(running[out][0].database))
+            size * (QUERY_S + QUERY_CELL_S * len(running[out][0].database))
             for (out, _), size in sizes.items()
         )
         announce(seconds / max(workers, 1), "answering")

@@ -13,8 +13,8 @@ import numpy as np
 from semsig_gis.core.threads import each_in_order
 from semsig_gis.evaluation.identifiability.lookalikes import city_extent
 from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
-from semsig_gis.evaluation.queries.distortion_text import ready_chain
-from semsig_gis.evaluation.queries.distortions import Detector
+from semsig_gis.evaluation.queries.distortion_text import prepare_chain
+from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 from semsig_gis.localization.likelihood.association import rerank
 from semsig_gis.localization.likelihood.index import CellScores, build_index
@@ -86,8 +86,8 @@ def draw_trials(
     `cells` are row numbers, `photos` what is looked at from each, a full turn by default. Query
     number i is the same whatever the number of queries.
     """
-    detector = Detector(noise=index.noise)
-    spoil = ready_chain((detector,), CitySights.of(index.database))
+    detector = SimulatedDetector(noise=index.noise)
+    spoil = prepare_chain((detector,), CitySights.of(index.database))
     looks = repeat(FULL_VIEW) if photos is None else photos
     for number, (cell, photo) in enumerate(zip(cells.tolist(), looks, strict=False)):
         query = spoil(Sight.of_cell(index.database, cell), seed, number).signature

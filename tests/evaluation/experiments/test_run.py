@@ -41,8 +41,10 @@ if TYPE_CHECKING:
 
     from distributed import LocalCluster
 
-    from semsig_gis.evaluation.queries.draw import Query
+    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.evaluation.spec import ExperimentSpec
+    from semsig_gis.localization.answers import Answer, Locator
 
 PART_QUERIES = 10
 SPEC = parse_experiment("""
@@ -226,7 +228,12 @@ def test_several_experiments_at_once_are_as_one_by_one(
 def test_parts_that_fail_are_told_and_the_others_are_kept(
     folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(database: Any, locator: Any, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
+    def fail(
+        database: SignatureDatabase,
+        locator: Locator[Answer],
+        queries: Sequence[SimulatedQuery],
+        **options: Any,  # noqa: ANN401
+    ) -> object:
         if len(queries) < PART_QUERIES:
             raise OSError("the disk hiccups")
         return score_queries(database, locator, queries, **options)
