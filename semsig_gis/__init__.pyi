@@ -14,8 +14,8 @@ from .sources.catalog import (
     load_catalog as load_catalog,
     paper_taxonomy as paper_taxonomy,
 )
-from .sources.area import clip_layers as clip_layers
-from .sources.layers import LayerSpec as LayerSpec
+from .sources.clip import clip_layers as clip_layers
+from .sources.layer_spec import LayerSpec as LayerSpec
 from .sources.synthetic.city import (
     CitySpec as CitySpec,
     PARIS_LIKE as PARIS_LIKE,
@@ -38,7 +38,7 @@ from .objects.load import (
     choose_layers as choose_layers,
     read_files as read_files,
 )
-from .reports.quality import quality_report as quality_report
+from .objects.quality import quality_report as quality_report
 from .objects.surroundings import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,
@@ -61,7 +61,7 @@ from .observation.north import North as North
 from .observation.sentences import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
 from .database.summary import database_summary as database_summary
-from .localization.answers import Requirement as Requirement
+from .localization.requirement import Requirement as Requirement
 from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,

@@ -8,7 +8,7 @@ import geopandas as gpd
 import numpy as np
 
 from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -188,7 +188,7 @@ def calibrate(
     import numpy as np
 
     from semsig_gis.database.city import open_city
-    from semsig_gis.localization.likelihood import rule as abstention
+    from semsig_gis.localization.likelihood import answer_rule as abstention
     from semsig_gis.localization.noise.learn import read_samples
 
     keep_inputs(out, read=(database, samples, noise, drift_report, objects))

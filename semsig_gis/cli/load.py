@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from semsig_gis.objects.load import Loaded, Selection
     from semsig_gis.sources.catalog import Catalog
     from semsig_gis.sources.filters import Rules
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 def _catalogs(incomplete: str) -> list[str]:
@@ -120,8 +120,8 @@ def load(
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
     from semsig_gis.objects.skipped_layers import passed_by, read_small
-    from semsig_gis.sources.area import BOX, clip_layers, parse_area
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
+    from semsig_gis.sources.clip import BOX, clip_layers, parse_area
     from semsig_gis.sources.detect import told_catalogs
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
@@ -272,9 +272,9 @@ def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
 def _save_loaded(
     loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
 ) -> None:
+    from semsig_gis.objects.quality import quality_report
     from semsig_gis.objects.surroundings import save_surroundings
     from semsig_gis.objects.table import save_objects
-    from semsig_gis.reports.quality import quality_report
 
     notes = list(loaded.notes)
     save_objects(loaded.objects, out)

@@ -45,8 +45,9 @@ if TYPE_CHECKING:
     from semsig_gis.database.city import City
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
-    from semsig_gis.localization.answers import Answer, Locator
+    from semsig_gis.localization.answers import Answer
     from semsig_gis.localization.distance.method import Method
+    from semsig_gis.localization.locator import Locator
     from semsig_gis.observation.files import QueryLine
     from semsig_gis.observation.north import North
     from semsig_gis.observation.view import View
@@ -175,8 +176,9 @@ def localize(options: LocalizeOptions) -> None:
         method = Method.parse(options.ranking)
     city = open_city(options.database)
     # The database is read while another core loads what answers; what fails there fails here, too.
-    answering = "likelihood.kernels" if method is None else "matching.search"
-    ThreadPoolExecutor(1).submit(importlib.import_module, f"semsig_gis.{answering}")
+    answering = "likelihood.kernels" if method is None else "distance.search"
+    module = f"semsig_gis.localization.{answering}"
+    ThreadPoolExecutor(1).submit(importlib.import_module, module)
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = seen_north(city, options.north, options.date)
 
@@ -217,24 +219,16 @@ def _locator(
     options: LocalizeOptions, city: City, method: Method | None, north: North
 ) -> Locator[Any]:
     """Return what answers the queries."""
-    if method is not None:
-        return _distance_locator(options, city, method, north)
-    usual = options.usual_noise(city.dataset.taxonomy)
-    top, explain = options.top, options.explain
-    return options.locator(city, north, usual_noise=usual, top=top, explain=explain)
+    taxonomy, top = city.dataset.taxonomy, options.top
+    if method is None:
+        usual = options.usual_noise(taxonomy)
+        return options.locator(city, north, usual_noise=usual, top=top, explain=options.explain)
+    from semsig_gis.localization.locator import make_locator
+    from semsig_gis.localization.requirement import Requirement
 
-
-def _distance_locator(
-    options: LocalizeOptions, city: City, method: Method, north: North
-) -> Locator[Any]:
-    from semsig_gis.localization.answers import Requirement
-    from semsig_gis.localization.distance.search import DistanceLocator
-
-    database, require = city.dataset, options.require
-    requirement = None if require is None else Requirement.parse(require, database.taxonomy)
-    return DistanceLocator(
-        database=database, method=method, requirement=requirement, top=options.top, north=north
-    )
+    require = options.require
+    requirement = None if require is None else Requirement.parse(require, taxonomy)
+    return make_locator(city, method, requirement=requirement, top=top, north=north)
 
 
 def _answer_lines(

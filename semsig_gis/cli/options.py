@@ -325,9 +325,8 @@ class SearchOptions:
         The noise is the `usual_noise` unless another one was asked for.
         """
         from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE, open_rule
-        from semsig_gis.localization.likelihood.index import build_index
-        from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-        from semsig_gis.localization.noise.model import cell_noise
+        from semsig_gis.localization.likelihood.method import LikelihoodMethod
+        from semsig_gis.localization.locator import make_locator
         from semsig_gis.observation.north import GRID_NORTH
 
         if self.on_grid and self.refine:
@@ -351,14 +350,15 @@ class SearchOptions:
             map_age=self.map_age,
             drift_report=self.drift_report,
         )
-        if not self.on_grid:
-            noise = cell_noise(noise, city.database.grid.step)
+        method = LikelihoodMethod(
+            noise=noise, refined=bool(refined), on_grid=self.on_grid, north_sigma=sigma
+        )
         log_prior, known = self._prior(city.database)
         needed = bool(self.refine)
         store = object_store(city, self.objects, needed=needed) if needs_objects else None
-        return LikelihoodLocator(
-            index=build_index(city.database, noise),
-            north_sigma=sigma,
+        return make_locator(
+            city,
+            method,
             log_prior=log_prior,
             rule=rule,
             top=top,
@@ -391,8 +391,8 @@ class SearchOptions:
             parts.append(raster_prior(database, self.popularity))
             known["popularity"] = {"file": str(self.popularity)}
         if self.require is not None:
-            from semsig_gis.localization.answers import Requirement
             from semsig_gis.localization.likelihood.priors import weight_prior
+            from semsig_gis.localization.requirement import Requirement
 
             requirement = Requirement.parse(self.require, database.taxonomy)
             met = requirement.met(database.type_sequences)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.symbology import one_line
+from semsig_gis.core.text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

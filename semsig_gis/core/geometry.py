@@ -13,8 +13,8 @@ from pyproj import CRS, Geod, Proj, Transformer
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.checks import require_number
-from semsig_gis.core.effort import require_memory
 from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.resources import require_memory
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

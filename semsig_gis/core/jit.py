@@ -10,7 +10,7 @@ import contextlib
 import sys
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from semsig_gis.core.memory import require_address_space
+from semsig_gis.core.resources import require_address_space
 
 # Where LLVM gets no memory, it ends the process without a word of ours.
 COMPILER_BYTES = 400_000_000

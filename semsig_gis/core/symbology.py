@@ -1,9 +1,8 @@
-"""How data is shown on maps, in QGIS and in reports: signs of classes, colours, text made fit."""
+"""Symbols and colours of classes and results on maps, in QGIS and in reports."""
 
 from __future__ import annotations
 
 import itertools
-import unicodedata
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -235,31 +234,3 @@ def mixed(values: NDArray[np.float64], ramp: Sequence[str]) -> list[str]:
     stops = np.linspace(0.0, 1.0, len(ramp))
     parts = np.stack([np.interp(values, stops, part) for part in anchors.T], axis=1)
     return [f"#{bytes(row).hex()}" for row in np.rint(parts).astype(np.uint8)]
-
-
-# They join letters and emoji; every other character of their kind only hides or turns text.
-JOINERS = "\u200c\u200d"
-
-
-def escaped(text: str) -> str:
-    """Return text on one line that cannot break a Markdown table or become HTML."""
-    plain = " ".join(text.split())
-    return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
-
-
-def one_line(text: str) -> str:
-    """Return text from data on one line, without characters that hide or turn other text.
-
-    Those are control characters and marks of direction. Halves of characters, which no file can
-    hold, become U+FFFD.
-    """
-    plain = " ".join(text.split())
-    # What is left out may have stood between two spaces.
-    return plain if plain.isprintable() else " ".join("".join(map(_shown, plain)).split())
-
-
-def _shown(character: str) -> str:
-    kind = unicodedata.category(character)
-    if kind == "Cs" or ord(character) & 0xFFFE == 0xFFFE:  # noqa: PLR2004 - Unicode's own number
-        return "\ufffd"
-    return "" if kind in {"Cc", "Cf"} and character not in JOINERS else character

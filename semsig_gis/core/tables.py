@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.symbology import escaped
+from semsig_gis.core.text import escaped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

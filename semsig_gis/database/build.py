@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from semsig_gis.core.effort import announce, require_memory
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, consecutive, split_ids
+from semsig_gis.core.resources import announce, require_memory
 from semsig_gis.core.rtree import PackedIndex
 from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec, distance_units_of
 from semsig_gis.database.database import SignatureDatabase

@@ -422,11 +422,6 @@ class SequenceTable:
         """Return one distinct sequence."""
         return self.values[self.offsets[index] : self.offsets[index + 1]]
 
-    @property
-    def bounds(self) -> NDArray[np.float64]:
-        """Box of the viewpoints in metres: west, south, east and north; not of no cells."""
-        return np.concatenate([self.xy.min(axis=0), self.xy.max(axis=0)])
-
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """Length of each distinct sequence, shape (d,)."""

@@ -20,7 +20,6 @@ import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
 from semsig_gis.core.geometry import (
     GridSpec,
@@ -31,6 +30,7 @@ from semsig_gis.core.geometry import (
     split_ids,
 )
 from semsig_gis.core.parallel import check_workers, finish_tasks
+from semsig_gis.core.resources import announce
 from semsig_gis.core.signature import SignatureSpec
 from semsig_gis.core.temporary import HALF_DONE
 from semsig_gis.database.build import (

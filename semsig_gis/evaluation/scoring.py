@@ -18,14 +18,13 @@ import pandas as pd
 
 from semsig_gis import __version__
 from semsig_gis.core.defaults import DEFAULT_METHOD
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import angular_distance, cell_ids, wrap_degrees
+from semsig_gis.core.resources import announce
 from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.search import DistanceLocator
 from semsig_gis.localization.distance.ties import (
     NEAR_METRES,
     NEAR_PLACES,
@@ -36,7 +35,6 @@ from semsig_gis.localization.distance.ties import (
     rank_range,
     top_candidates,
 )
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.likelihood.method import LikelihoodMethod
 from semsig_gis.localization.locator import make_locator, parse_method
 
@@ -47,9 +45,10 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import SimulatedQuery
-    from semsig_gis.localization.answers import Answer, DistanceMemo, Locator, Ranking
+    from semsig_gis.localization.answers import Answer, Ranking
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.locator import AnyMethod
+    from semsig_gis.localization.locator import AnyMethod, Locator
     from semsig_gis.observation.view import Photo
 
 # Approximate seconds for each query and for each cell of a query, to announce the duration.
@@ -133,21 +132,20 @@ def evaluate(
     chain = (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
     spec = QuerySpec(number=queries, seeds=(seed,), distortions=chain)
     ranking: AnyMethod
-    locator: Locator[Answer]
+    index: LikelihoodIndex | None = None
     if isinstance(method, str):
         ranking = parse_method(method)
         if isinstance(ranking, LikelihoodMethod):
             ranking = replace(ranking, on_grid=True)
-        locator = make_locator(database, ranking)
     elif isinstance(method, Method):
-        ranking, locator = method, DistanceLocator(database=database, method=method)
+        ranking = method
     elif method.database is database:
-        ranking = LikelihoodMethod(noise=method.noise, on_grid=True)
-        locator = LikelihoodLocator(index=method)
+        ranking, index = LikelihoodMethod(noise=method.noise, on_grid=True), method
     else:
         raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."
         )
+    locator = make_locator(database, ranking, index=index)
     announce(queries * (QUERY_S + QUERY_CELL_S * len(database)), "evaluating")
     sample = draw_queries(database, spec)
     outcomes = score_queries(database, locator, sample, tops=(top,), progress=progress)

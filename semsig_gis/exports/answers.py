@@ -12,7 +12,8 @@ import pyogrio
 import shapely
 
 from semsig_gis.core.geometry import GEOMETRY
-from semsig_gis.core.symbology import ANSWERS, one_line
+from semsig_gis.core.symbology import ANSWERS
+from semsig_gis.core.text import one_line
 from semsig_gis.exports.files import geojson_options, whole_by_gdal
 from semsig_gis.exports.styles import RANKS
 from semsig_gis.storage.whole import whole_file

@@ -14,8 +14,8 @@ from semsig_gis.core.symbology import (
     RANK_RAMP,
     class_signs,
     group_labels,
-    one_line,
 )
+from semsig_gis.core.text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

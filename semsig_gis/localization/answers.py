@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
-import time
 from abc import abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,12 +15,11 @@ from semsig_gis.core.display import Displayed
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import LICENSES, to_degrees
 from semsig_gis.core.presentation import plot_with
-from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.observation.north import GRID_NORTH
 from semsig_gis.observation.view import View
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+    from collections.abc import Mapping
 
     import geopandas as gpd
     import pandas as pd
@@ -32,7 +29,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.display import Axes
     from semsig_gis.core.signature import Signature
     from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SequenceTable, SignatureDatabase
+    from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.observation.north import North
 
 
@@ -149,56 +146,6 @@ class Ranking:
     seconds: float
 
 
-@dataclass(eq=False, slots=True)
-class DistanceMemo:
-    """Distances between one batch of queries and one database, and how long each took to measure.
-
-    Most methods of an experiment differ only in how they join the same distances. Make another memo
-    for the next batch.
-    """
-
-    _known: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
-    spared: float = field(default=0.0, init=False)
-    """Seconds that it would have taken to measure again what was known."""
-
-    def get(self, key: Hashable, measure: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-        """Return the distances under a key, calling `measure` only if they are not known yet.
-
-        The key must name all that they depend on. Do not write to the result.
-        """
-        if key in self._known:
-            distances, seconds = self._known[key]
-            self.spared += seconds
-            return distances
-        start = time.perf_counter()
-        distances = measure()
-        self._known[key] = distances, time.perf_counter() - start
-        return distances
-
-
-_Answer_co = TypeVar("_Answer_co", bound=Answer, covariant=True)
-
-
-class Locator(Protocol[_Answer_co]):
-    """A method with the cells that it searches and all else that it needs."""
-
-    def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
-        """Answer a query, with its own number of candidates or another one.
-
-        Objects of a class that no cell sees count as false detections, and the answer says so.
-        Raises InputError if the query lacks a part that the method needs.
-        """
-
-    def rankings(
-        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
-    ) -> Iterator[Ranking]:
-        """Rank all cells for each query, in order; each query has at least one object.
-
-        `memo` keeps distances of these queries that other methods have needed; the time it took to
-        measure them counts for each method.
-        """
-
-
 def check_top(top: int) -> None:
     """Refuse a list of no candidates."""
     if top < 1:
@@ -232,72 +179,3 @@ def _outside_notes(view: View, taxonomy: Taxonomy) -> tuple[str, ...]:
         "or the bearing may be wrong."
     )
     return (note,)
-
-
-_COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
-_AMOUNT = re.compile(r"(\d*)\s*(\S)")
-
-
-@dataclass(frozen=True, slots=True)
-class Requirement:
-    """How many objects of some classes a cell must see.
-
-    Each limit is a class code, or `WILDCARD` for all objects together, the fewest and the most.
-
-    Examples
-    --------
-    >>> from semsig_gis import paper_taxonomy
-    >>> requirement = Requirement.parse("M,2B", paper_taxonomy())
-    """
-
-    limits: tuple[tuple[int, int, float], ...]
-
-    @classmethod
-    def parse(cls, text: str, taxonomy: Taxonomy) -> Self:
-        """Read a requirement from text, such as ``M,2B,D=0,?<=10``.
-
-        Parts stand between commas: ``M`` for at least one bus stop, ``2B`` for at least two trees,
-        or ``B>=2``, ``B<=5``, ``B=3``. The symbol ``?`` counts all objects. A symbol may stand in
-        several parts. Raise InputError if a part does not have that form or two parts exclude each
-        other, and UnknownNameError if a symbol is not in the taxonomy.
-        """
-        limits: dict[int, tuple[int, float]] = {}
-        for part in map(str.strip, text.split(",")):
-            symbol, least, most = _read(part, text)
-            code = WILDCARD if symbol == "?" else taxonomy.by_symbol(symbol).code
-            low, high = limits.get(code, (0, math.inf))
-            limits[code] = low, high = max(low, least), min(high, most)
-            if low > high:
-                raise InputError(
-                    f"requirement {text!r} wants at least {low} and at most {high} of "
-                    f"{symbol!r}; give numbers that a cell can meet."
-                )
-        return cls(tuple((code, low, high) for code, (low, high) in limits.items()))
-
-    def met(self, sequences: SequenceTable) -> NDArray[np.bool_]:
-        """Tell which cells meet it, shape (n,), by their distinct type sequences."""
-        counts = sequences.histogram
-        met = np.ones(len(sequences), np.bool_)
-        for code, least, most in self.limits:
-            seen = np.zeros(len(sequences), np.int64)
-            if code == WILDCARD:
-                seen = sequences.lengths
-            elif code < counts.shape[1]:
-                seen = counts[:, code].astype(np.int64)
-            met &= (seen >= least) & (seen <= most)
-        return np.asarray(met[sequences.inverse])
-
-
-def _read(part: str, text: str) -> tuple[str, int, float]:
-    """Return the symbol, the fewest and the most of one part of a requirement."""
-    if found := _COMPARISON.fullmatch(part):
-        symbol, sign, digits = found.groups()
-        number = int(digits)
-        return symbol, 0 if sign == "<=" else number, math.inf if sign == ">=" else number
-    if found := _AMOUNT.fullmatch(part):
-        digits, symbol = found.groups()
-        return symbol, int(digits or 1), math.inf
-    raise InputError(
-        f"{part!r} in requirement {text!r} cannot be read; give parts such as 'M', '2B', 'B>=2', "
-        "'B<=5' or 'B=3' with commas between them, '?' for all objects."
-    )

@@ -1,8 +1,8 @@
-"""Methods of either kind: named by text, with what they need to answer, and their answers."""
+"""Make the locator of a method, and locate a view with it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, Unpack, overload
 
 import numpy as np
 
@@ -10,29 +10,57 @@ from semsig_gis.core.defaults import DEFAULT_METHOD, LIKELIHOOD
 from semsig_gis.database.city import City
 from semsig_gis.database.database import join_databases
 from semsig_gis.database.file import PartitionedDatabase
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.search import DistanceLocator
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.likelihood.priors import weight_prior
+from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import NOISES, cell_noise
 from semsig_gis.observation.north import GRID_NORTH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
-    from semsig_gis.localization.answers import Answer, Locator, Requirement
-    from semsig_gis.localization.distance.search import Localization
+    from semsig_gis.localization.answers import Ranking
+    from semsig_gis.localization.distance.memo import DistanceMemo
+    from semsig_gis.localization.distance.method import Method
+    from semsig_gis.localization.distance.search import DistanceLocator, Localization
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization.likelihood.locate import (
+        LikelihoodLocator,
+        LocateOptions,
+        Location,
+    )
+    from semsig_gis.localization.likelihood.method import LikelihoodMethod
     from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization.requirement import Requirement
     from semsig_gis.observation.north import North
 
-AnyMethod = Method | LikelihoodMethod
+    AnyMethod: TypeAlias = Method | LikelihoodMethod
+    Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
+
+# Imports of one kind of method are in functions: they take 0.1 s for each kind, and a process
+# answers by one of them.
+
+_Answer_co = TypeVar("_Answer_co", bound=Answer, covariant=True)
+
+
+class Locator(Protocol[_Answer_co]):
+    """A method with the cells that it searches and all else that it needs."""
+
+    def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
+        """Answer a query, with its own number of candidates or another one.
+
+        Objects of a class that no cell sees count as false detections, and the answer says so.
+        Raises InputError if the query lacks a part that the method needs.
+        """
+
+    def rankings(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query, in order; each query has at least one object.
+
+        `memo` keeps distances of these queries that other methods have needed; the time it took to
+        measure them counts for each method.
+        """
 
 
 def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMethod:
@@ -61,30 +89,102 @@ def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMetho
     ('edit+edit:5%', 'likelihood:generic')
     """
     if text.strip().partition(":")[0] == LIKELIHOOD:
+        from semsig_gis.localization.likelihood.method import LikelihoodMethod  # noqa: PLC0415 - above
+
         return LikelihoodMethod.parse(text, noises=noises)
+    from semsig_gis.localization.distance.method import Method  # noqa: PLC0415 - above
+
     return Method.parse(text)
 
 
+@overload
 def make_locator(
-    database: SignatureDatabase,
+    database: Cells,
+    method: LikelihoodMethod,
+    *,
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> LikelihoodLocator: ...
+@overload
+def make_locator(
+    database: Cells,
+    method: Method,
+    *,
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> DistanceLocator: ...
+@overload
+def make_locator(
+    database: Cells,
     method: AnyMethod,
     *,
-    store: Callable[[], ObjectStore] | None = None,
-) -> Locator[Answer]:
-    """Return a method with all that it needs; `store` is called if places are to be refined."""
-    if isinstance(method, Method):
-        return DistanceLocator(database=database, method=method)
-    return LikelihoodLocator(
-        index=_index(database, method),
-        north_sigma=method.north_sigma,
-        store=store() if method.refined and store else None,
-        refined=method.refined,
-    )
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> DistanceLocator | LikelihoodLocator: ...
+def make_locator(
+    database: Cells,
+    method: AnyMethod,
+    *,
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> DistanceLocator | LikelihoodLocator:
+    """Return the locator of a method.
+
+    `requirement` limits the cells that are candidates. `index` is the one of `method_index`, if it
+    exists already. `options` are those of `locate`: a distance uses ``top`` and ``north``, and by
+    likelihood the ``store`` is that of the city, and ``refined`` follows the method and the store,
+    where they are not given.
+    """
+    if method.noise is None:
+        from semsig_gis.localization.distance.search import DistanceLocator  # noqa: PLC0415 - above
+
+        cells = database.dataset if isinstance(database, City) else database
+        return DistanceLocator(
+            database=cells,
+            method=method,
+            requirement=requirement,
+            top=options.get("top", DistanceLocator.top),
+            north=options.get("north", GRID_NORTH),
+        )
+    from semsig_gis.localization.likelihood.locate import LikelihoodLocator  # noqa: PLC0415 - above
+
+    if isinstance(database, City):
+        if "store" not in options and database.has_store and not method.on_grid:
+            options["store"] = database.store
+        database = database.database
+    elif isinstance(database, PartitionedDatabase):
+        database = join_databases(list(database.parts()))
+    if requirement is not None:
+        # GeoPandas, which the module of priors imports, takes a second.
+        from semsig_gis.localization.likelihood.priors import weight_prior  # noqa: PLC0415
+
+        met = requirement.met(database.type_sequences)
+        prior = weight_prior(database, met.astype(np.float64))
+        other = options.get("log_prior")
+        options["log_prior"] = prior if other is None else other + prior
+    if "refined" not in options:
+        # None: where the query has bearings.
+        between = options.get("store") is not None and not method.on_grid
+        options["refined"] = method.refined or (None if between else False)
+    options.setdefault("north_sigma", method.north_sigma)
+    return LikelihoodLocator(index=index or method_index(database, method), **options)
+
+
+def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
+    """Return the index of a database for queries from where the method expects them."""
+    from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
+
+    noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
+    return build_index(database, noise)
 
 
 @overload
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: LikelihoodMethod | Literal["likelihood"] = DEFAULT_METHOD,
@@ -94,7 +194,7 @@ def localize(
 ) -> Location: ...
 @overload
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: Method,
@@ -104,7 +204,7 @@ def localize(
 ) -> Localization: ...
 @overload
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: str,
@@ -113,7 +213,7 @@ def localize(
     north: North = GRID_NORTH,
 ) -> Location | Localization: ...
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
@@ -170,32 +270,5 @@ def localize(
     ('types+angles', np.float64(0.0))
     """
     used = parse_method(method) if isinstance(method, str) else method
-    if isinstance(used, Method):
-        cells = database.dataset if isinstance(database, City) else database
-        return DistanceLocator(
-            database=cells, method=used, requirement=requirement, top=top, north=north
-        ).locate(query)
-    store = None
-    if isinstance(database, City):
-        store = database.store if database.has_store and not used.on_grid else None
-        database = database.database
-    elif isinstance(database, PartitionedDatabase):
-        database = join_databases(list(database.parts()))
-    prior = None
-    if requirement is not None:
-        met = requirement.met(database.type_sequences)
-        prior = weight_prior(database, met.astype(np.float64))
-    return LikelihoodLocator(
-        index=_index(database, used),
-        north_sigma=used.north_sigma,
-        log_prior=prior,
-        top=top,
-        store=store,
-        refined=used.refined or (None if store else False),
-        north=north,
-    ).locate(query)
-
-
-def _index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
-    noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
-    return build_index(database, noise)
+    locator = make_locator(database, used, requirement=requirement, top=top, north=north)
+    return locator.locate(query)

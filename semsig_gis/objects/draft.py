@@ -42,7 +42,7 @@ from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxono
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.filters import ANY_VALUE, BETWEEN_SLASHES, Condition
 from semsig_gis.sources.keywords import words_of
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.rows import WGS84, off_the_globe
 
 if TYPE_CHECKING:

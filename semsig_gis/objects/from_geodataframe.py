@@ -15,8 +15,13 @@ from semsig_gis.objects.table import Licence
 from semsig_gis.sources import TAGS_READER
 from semsig_gis.sources.catalog import Catalog, built_in_taxonomy, load_catalog
 from semsig_gis.sources.filters import as_text
-from semsig_gis.sources.layers import ClassBy, LayerSpec
-from semsig_gis.sources.osm.features import frame_fields, frame_layers, holds_tags, tells_elements
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
+from semsig_gis.sources.osm.features import (
+    frame_fields,
+    frame_layers,
+    has_element_columns,
+    has_tag_columns,
+)
 from semsig_gis.sources.rows import RowRules, Rows, raw_layer
 
 if TYPE_CHECKING:
@@ -129,11 +134,11 @@ def _require_frame(frame: object) -> None:
 def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
     """Refuse a table without tags of OpenStreetMap, or, to be sure, without its elements."""
     fields = frame_fields(frame)
-    tells = tells_elements if sure else holds_tags
+    tells = has_element_columns if sure else has_tag_columns
     if tells(fields):
         return
     told = ", ".join(fields[:COLUMNS_TOLD]) + (", ..." if len(fields) > COLUMNS_TOLD else "")
-    if sure and holds_tags(fields):
+    if sure and has_tag_columns(fields):
         msg = (
             f"the table does not say what its columns ({told}) are; give tags=True if they are "
             "tags of OpenStreetMap, or else class_column or catalog."

@@ -28,8 +28,8 @@ from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_ext
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
 from semsig_gis.sources import MERGING, PRUNING, TAGS_READER, file_reader, find_files, reader
-from semsig_gis.sources.area import note_outside
 from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources.clip import note_outside
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer, RowCounts
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec, Role
+    from semsig_gis.sources.layer_spec import LayerSpec, Role
 
 
 # Two objects of a class within the same centimetre are one object listed twice.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import RawLayer
     from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 # Files that are read in about a second.
 SMALL_BYTES = 2**21

@@ -14,10 +14,11 @@ from semsig_gis.core.geometry import CLASS_NAME, LICENSES
 from semsig_gis.objects.table import layer_licences
 from semsig_gis.sources import file_reader, reader
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.area import NUMBERS, join_areas, parse_area
+from semsig_gis.sources.area import join_areas
 from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.osm.features import frame_fields, frame_layers, tells_elements
+from semsig_gis.sources.clip import NUMBERS, parse_area
+from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.sources.osm.features import frame_fields, frame_layers, has_element_columns
 from semsig_gis.sources.parquet import SUFFIXES, read_parquet
 from semsig_gis.sources.rows import WGS84
 from semsig_gis.storage.geoparquet import (
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
     from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import GeometryKind
+    from semsig_gis.sources.layer_spec import GeometryKind
 
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
@@ -131,7 +132,7 @@ def elements_in(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) 
 
     InputError if there are none.
     """
-    if not tells_elements(frame_fields(table)):
+    if not has_element_columns(frame_fields(table)):
         return table
     (layer,) = frame_layers(table, [load_catalog("openstreetmap").layer(role)])
     if layer.table.empty:

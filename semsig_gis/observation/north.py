@@ -90,8 +90,8 @@ class North:
         turns = -grid_convergence(crs, places)
         if name == "magnetic":
             date = dt.datetime.now().astimezone().date() if date is None else date
-            degrees = to_degrees(crs).transform(*places.T)
-            turns = turns + declination(*degrees, date)
+            lon, lat = to_degrees(crs).transform(places[:, 0], places[:, 1])
+            turns = turns + declination(lon, lat, date)
         turn = float(signed_degrees(turns[0]))
         spread = float(np.abs(signed_degrees(turns - turn)).max())
         return cls(name=name, turn=turn, spread=spread, date=date)

@@ -18,8 +18,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.symbology import escaped, one_line
 from semsig_gis.core.tables import Table, markdown_rows
+from semsig_gis.core.text import escaped, one_line
 from semsig_gis.reports.outcomes import draw_map
 from semsig_gis.reports.plots import draw_plot, in_the_dark
 from semsig_gis.reports.scenes import draw_scene

@@ -18,7 +18,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from semsig_gis.core.errors import extra
-from semsig_gis.core.symbology import one_line
+from semsig_gis.core.text import one_line
 
 with extra("plot", "a report or a figure"):
     import matplotlib as mpl

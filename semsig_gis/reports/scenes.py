@@ -12,7 +12,8 @@ import numpy as np
 
 from semsig_gis.core.errors import InputError, extra
 from semsig_gis.core.geometry import to_degrees
-from semsig_gis.core.symbology import OUTCOMES, ClassSign, class_signs, one_line
+from semsig_gis.core.symbology import OUTCOMES, ClassSign, class_signs
+from semsig_gis.core.text import one_line
 from semsig_gis.evaluation.queries.true_view import Sight
 from semsig_gis.reports.plots import GROUND, INK, SOFT, blank_figure, draw_legend, label, saved
 from semsig_gis.reports.report_model import Pair, Scene, SceneObject

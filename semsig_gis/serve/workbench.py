@@ -23,10 +23,10 @@ from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 from semsig_gis.exports import export_answer
 from semsig_gis.localization.likelihood.incremental import TurnMemo
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
+from semsig_gis.localization.likelihood.method import LikelihoodMethod
 from semsig_gis.localization.likelihood.priors import KnownPosition, position_prior
-from semsig_gis.localization.noise.model import NOISES, cell_noise
+from semsig_gis.localization.locator import make_locator, method_index
+from semsig_gis.localization.noise.model import NOISES
 from semsig_gis.localization.suggest import next_questions, with_unplaced
 from semsig_gis.maps.image import CellPixels, city_image
 from semsig_gis.maps.location import RAYS
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.localization.likelihood.index import CellScores, LikelihoodIndex
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization.likelihood.locate import LikelihoodLocator, Location
     from semsig_gis.localization.noise.model import Noise
 
 MOST_UPLOAD = 25 * 2**20
@@ -322,22 +322,25 @@ class Workbench:
         """Return what views of a question are compared with."""
         key = self._noise(question), question.seen_from
         if key not in self._indexes:
-            noise = self.noises[key[0]]
-            if question.seen_from == "anywhere":
-                noise = cell_noise(noise, self.database.grid.step)
-            self._indexes[key] = build_index(self.database, noise)
+            self._indexes[key] = method_index(self.database, self._method(question))
         return self._indexes[key]
+
+    def _method(self, question: Question) -> LikelihoodMethod:
+        """Return the method of a question."""
+        noise = self.noises[self._noise(question)]
+        return LikelihoodMethod(noise=noise, on_grid=question.seen_from == "cells")
 
     def _locator(self, question: Question) -> LikelihoodLocator:
         """Return what answers a question."""
-        locator = LikelihoodLocator(
+        locator = make_locator(
+            self.database,
+            self._method(question),
             index=self._index(question),
             store=self.store,
-            refined=None if question.seen_from == "anywhere" else False,
             top=question.top,
             explained=question.top,
-            memo=self._memo,
         )
+        locator = replace(locator, memo=self._memo)
         if self._is_quick(question):
             locator = replace(locator, refined=False, quick=True, explained=QUICKLY_EXPLAINED)
         if question.near is not None:

@@ -20,7 +20,7 @@ from semsig_gis.core.errors import (
 from semsig_gis.core.geometry import require_metric_crs
 from semsig_gis.core.plugins import installed_catalogs
 from semsig_gis.core.taxonomy import MAX_HEIGHT_M, MAX_RANGE_M, ObjectClass, Taxonomy
-from semsig_gis.sources.layers import conditions_of, layer_of, require_class
+from semsig_gis.sources.layer_spec import conditions_of, layer_of, require_class
 from semsig_gis.storage.text import read_text
 from semsig_gis.storage.toml import check_keys, metres, parse_toml, texts
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from importlib.resources.abc import Traversable
 
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 # Shipped beside the catalogues: the paper's classes, words by which drafts are made, and more.

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semsig_gis.core.errors import InputError
-from semsig_gis.sources import file_reader, files_in, require_file
+from semsig_gis.sources.files import file_reader
 from semsig_gis.sources.parquet import SUFFIXES, column_names
+from semsig_gis.sources.paths import files_in, require_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -16,11 +16,11 @@ from semsig_gis.storage.text import parse_json
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Position
 
 FIELDS = ("id", "object_value", "object_type", "geometry", "first_seen_at", "last_seen_at")

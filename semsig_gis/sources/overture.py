@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.http.cache import Cache, Entry
+    from semsig_gis.sources.http.cache import Cache, CacheEntry
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
 
     Boxes = Sequence[tuple[float, float, float, float]]
 
@@ -286,19 +286,19 @@ def fetch_layers(
     kinds = sorted({layer.dataset or "" for layer in published})
     system, folder = _open_store(address, spec)
     release, files = _listing(system, folder, kinds, address=address, cache=cache, spec=spec)
-    spec.tell(f"{address.partition('?')[0]}: release {release}, {len(files):,} files")
+    spec.report(f"{address.partition('?')[0]}: release {release}, {len(files):,} files")
 
     def held(file: str) -> Path:
         rules = [layer for layer in published if _may_hold(file, layer)]
         what = [address, file, boxes, [[layer.name, layer.tags, layer.fields] for layer in rules]]
         key = _key(what)
-        if (kept := cache.entry(key).copy()) is not None:  # a release does not change
+        if (kept := cache.entry(key).cached_file()) is not None:  # a release does not change
             return kept.path
         if spec.offline:
             raise _not_cached(file, address, cache)
         with cache.locked(key) as entry:
             tables = [table for table in _slices(system, file, rules, boxes) if len(table)]
-            body = entry.scratch(".parquet")
+            body = entry.temporary_path(".parquet")
             # A file that has nothing here is known as such by one without columns.
             pq.write_table(pa.concat_tables(tables) if tables else pa.table({}), body)
             return _keep(entry, body, f"{address.partition('?')[0]} {file}", what)
@@ -357,7 +357,7 @@ def _listing(
     what = [address, *kinds]
     key = _key(what)
     if spec.offline:
-        held = cache.entry(key).copy()
+        held = cache.entry(key).cached_file()
         if held is None:
             raise _not_cached(folder, address, cache)
         found = parse_json(held.path.read_bytes())
@@ -380,7 +380,7 @@ def _listing(
             f"{release} contains no files of {', '.join(kinds)}; name another store in endpoints."
         )
     with cache.locked(key) as entry:
-        body = entry.scratch(".json")
+        body = entry.temporary_path(".json")
         body.write_text(json.dumps({"release": Path(release).name, "files": files}), "utf-8")
         _keep(entry, body, address, what)
     return Path(release).name, files
@@ -404,7 +404,7 @@ def _key(what: Sequence[object]) -> str:
     return hashlib.sha256(json.dumps(what).encode()).hexdigest()[:32]
 
 
-def _keep(entry: Entry, body: Path, address: str, what: Sequence[object]) -> Path:
+def _keep(entry: CacheEntry, body: Path, address: str, what: Sequence[object]) -> Path:
     """Make a file that was written in the place for it the entry of the cache; return its path."""
     fetched = Fetched(
         path=body,

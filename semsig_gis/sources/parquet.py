@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import shapely
 
 from semsig_gis.core.errors import SourceError
-from semsig_gis.sources import require_file
+from semsig_gis.sources.paths import require_file
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, UNREADABLE, require_intact
 
 if TYPE_CHECKING:

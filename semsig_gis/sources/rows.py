@@ -19,9 +19,9 @@ from pyproj.exceptions import CRSError
 
 from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
 from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, NAME, SOURCE_ID, crs_label
-from semsig_gis.sources import RawLayer, RowCounts
 from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
-from semsig_gis.sources.layers import MAX_WIDTH_M, MIN_WIDTH_M
+from semsig_gis.sources.layer import RawLayer, RowCounts
+from semsig_gis.sources.layer_spec import MAX_WIDTH_M, MIN_WIDTH_M
 from semsig_gis.sources.numbers import decimal
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.sources.filters import Value
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 
 WGS84 = CRS.from_epsg(4326)

@@ -16,7 +16,7 @@ from semsig_gis.core.geometry import GridSpec
 from semsig_gis.database.build import build_database
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.objects.load import build_objects, choose_layers
-from semsig_gis.reports.quality import quality_report
+from semsig_gis.objects.quality import quality_report
 from semsig_gis.sources import find_files
 from semsig_gis.sources.catalog import load_catalog
 from semsig_gis.sources.vector import read_layer

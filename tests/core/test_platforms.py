@@ -11,7 +11,7 @@ import filelock
 import pytest
 
 from semsig_gis import open_cache
-from semsig_gis.core.memory import address_space_left
+from semsig_gis.core.resources import free_address_space
 from semsig_gis.core.temporary import own_folder
 from semsig_gis.core.threads import cores
 from semsig_gis.storage.whole import alone_in, exchanged, whole_folder
@@ -27,7 +27,7 @@ def test_without_affinity_all_processors_count(monkeypatch: pytest.MonkeyPatch) 
 
 def test_without_limits_of_memory_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
-    assert address_space_left() is None
+    assert free_address_space() is None
 
 
 def test_without_locks_folders_are_made_and_go(

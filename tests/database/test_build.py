@@ -21,7 +21,7 @@ from worlds import (
     worlds,
 )
 
-from semsig_gis.core import effort
+from semsig_gis.core import resources
 from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
 from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
 from semsig_gis.core.rtree import PackedIndex
@@ -241,7 +241,7 @@ def test_as_many_pairs_are_expected_as_there_are(town: World, radius: float, ste
 def test_what_the_memory_does_not_hold_is_not_begun(
     town: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(effort, "free_memory", lambda: 120_000_000)
+    monkeypatch.setattr(resources, "free_memory", lambda: 120_000_000)
     build_database(town.street_objects)
     with refused(InputError, "sightings", "0.1 GB are free", "smaller tiles"):
         build_database(town.street_objects, spec=SignatureSpec(3000.0))

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, CORNER, World, assert_same, worlds
 
-from semsig_gis.core import effort
+from semsig_gis.core import resources
 from semsig_gis.core.errors import (
     CrsError,
     DatabaseError,
@@ -363,7 +363,7 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
 def test_tiles_that_the_memory_does_not_hold_are_not_begun(
     objects_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(effort, "free_memory", lambda: 150_000_000)
+    monkeypatch.setattr(resources, "free_memory", lambda: 150_000_000)
     build_tiles(objects_file, tmp_path / "city", tile=TileSpec(80.0))
     with refused(InputError, "by each of 2 processes", "0.2 GB", "smaller tiles"):
         build_tiles(objects_file, tmp_path / "other", tile=TileSpec(80.0), workers=2)

@@ -253,7 +253,7 @@ def test_the_likelihood_method_answers_as_it_locates(text: str) -> None:
     town = random_town()
     database, store = town.database, ObjectStore.of(town.street_objects)
     index = build_index(database, cell_noise(method.noise, database.grid.step))
-    locator = make_locator(database, method, store=lambda: store)
+    locator = make_locator(database, method, store=store if method.refined else None)
     spec = QuerySpec(number=6, seen_from="anywhere")
     drawn = [query.asked.signature for query in draw_queries(database, spec, store=store)]
     queries = [query for query in drawn if len(query)]

@@ -15,7 +15,8 @@ from sentences import refused
 from semsig_gis.core.errors import InputError, UnknownNameError
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.database import SequenceTable
-from semsig_gis.localization.answers import DistanceMemo, Requirement
+from semsig_gis.localization.distance.memo import DistanceMemo
+from semsig_gis.localization.requirement import Requirement
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:

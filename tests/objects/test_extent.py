@@ -15,7 +15,7 @@ from semsig_gis.database.build import build_database
 from semsig_gis.objects.extent import settle_extent
 from semsig_gis.objects.load import assemble
 from semsig_gis.sources.catalog import Catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

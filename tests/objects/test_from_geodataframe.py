@@ -21,7 +21,7 @@ from semsig_gis.database.store import ObjectStore
 from semsig_gis.objects.from_geodataframe import objects_from_frame
 from semsig_gis.objects.load import assemble, choose_layers, read_files
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
 
 if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase

@@ -26,12 +26,13 @@ from semsig_gis.objects.load import (
     choose_layers,
     read_files,
 )
+from semsig_gis.objects.quality import quality_report
 from semsig_gis.objects.skipped_layers import passed_by, read_small
 from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.reports.quality import quality_report, quality_tables
+from semsig_gis.reports.quality import quality_tables
 from semsig_gis.sources import RowCounts
 from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.rows import RowRules, Rows
 

@@ -15,15 +15,15 @@ from raw_layers import raw_layer
 
 from semsig_gis.objects.conflate import conflate
 from semsig_gis.objects.load import build_objects
+from semsig_gis.objects.quality import quality_report
 from semsig_gis.objects.table import StreetObjects
-from semsig_gis.reports.quality import quality_report
 from semsig_gis.sources.catalog import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from semsig_gis.objects.load import LoadReport
-    from semsig_gis.reports.quality import QualityReport
+    from semsig_gis.objects.quality import QualityReport
     from semsig_gis.sources import RawLayer
 
 TAXONOMY = paper_taxonomy()

@@ -24,7 +24,7 @@ from sentences import refused
 
 from semsig_gis import __version__
 from semsig_gis.core.errors import InputError
-from semsig_gis.core.symbology import one_line
+from semsig_gis.core.text import one_line
 from semsig_gis.reports.page import html_page, markdown_page, write_page, write_report
 from semsig_gis.reports.report_model import Number, Section
 

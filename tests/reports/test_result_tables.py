@@ -40,6 +40,7 @@ from semsig_gis.localization.noise.model import named_noise
 from semsig_gis.objects.changes import ClassChange
 from semsig_gis.objects.conflate import ConflatedPair
 from semsig_gis.objects.load import LayerReport, UnreadLayer
+from semsig_gis.objects.quality import ClassQuality, QualityReport
 from semsig_gis.reports.database import database_tables
 from semsig_gis.reports.evaluation import (
     comparison_sentence,
@@ -52,7 +53,7 @@ from semsig_gis.reports.identifiability import (
     identifiability_tables,
 )
 from semsig_gis.reports.page import write_report
-from semsig_gis.reports.quality import ClassQuality, QualityReport, quality_tables, update_tables
+from semsig_gis.reports.quality import quality_tables, update_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from semsig_gis.sources.catalog import (
     load_catalog,
     paper_taxonomy,
 )
-from semsig_gis.sources.layers import LayerSpec, WidthBy
+from semsig_gis.sources.layer_spec import LayerSpec, WidthBy
 from semsig_gis.sources.vector.member import DRIVERS
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from semsig_gis.sources.catalog import (
     data_folder,
     paper_taxonomy,
 )
-from semsig_gis.sources.layers import (
+from semsig_gis.sources.layer_spec import (
     CLASS_BY_KEYS,
     LAYER_KEYS,
     WIDTH_BY_KEYS,

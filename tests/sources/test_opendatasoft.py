@@ -25,10 +25,10 @@ from servers import Answer, published
 
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError
 from semsig_gis.sources.area import Area
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
+from semsig_gis.sources.services.fetch import fetch_layers
 from semsig_gis.sources.services.layers import find_field, fold, read_layers
 from semsig_gis.sources.services.opendatasoft import _outline
-from semsig_gis.sources.services.pages import fetch_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable

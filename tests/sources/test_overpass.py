@@ -22,11 +22,12 @@ from servers import Answer
 
 from semsig_gis.core.errors import CatalogError, InputError, SourceError
 from semsig_gis.sources import RowCounts
-from semsig_gis.sources.area import Area, parse_area
+from semsig_gis.sources.area import Area
 from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.clip import parse_area
 from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.osm import file as osm_file
 from semsig_gis.sources.osm.overpass import (
     fetch_layers,

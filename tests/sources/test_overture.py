@@ -14,8 +14,8 @@ from stores import keep_in_bucket
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import find_files
-from semsig_gis.sources.area import clip_layer, parse_area
 from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.sources.clip import clip_layer, parse_area
 from semsig_gis.sources.http.fetch import HttpSpec, NotCachedError
 from semsig_gis.sources.overture import fetch_layers, read_layers
 
@@ -154,7 +154,7 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
     pq.write_table(table, land, row_group_size=10)
     address = keep_in_bucket(server, "maps", release.parent)
     told: list[str] = []
-    spec = HttpSpec(attempts=1, tell=told.append)
+    spec = HttpSpec(attempts=1, report=told.append)
     options: Any = {"endpoints": [address], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
     files = fetch_layers(SPECS, spec=spec, progress=lambda *s: steps.append(s), **options)

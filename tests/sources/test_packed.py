@@ -12,7 +12,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import SourceError
 from semsig_gis.sources.compression import HARMLESS_BYTES, require_modest
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.osm.file import read_layers
 from semsig_gis.sources.vector import read_layer
 

@@ -17,7 +17,7 @@ from sentences import refused
 from semsig_gis.core.errors import CatalogError
 from semsig_gis.core.geometry import crs_label
 from semsig_gis.sources import reader
-from semsig_gis.sources.layers import ClassBy, LayerSpec, WidthBy
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec, WidthBy
 from semsig_gis.sources.rows import (
     RowRules,
     Rows,

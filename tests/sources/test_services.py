@@ -26,11 +26,13 @@ from stand_ins import (
 
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.sources import reader
-from semsig_gis.sources.area import Area, parse_area
+from semsig_gis.sources.area import Area
+from semsig_gis.sources.clip import parse_area
 from semsig_gis.sources.http.fetch import HttpError
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.sources.services.fetch import fetch_layers
 from semsig_gis.sources.services.layers import read_layers
-from semsig_gis.sources.services.pages import PagingError, fetch_layers
+from semsig_gis.sources.services.pages import PagingError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

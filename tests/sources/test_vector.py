@@ -28,7 +28,7 @@ from sentences import refused
 
 from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
 from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.layers import ClassBy, LayerSpec
+from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
 from semsig_gis.sources.vector import list_layers, read_layer
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import DatabaseError, SourceError
 from semsig_gis.core.parallel import check_workers, finish_tasks
+from semsig_gis.core.resources import announce
 from semsig_gis.database.city import City
 from semsig_gis.database.file import digest
 from semsig_gis.evaluation.experiments.tables import experiment_figures, experiment_markdown
@@ -37,7 +37,7 @@ from semsig_gis.evaluation.scoring import (
     versions,
 )
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.localization.answers import DistanceMemo
+from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.locator import make_locator
 from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
 from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
@@ -52,7 +52,8 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
-    from semsig_gis.localization.answers import Answer, Locator
+    from semsig_gis.localization.answers import Answer
+    from semsig_gis.localization.locator import Locator
 
     # Experiments and the folders where their parts are put, by the folders for their results.
     Running = Mapping[Path, tuple["ExperimentWork", Path]]
@@ -332,11 +333,9 @@ class ExperimentWork:
     def _locator(self, name: str) -> Locator[Answer]:
         """Return a method with all that it needs."""
         if name not in self._locators:
-            self._locators[name] = make_locator(
-                self.database,
-                self.spec.methods[name],
-                store=lambda: self._city(self.spec.database).store,
-            )
+            method = self.spec.methods[name]
+            store = self._city(self.spec.database).store if method.refined else None
+            self._locators[name] = make_locator(self.database, method, store=store)
         return self._locators[name]
 
     def _city(self, name: str) -> City:

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core.checks import MOST_SEED, MOST_WORKERS, require_number
-from semsig_gis.core.effort import announce
 from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.resources import announce
 from semsig_gis.core.statistics import fit_shares
 from semsig_gis.evaluation.identifiability.lookalikes import (
     LEAST_SUM,

@@ -11,9 +11,9 @@ import pandas as pd
 
 from semsig_gis.core.checks import MOST_SEED, MOST_WORKERS, require_number
 from semsig_gis.core.display import Displayed
-from semsig_gis.core.effort import announce
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core.resources import announce
 from semsig_gis.core.text import percent
 from semsig_gis.evaluation.figures import calibration_bins, finite_or_none
 from semsig_gis.evaluation.identifiability.trials import (

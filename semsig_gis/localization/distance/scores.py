@@ -13,7 +13,7 @@ import numpy as np
 
 from semsig_gis.core.taxonomy import WILDCARD
 from semsig_gis.database.file import PartitionedDatabase
-from semsig_gis.localization.answers import DistanceMemo
+from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.distance.method import ANGLES, BOTH, FUSION, TYPES
 from semsig_gis.localization.distance.metrics import metric
 from semsig_gis.localization.distance.metrics.edit import EditWeights

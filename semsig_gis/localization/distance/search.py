@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from semsig_gis.core.display import MapFrame
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.answers import DistanceMemo, Requirement
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
+    from semsig_gis.localization.requirement import Requirement
     from semsig_gis.observation.north import North
 
 

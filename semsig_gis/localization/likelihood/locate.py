@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from semsig_gis.core.signature import Signature
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.localization.answers import DistanceMemo
+    from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
     from semsig_gis.localization.likelihood.explain import Explanation
@@ -462,7 +462,7 @@ class LocateOptions(TypedDict, total=False):
     rule: AnswerRule
     top: int
     store: ObjectStore | None
-    refined: bool
+    refined: bool | None
     explained: int
     known: Mapping[str, Any]
     north: North

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import ElementKind, LayerSpec, Role
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec, Role
     from semsig_gis.sources.rows import Position
 
 RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its end

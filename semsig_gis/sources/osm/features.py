@@ -33,10 +33,12 @@ from semsig_gis.storage.toml import parse_toml
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
     from semsig_gis.sources.rows import Position
 
+# What a file is by its name, and what pyosmium calls it.
+FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
 SUFFIXES = frozenset({*DRIVERS, *parquet.SUFFIXES, ".zip"} - {".csv"})
 # Columns of all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
 MAPS = ("tags", "other_tags", "@other_tags")
@@ -136,15 +138,15 @@ def table_layers(
     return (replace(raw[0], notes=(*raw[0].notes, *notes)), *raw[1:]) if raw else ()
 
 
-def tells_elements(fields: Iterable[str]) -> bool:
+def has_element_columns(fields: Iterable[str]) -> bool:
     """Tell whether columns can only be those of elements of OpenStreetMap, with their tags."""
     fields = set(fields)
     pairs = (pair for pair in KINDS_AND_NUMBERS if pair != (TYPE, "id"))
     named = fields & {QUACKOSM, "@id", "@osmId", "full_id", NUMBER}
-    return holds_tags(fields) and bool(named or any(fields.issuperset(pair) for pair in pairs))
+    return has_tag_columns(fields) and bool(named or any(fields.issuperset(pair) for pair in pairs))
 
 
-def holds_tags(fields: Iterable[str]) -> bool:
+def has_tag_columns(fields: Iterable[str]) -> bool:
     """Tell whether some columns are tags, or hold them."""
     fields = set(fields)
     return bool(fields & {*MAPS, *_index().keys} or fields.issuperset((CLASS, CODE)))
@@ -164,7 +166,7 @@ def file_reader(path: Path, *, sure: bool = False) -> str | None:
         if b'"elements"' in start and b'"Feature' not in start:
             return "overpass"
     names = [column_names(path)] if suffix in parquet.SUFFIXES else layer_fields(path)
-    tells = tells_elements if sure else holds_tags
+    tells = has_element_columns if sure else has_tag_columns
     return "osm_features" if any(map(tells, names)) else None
 
 
@@ -206,7 +208,7 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         yield frame_table(frame)
         return
     for table in read_tables(
-        path, lambda fields: names_read if holds_tags(fields) else (), crs=crs
+        path, lambda fields: names_read if has_tag_columns(fields) else (), crs=crs
     ):
         rows = table.rows
         values = zip(*rows.values, strict=True) if rows.values else [()] * len(table.fields)

@@ -19,11 +19,12 @@ from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 from semsig_gis.core.errors import CatalogError, SourceError
 from semsig_gis.core.geometry import HALF_TURN
 from semsig_gis.core.temporary import own_folder
-from semsig_gis.sources import require_file
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import require_modest
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
+from semsig_gis.sources.osm.features import FORMATS
 from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
+from semsig_gis.sources.paths import require_file
 from semsig_gis.sources.rows import BadFeatureError
 
 if TYPE_CHECKING:
@@ -32,12 +33,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from osmium.osm import Location
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layers import ElementKind, LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
     from semsig_gis.sources.rows import Position
 
-# What a file is by its name, and what pyosmium calls it.
-FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
 KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 # pyosmium's table of node places that is not in memory.
 PLACES = "sparse_file_array"

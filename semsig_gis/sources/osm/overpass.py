@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Position
 
 JSON = ("application/json",)
@@ -422,7 +422,7 @@ class _Servers:
                 TOO_MANY,
             )
         if wait:
-            spec.tell(f"{host_of(address)} has no free slot for {wait:.0f} s")
+            spec.report(f"{host_of(address)} has no free slot for {wait:.0f} s")
             spec.sleep(wait + NO_SLOT_MARGIN_S)
 
 

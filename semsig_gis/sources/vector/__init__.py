@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
     from pyproj import CRS
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.csv_layer import CsvTable
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Rows
     from semsig_gis.sources.vector.by_pyogrio import Layer
 

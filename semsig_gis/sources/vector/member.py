@@ -12,8 +12,8 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from semsig_gis.core.errors import SourceError
-from semsig_gis.sources import require_file
 from semsig_gis.sources.compression import bomb, swells
+from semsig_gis.sources.paths import require_file
 
 CSV = "CSV"
 GEOJSON = "GeoJSON"

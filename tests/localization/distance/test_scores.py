@@ -12,7 +12,7 @@ from noisy_cells import METHODS, NOTHING, asked, database_of, random_cells
 
 from semsig_gis.core.errors import InputError
 from semsig_gis.core.signature import Signature
-from semsig_gis.localization.answers import DistanceMemo
+from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.metrics import metric
 from semsig_gis.localization.distance.scores import _MANY_QUERIES, score_cells

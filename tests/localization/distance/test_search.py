@@ -20,11 +20,11 @@ from worlds import random_town
 from semsig_gis.core.errors import EmptyResultError, InputError
 from semsig_gis.core.signature import Signature
 from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
-from semsig_gis.localization.answers import Requirement
 from semsig_gis.localization.distance.method import Method
 from semsig_gis.localization.distance.scores import score_cells
 from semsig_gis.localization.distance.search import DistanceLocator
 from semsig_gis.localization.locator import localize
+from semsig_gis.localization.requirement import Requirement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
