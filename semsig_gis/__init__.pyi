@@ -185,7 +185,7 @@ from .reports.scenes import (
     draw_scenes as draw_scenes,
 )
 from .core.tables import Table as Table
-from .evaluation.experiments.run import open_results as open_results
+from .evaluation.experiments.results import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (
     run_experiment as run_experiment,

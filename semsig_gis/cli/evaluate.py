@@ -207,7 +207,7 @@ def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None
         common_cases,
         compare_evaluations,
     )
-    from semsig_gis.evaluation.experiments.run import open_results
+    from semsig_gis.evaluation.experiments.results import open_results
     from semsig_gis.evaluation.figures import plain_records
     from semsig_gis.reports.evaluation import comparison_sentence, comparison_table
 

@@ -102,7 +102,7 @@ def test_a_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPa
     before = contents(reproduced)
     for name in ("build_database", "time_queries", "save_database"):
         monkeypatch.setattr(f"semsig_gis.evaluation.paper.reproduction.{name}", never)
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", never)
+    monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", never)
     database = reproduced.parent / "city.parquet"
     found = reproduce(reproduced, database=database, queries=QUERIES)
     assert found.settings["queries"] == QUERIES
