@@ -26,7 +26,7 @@ from semsig_gis.core.statistics import wilson_interval
 from semsig_gis.database.city import City
 from semsig_gis.database.file import open_database, save_database
 from semsig_gis.evaluation.identifiability import result as identifiability_file
-from semsig_gis.evaluation.identifiability.analysis import _places, identify
+from semsig_gis.evaluation.identifiability.analysis import _merged_places, identify
 from semsig_gis.evaluation.identifiability.check import check_identifiability
 from semsig_gis.evaluation.identifiability.lookalikes import find_lookalikes
 from semsig_gis.evaluation.identifiability.result import (
@@ -134,7 +134,7 @@ def test_places_of_several_looks_become_few() -> None:
     rng = np.random.default_rng(2)
     found = rng.integers(-1, 40, (120, 3))
     chances = rng.random((120, 3))
-    named, sums = _places(database, found, chances, radius=20.0)
+    named, sums = _merged_places(database, found, chances, radius=20.0)
     for cell in range(40):
         of_cell = slice(3 * cell, 3 * cell + 3)
         some = found[of_cell] >= 0
