@@ -1,8 +1,7 @@
-"""Plots and maps of results: how `plot` and `explore` reach the packages that draw.
+"""Calls of public plot and map functions by name, for the methods `plot` and `explore` of results.
 
-A result draws itself in a notebook, but the packages that draw import the package of the result.
-So the root of `semsig_gis`, which lists all public names, registers here how to load one, and the
-methods of a result call a function by its public name.
+The packages that draw import the packages of the results, so a result cannot import them. The root
+package `semsig_gis`, which lists all public names, registers here a function that loads one.
 """
 
 from __future__ import annotations
@@ -18,15 +17,15 @@ _loaders: list[Callable[[str], Any]] = []
 
 
 def register_loader(load: Callable[[str], Any]) -> None:
-    """Set the function that returns a public function by its name."""
+    """Register the function that returns a public function by name."""
     _loaders[:] = [load]
 
 
 def plot_with(name: str, *results: object, **options: Any) -> Axes:  # noqa: ANN401 - as it takes
-    """Call the public function `name`, which draws results on axes."""
+    """Return the axes on which the public function `name` draws results."""
     return _loaders[0](name)(*results, **options)
 
 
 def map_with(name: str, *results: object) -> MapFrame:
-    """Show in a notebook the map that the public function `name` returns for results."""
+    """Return the map by the public function `name` of results, to show in a notebook."""
     return _loaders[0]("show_map")(_loaders[0](name)(*results))

@@ -9,6 +9,8 @@ import sys
 import warnings
 from pathlib import Path
 
+import psutil
+
 from semsig_gis.core.errors import InputError
 
 if sys.platform != "win32":
@@ -32,8 +34,6 @@ MEMORY_MESSAGES = tuple(os.strerror(number) for number in (errno.ENOMEM, errno.E
 
 def free_memory() -> int:
     """Return the number of bytes that this process may still allocate."""
-    import psutil  # noqa: PLC0415 - it loads slowly
-
     free = [psutil.virtual_memory().available]
     for usage, limit in CGROUP_FILES:
         with contextlib.suppress(OSError, ValueError):  # without a limit, the file contains "max"
@@ -61,8 +61,6 @@ def free_address_space() -> int | None:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return None
-    import psutil  # noqa: PLC0415 - it loads slowly
-
     size: int = psutil.Process().memory_info().vms
     return limit - size
 

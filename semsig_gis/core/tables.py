@@ -1,4 +1,4 @@
-"""Tables of text, and how they are written as Markdown."""
+"""Tables of text, written as Markdown."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table for people.
+    """A table of text for a report.
 
     Parameters
     ----------
     title : str
-        What it shows.
+        Title of the table.
     columns : tuple of str
         Headings, with units.
     rows : tuple of tuple of str
-        Cells as text, one for each column; empty where there is nothing to say.
+        Cells as text, one for each column; empty for a missing value.
     note : str, default ""
-        What a reader must know to read it rightly.
+        Explanation below the table.
     labels : int, default 1
-        How many columns from the left are text; the others are numbers.
+        Number of text columns at the left; the others are numbers.
     groups : tuple of (str, tuple of str), optional
-        The headings after the labels in two rows: each group with its columns.
+        Headings of the number columns in two rows: each group with its columns.
     bold : frozenset of (int, int), optional
         Row and column of the cells in bold.
     intervals : mapping of (int, int) to str, optional
@@ -57,18 +57,18 @@ class Table:
 
     @classmethod
     def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:
-        """Return a table of columns, which are given by their headings."""
+        """Return a table from columns by heading."""
         return cls(title, tuple(columns), tuple(zip(*columns.values(), strict=True)), note)
 
     @property
     def group_starts(self) -> frozenset[int]:
-        """At which columns a group begins."""
+        """Indices of the columns where a group begins."""
         widths = [len(columns) for _, columns in self.groups[:-1]]
         return frozenset(itertools.accumulate(widths, initial=self.labels) if self.groups else ())
 
     @property
     def spans(self) -> tuple[int, ...]:
-        """How many rows from here on share the first label; 0 where the row above has it."""
+        """Rows that share the first label, at the first row of each run; 0 at the others."""
         runs = (len(list(rows)) for _, rows in itertools.groupby(row[0] for row in self.rows))
         return tuple(span for run in runs for span in (run, *[0] * (run - 1)))
 
@@ -77,13 +77,13 @@ class Table:
         return self.markdown()
 
     def markdown(self) -> str:
-        """Return the table as a Markdown section: its heading, rows and note."""
+        """Return the table as a Markdown section: heading, rows and note."""
         note = f"\n{escaped(self.note)}\n" if self.note else ""
         return f"### {escaped(self.title)}\n\n{markdown_rows(self, escaped)}\n{note}"
 
 
 def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
-    """Return the headings and rows of a table as Markdown, with its texts escaped."""
+    """Return the headings and rows of a table as Markdown; `escape` is applied to each text."""
 
     def cell(row: int, column: int) -> str:
         text = escape(table.rows[row][column])

@@ -21,12 +21,11 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.core.threads import NotWantedError, while_wanted
+from semsig_gis.core import InputError, SemsigError, WorkCancelledError, cancellable
 from semsig_gis.serve.page import policy, workbench_page
 from semsig_gis.serve.streets import city_ground
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -122,7 +121,7 @@ class _Api:
         number = self.asked[page] = self.asked[page] + 1
 
         def answer() -> dict[str, Any]:
-            with while_wanted(lambda: number == self.asked[page]):
+            with cancellable(lambda: number == self.asked[page]):
                 return self.bench.answer(told)
 
         return await self._told(answer)
@@ -211,7 +210,7 @@ def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
         routes=routes,
         exception_handlers={
             SemsigError: _refused,
-            NotWantedError: _outrun,
+            WorkCancelledError: _outrun,
             HTTPException: _failed,
             Exception: _failed,
         },

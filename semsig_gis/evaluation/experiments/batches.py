@@ -16,28 +16,29 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.database.city import City
-from semsig_gis.database.file import digest
+from semsig_gis.core import SourceError
+from semsig_gis.database import City, digest
 from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.queries.draw import check_count, draw_queries
 from semsig_gis.evaluation.scoring import make_evaluation, score_queries, scored_tables
 from semsig_gis.evaluation.spec import Case
-from semsig_gis.localization.distance.memo import DistanceMemo
-from semsig_gis.localization.locator import make_locator
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.localization import DistanceMemo, make_locator
+from semsig_gis.storage import (
+    VERIFY_CHECKSUMS,
+    add_footer_checksum,
+    check_footer_checksum,
+    whole_file,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.localization.locator import Locator
+    from semsig_gis.localization import Answer, Locator
 
 BATCH_QUERIES = 100
 MEMO_BYTES = 256 << 20  # memory for the distances that the methods of an experiment share
@@ -151,7 +152,7 @@ class OpenExperiment:
             for name, scored in self._scored(names, queries):
                 with whole_file(missing[name]) as unfinished:
                     scored.to_parquet(unfinished, write_page_checksum=True)
-                    seal(unfinished)
+                    add_footer_checksum(unfinished)
 
     def _scored(
         self, names: Sequence[str], queries: Sequence[SimulatedQuery]
@@ -192,7 +193,7 @@ class OpenExperiment:
         for distortion, method in product(self.spec.distortions, self.spec.methods):
             batches = [batch for batch in self.batches if batch.distortion == distortion]
             files = [_batch_file(folder, batch, method) for batch in batches]
-            tables = [pq.read_table(file, **CHECKING_PAGES) for file in files]
+            tables = [pq.read_table(file, **VERIFY_CHECKSUMS) for file in files]
             scored = pa.concat_tables(tables, promote_options="default").to_pandas()
             for top in self.spec.top:
                 case = Case(distortion=distortion, method=method, top=top)
@@ -239,7 +240,7 @@ def _is_complete(file: Path, *, rows: int) -> bool:
     if not file.is_file():
         return False
     try:
-        require_intact(file)
-        return bool(pq.read_table(file, **CHECKING_PAGES).num_rows == rows)
+        check_footer_checksum(file)
+        return bool(pq.read_table(file, **VERIFY_CHECKSUMS).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False

@@ -5,14 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import DatabaseError
+from semsig_gis.core import DatabaseError
 from semsig_gis.evaluation.experiments.tables import experiment_figures, experiment_markdown
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
 from semsig_gis.evaluation.spec import parse_experiment
-from semsig_gis.storage.runs import RunKind, read_json, write_json
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import toml_text
-from semsig_gis.storage.whole import write_whole
+from semsig_gis.storage import (
+    RunKind,
+    read_json,
+    read_text,
+    toml_text,
+    write_json,
+    write_whole,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,14 +8,12 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.resources import announce
+from semsig_gis.core import DatabaseError, announce, check_workers, finish_tasks
 from semsig_gis.evaluation.experiments.batches import OpenExperiment
 from semsig_gis.evaluation.experiments.results import BATCHES, RUN, open_results, write_results
 from semsig_gis.evaluation.scoring import QUERY_CELL_S, QUERY_S, versions
 from semsig_gis.evaluation.spec import parse_experiment
-from semsig_gis.storage.runs import finish, partial_folder
+from semsig_gis.storage import finish, partial_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -215,7 +213,7 @@ def _answer(
     failed = finish_tasks(
         answer,
         list(sizes),
-        done=count_answers,
+        on_success=count_answers,
         workers=workers,
         scheduler=scheduler,
         files=[item.folder.resolve() / item.spec.database for item, _ in unfinished.values()],

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core import MOST_METRES, InputError, cell_ids, require_number
 from semsig_gis.evaluation.identifiability.kernels import (
     BLOCK_CELLS,
     BaseScores,
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
 
 CELLS_A_TASK = 1024

@@ -25,8 +25,8 @@ import requests
 import urllib3.exceptions
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.compression import bomb, swells
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.http.cache import Fetched, FileVersion
 from semsig_gis.sources.http.deadline import (
     Deadline,
@@ -545,9 +545,9 @@ def _unpack(part: Path, body: Path, encoding: str, download: _Download) -> tuple
         for block in _unpacked(packed.read, encoding, download.host):
             size += len(block)
             _check_size(size, download)
-            if swells(packed.tell(), size):
+            if ratio_too_high(packed.tell(), size):
                 what = f"what {download.host} sends"
-                raise bomb(what, "report it to the publisher")
+                raise decompression_bomb_error(what, "report it to the publisher")
             digest.update(block)
             stream.write(block)
     return digest.hexdigest(), size

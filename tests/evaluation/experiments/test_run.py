@@ -20,16 +20,20 @@ from pandas.testing import assert_frame_equal
 from sentences import refused
 from worlds import CORNER, TOWN, World, contents, save_town
 
-from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.core.temporary import MACHINE
+from semsig_gis.core import MACHINE_PREFIX, DatabaseError, InputError, SemsigError
+from semsig_gis.evaluation import (
+    Districts,
+    OpenExperiment,
+    QueryBatch,
+    evaluate,
+    open_results,
+    parse_experiment,
+    run_experiment,
+    run_experiments,
+    score_queries,
+)
 from semsig_gis.evaluation.experiments import batches
-from semsig_gis.evaluation.experiments.batches import OpenExperiment, QueryBatch
-from semsig_gis.evaluation.experiments.results import open_results
-from semsig_gis.evaluation.experiments.run import run_experiment, run_experiments
-from semsig_gis.evaluation.scoring import evaluate, score_queries
-from semsig_gis.evaluation.spec import Districts, parse_experiment
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.locator import parse_method
+from semsig_gis.localization import Method, parse_method
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -37,10 +41,9 @@ if TYPE_CHECKING:
 
     from distributed import LocalCluster
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.queries.draw import SimulatedQuery
-    from semsig_gis.evaluation.spec import ExperimentSpec
-    from semsig_gis.localization.answers import Answer, Locator
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import ExperimentSpec, SimulatedQuery
+    from semsig_gis.localization import Answer, Locator
 
 BATCH_QUERIES = 10
 SPEC = parse_experiment("""
@@ -266,7 +269,7 @@ def test_damaged_batches_are_answered_again(folder: Path, results: Path, tmp_pat
     first, second, *_ = sorted(parts.iterdir())
     first.write_bytes(first.read_bytes()[:-50])
     pd.read_parquet(second).iloc[1:].to_parquet(second)
-    (parts / f"{MACHINE}left").mkdir()
+    (parts / f"{MACHINE_PREFIX}left").mkdir()
     resume(folder, tmp_path, results)
 
 
