@@ -26,7 +26,7 @@ from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
 from .objects.conflation import conflate as conflate
 from .objects.draft import draft_catalog as draft_catalog
-from .objects.fetch import (
+from .sources.fetch import (
     fetch_layers as fetch_layers,
     find_area as find_area,
     open_cache as open_cache,
