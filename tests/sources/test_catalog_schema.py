@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import tomllib
 from functools import cache
@@ -29,7 +28,8 @@ from semsig_gis.sources import (
     data_folder,
     paper_taxonomy,
 )
-from semsig_gis.sources.catalog import _checked_catalog
+from semsig_gis.sources.catalog import _parse_catalog
+from semsig_gis.storage import toml_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,7 +52,7 @@ ONLY_READER = (
 def accepts(content: dict[str, Any]) -> bool:
     """Whether the reader accepts a catalogue."""
     try:
-        _checked_catalog(copy.deepcopy(content), "it")
+        _parse_catalog(toml_text(content), "it")
     except CatalogError:
         return False
     return True
