@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core import ERROR_BREAKS, FAILURES, OUTCOMES, percent
-from semsig_gis.evaluation import ENOUGH, Evaluation, chain_text
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation import ENOUGH_QUERIES, Evaluation, chain_text, error_field
 from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.page_elements import (
     OUTLINES,
@@ -295,7 +294,7 @@ def _field(
         "height": height,
         "breaks": [1.0 + SHARES * least if least else 0.0 for least in FAILURES],
         "colours": list(FAILURES.values()),
-        "enough": SPOKEN * ENOUGH,
+        "enough": SPOKEN * ENOUGH_QUERIES,
     }
     return arrays, about
 
@@ -319,7 +318,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
         f"{class_bar(list(FAILURES.values()), limits)}"
-        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries count</p>'
+        f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
     return (
         "<summary>Localization errors</summary>"

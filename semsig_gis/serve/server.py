@@ -218,7 +218,7 @@ def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     return _Guard(app, port=port, token=token)
 
 
-def listening(port: int) -> socket.socket:
+def open_listener(port: int) -> socket.socket:
     """Return a socket that listens on a port of this machine, any free one for 0.
 
     InputError if another program has it, or the number is none of a port.
@@ -237,7 +237,7 @@ def listening(port: int) -> socket.socket:
     return listener
 
 
-def served(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.Server:
+def make_server(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.Server:
     """Return the server of a workbench; its `run` serves until it is interrupted."""
     port = listener.getsockname()[1]
     settings = uvicorn.Config(
@@ -251,6 +251,6 @@ def served(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.
     return uvicorn.Server(settings)
 
 
-def address(listener: socket.socket, token: str) -> str:
+def server_address(listener: socket.socket, token: str) -> str:
     """Return the address of the page."""
     return f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
