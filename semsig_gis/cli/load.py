@@ -119,7 +119,7 @@ def load(
 ) -> None:
     """Read files of open data into street objects."""
     from semsig_gis.objects.load import assemble, choose_layers, read_files
-    from semsig_gis.objects.skipped_layers import passed_by, read_small
+    from semsig_gis.objects.skipped_layers import layers_in_same_extracts, read_small_layers
     from semsig_gis.sources.catalog import combine_catalogs, load_catalog
     from semsig_gis.sources.clip import BOX, clip_layers, parse_area
     from semsig_gis.sources.detect import detect_catalogs
@@ -138,7 +138,7 @@ def load(
         selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
         surroundings=bool(buildings or streets),
     )
-    others = passed_by(catalog, specs)
+    others = layers_in_same_extracts(catalog, specs)
     with progress("reading") as advance:
         found, absent = read_files(
             [*specs, *others],
@@ -148,7 +148,7 @@ def load(
             area=None if clip in {None, BOX} else parse_area(clip),
             progress=advance,
         )
-        found += read_small(catalog, [*specs, *others], files, filters=filters, crs=crs)
+        found += read_small_layers(catalog, [*specs, *others], files, filters=filters, crs=crs)
     notes = [
         f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); it is "
         "left out"

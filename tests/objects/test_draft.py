@@ -24,7 +24,7 @@ from semsig_gis.core.errors import CrsError, SourceError
 from semsig_gis.objects.draft import draft_catalog
 from semsig_gis.objects.guesses import (
     Column,
-    Sample,
+    LayerSample,
     columns_of,
     guess_class,
     guess_class_by,
@@ -427,9 +427,9 @@ def test_the_classes_are_those_of_the_catalogues() -> None:
     assert {name for name, _ in keywords("class_fields").phrases} <= known
 
 
-def sample(*rows: dict[str, Any]) -> Sample:
+def sample(*rows: dict[str, Any]) -> LayerSample:
     fields = tuple(dict.fromkeys(name for row in rows for name in row))
-    return Sample("opendatasoft", LayerInfo("x", "Point", None, len(rows), fields), rows)
+    return LayerSample("opendatasoft", LayerInfo("x", "Point", None, len(rows), fields), rows)
 
 
 def column(name: str, *values: object) -> Column:
