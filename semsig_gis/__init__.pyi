@@ -24,9 +24,9 @@ from .sources.synthetic.city import (
 )
 from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
-from .objects.conflate import conflate as conflate
+from .objects.conflation import conflate as conflate
 from .objects.draft import draft_catalog as draft_catalog
-from .objects.fetch import (
+from .sources.fetch import (
     fetch_layers as fetch_layers,
     find_area as find_area,
     open_cache as open_cache,
@@ -128,7 +128,7 @@ from .evaluation.queries.distortions import (
 from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.scoring import evaluate as evaluate
-from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
+from .evaluation.error_maps import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,
@@ -155,7 +155,7 @@ from .maps.location import localization_map as localization_map
 from .maps.location import location_map as location_map, posterior_map as posterior_map
 from .maps.objects import ground_map as ground_map, objects_map as objects_map
 from .maps.page import save_map as save_map, show_map as show_map
-from .exports import (
+from .exports.export import (
     export_answer as export_answer,
     export_database as export_database,
     export_item as export_item,
@@ -174,7 +174,7 @@ from .reports.axes import (
     plot_objects as plot_objects,
 )
 from .reports.evaluation import evaluation_tables as evaluation_tables
-from .reports.evaluation_page import evaluation_page as evaluation_page
+from .reports.evaluation_html import evaluation_page as evaluation_page
 from .reports.page import write_page as write_page
 from .reports.report_model import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables
@@ -185,7 +185,7 @@ from .reports.scenes import (
     draw_scenes as draw_scenes,
 )
 from .core.tables import Table as Table
-from .evaluation.experiments.run import open_results as open_results
+from .evaluation.experiments.results import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (
     run_experiment as run_experiment,

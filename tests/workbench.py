@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from machine import PATIENCE_S
 
-from semsig_gis.serve import server
+from semsig_gis.serve import make_server, open_listener
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.serve.workbench import Workbench
+    from semsig_gis.serve import Workbench
 
 TOKEN = "the-token-of-the-tests"  # noqa: S105 - of a server that lives for a test
 
@@ -70,8 +70,8 @@ class Page:
 @contextlib.contextmanager
 def serving(bench: Workbench) -> Iterator[Page]:
     """Serve a workbench in a thread for as long as the block runs."""
-    with server.listening(0) as listener:
-        running = server.served(bench, listener, token=TOKEN)
+    with open_listener(0) as listener:
+        running = make_server(bench, listener, token=TOKEN)
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]})
         thread.start()
         try:

@@ -18,9 +18,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import lazy_loader
 
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, NAME, crs_label
+from semsig_gis.core import (
+    HALF_WIDTH,
+    LICENSES,
+    NAME,
+    DatabaseError,
+    Displayed,
+    InputError,
+    crs_label,
+)
 from semsig_gis.database.file import (
     INPUTS,
     damaged_files,
@@ -33,10 +39,16 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.database.viewpoints import reproject, select_elements
-from semsig_gis.objects.table import licenses_of, open_objects, save_objects
-from semsig_gis.storage.geoparquet import UNREADABLE
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import folder_locked, move_folder, whole_file, whole_folder
+from semsig_gis.objects import licenses_of, open_objects, save_objects
+from semsig_gis.storage import (
+    UNREADABLE,
+    folder_locked,
+    move_folder,
+    parse_json,
+    read_whole,
+    whole_file,
+    whole_folder,
+)
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -45,9 +57,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 else:
     gpd = lazy_loader.load("geopandas")
     shapely = lazy_loader.load("shapely")
@@ -117,7 +129,7 @@ class ObjectStore(Displayed):
     @cached_property
     def index(self) -> ObjectIndex:
         """R-tree over the objects, in their order, built at the first access."""
-        from semsig_gis.core.rtree import ObjectIndex  # noqa: PLC0415 - it takes 110 ms to load
+        from semsig_gis.core import ObjectIndex  # noqa: PLC0415 - it takes 110 ms to load
 
         return ObjectIndex(self.objects.xy)
 
@@ -337,7 +349,7 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    from semsig_gis.objects.surroundings import read_surroundings  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it loads slowly
 
     files = stored_inputs(folder)
     objects = open_objects(files["objects"])

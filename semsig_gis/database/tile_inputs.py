@@ -15,14 +15,10 @@ import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.core.geometry import HALF_WIDTH
-from semsig_gis.core.temporary import temporary_folder
+from semsig_gis.core import HALF_WIDTH, SourceError, temporary_folder
 from semsig_gis.database.file import INPUTS, digest
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.storage.geoparquet import EMPTY_BOX, VERIFY_CHECKSUMS
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
+from semsig_gis.storage import EMPTY_BOX, VERIFY_CHECKSUMS, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

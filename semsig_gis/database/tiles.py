@@ -19,20 +19,24 @@ import pyarrow.parquet as pq
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
+    MOST_METRES,
+    TEMPORARY_PREFIX,
+    DatabaseError,
+    EmptyResultError,
     GridSpec,
+    InputError,
+    SignatureSpec,
+    announce,
     cell_ids,
     cells_near,
+    check_workers,
     consecutive,
+    finish_tasks,
+    require_number,
     require_step,
     split_ids,
 )
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.resources import announce
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.temporary import TEMPORARY_PREFIX
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -54,12 +58,12 @@ from semsig_gis.database.file import (
 from semsig_gis.database.occlusion import TOLERANCE_M
 from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
 from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
-from semsig_gis.objects.surroundings import read_surroundings
-from semsig_gis.objects.table import open_objects
-from semsig_gis.storage.geoparquet import EMPTY_BOX, bounds_by_group
-from semsig_gis.storage.runs import (
+from semsig_gis.objects import open_objects, read_surroundings
+from semsig_gis.storage import (
+    EMPTY_BOX,
     PARTIAL,
     RunKind,
+    bounds_by_group,
     finish,
     partial_folder,
     read_json,

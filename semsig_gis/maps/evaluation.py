@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.symbology import ERROR_BREAKS, FAILURES, OUTCOMES
-from semsig_gis.core.text import percent
-from semsig_gis.evaluation.error_field import ENOUGH, error_field
-from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.evaluation.result import Evaluation
+from semsig_gis.core import ERROR_BREAKS, FAILURES, OUTCOMES, percent
+from semsig_gis.evaluation import ENOUGH_QUERIES, Evaluation, chain_text, error_field
 from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.page_elements import (
     OUTLINES,
@@ -44,7 +41,7 @@ from semsig_gis.maps.page_elements import (
     ties_text,
     to_latlon,
 )
-from semsig_gis.observation.sentences import parse_view
+from semsig_gis.observation import parse_view
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,9 +49,9 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.error_field import ErrorField
-    from semsig_gis.observation.view import View
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import ErrorField
+    from semsig_gis.observation import View
 
 QUERY_FIELDS = (
     *(
@@ -297,7 +294,7 @@ def _field(
         "height": height,
         "breaks": [1.0 + SHARES * least if least else 0.0 for least in FAILURES],
         "colours": list(FAILURES.values()),
-        "enough": SPOKEN * ENOUGH,
+        "enough": SPOKEN * ENOUGH_QUERIES,
     }
     return arrays, about
 
@@ -321,7 +318,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
         f"{class_bar(list(FAILURES.values()), limits)}"
-        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries count</p>'
+        f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
     return (
         "<summary>Localization errors</summary>"

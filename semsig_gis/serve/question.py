@@ -10,26 +10,26 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import wrap_degrees
-from semsig_gis.evaluation.queries.draw import SeenFrom
-from semsig_gis.observation.detectors.camera import Camera
-from semsig_gis.observation.detectors.views import (
+from semsig_gis.core import InputError, UnknownNameError, nearest_name, wrap_degrees
+from semsig_gis.evaluation import SeenFrom
+from semsig_gis.observation import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
     METRE_DIGITS,
+    Camera,
+    Leg,
+    View,
+    mappings,
+    parse_view,
     placed,
 )
-from semsig_gis.observation.leg import Leg
-from semsig_gis.observation.sentences import parse_view
-from semsig_gis.observation.view import View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
 MarkNumber = tuple[int, int, int]
 """The numbers of a view of the page, of a photo in it, and of a mark in that."""
@@ -66,7 +66,7 @@ class Question:
     def parse(cls, told: object, *, taxonomy: Taxonomy, radius: float) -> Question:
         """Read the JSON of a page; InputError or UnknownNameError if it cannot be answered."""
         body = _mapping(told, "the question")
-        rows = _mappings(body, "views", most=MOST_PHOTOS)
+        rows = mappings(body.get("views"), "views", most=MOST_PHOTOS)
         places: list[list[tuple[View, list[MarkNumber]]]] = []
         ways: list[Leg] = []
         own: list[int] = []
@@ -173,11 +173,11 @@ def _photos(
     row: Mapping[str, Any], view: int, taxonomy: Taxonomy, radius: float
 ) -> list[tuple[View, list[MarkNumber]]]:
     """Return the photos of a view that have marks, and the numbers of these by object."""
-    told = [row] if "compass" in row else _mappings(row, "photos", most=MOST_PHOTOS)
+    told = [row] if "compass" in row else mappings(row.get("photos"), "photos", most=MOST_PHOTOS)
     photos = []
     for number_, photo in enumerate(told):
         name = "compass" if "compass" in photo else "marks"
-        marks = _mappings(photo, name, most=MOST_MARKS)
+        marks = mappings(photo.get(name), name, most=MOST_MARKS)
         if not marks:
             continue
         if name == "compass":
@@ -336,15 +336,6 @@ def _mapping(told: object, what: str) -> Mapping[str, Any]:
             f"{what} was given as {str(told)[:60]!r}; give a mapping of names to values."
         )
     return told
-
-
-def _mappings(told: Mapping[str, Any], name: str, *, most: int) -> list[Mapping[str, Any]]:
-    values = told.get(name)
-    if not isinstance(values, list) or len(values) > most:
-        raise InputError(
-            f"{name} were given as {str(values)[:60]!r}; give a list of at most {most}."
-        )
-    return [_mapping(one, f"one of the {name}") for one in values]
 
 
 def _whole(told: object, what: str, *, least: int = 0, most: int) -> int:

@@ -21,12 +21,11 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.core.threads import WorkCancelledError, cancellable
+from semsig_gis.core import InputError, SemsigError, WorkCancelledError, cancellable
 from semsig_gis.serve.page import policy, workbench_page
 from semsig_gis.serve.streets import city_ground
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -219,7 +218,7 @@ def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     return _Guard(app, port=port, token=token)
 
 
-def listening(port: int) -> socket.socket:
+def open_listener(port: int) -> socket.socket:
     """Return a socket that listens on a port of this machine, any free one for 0.
 
     InputError if another program has it, or the number is none of a port.
@@ -238,7 +237,7 @@ def listening(port: int) -> socket.socket:
     return listener
 
 
-def served(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.Server:
+def make_server(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.Server:
     """Return the server of a workbench; its `run` serves until it is interrupted."""
     port = listener.getsockname()[1]
     settings = uvicorn.Config(
@@ -252,6 +251,6 @@ def served(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.
     return uvicorn.Server(settings)
 
 
-def address(listener: socket.socket, token: str) -> str:
+def server_address(listener: socket.socket, token: str) -> str:
     """Return the address of the page."""
     return f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"

@@ -18,13 +18,12 @@ import pyarrow.parquet as pq
 import shapely
 from pyarrow import fs
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.filters import ANY_VALUE, as_text
 from semsig_gis.sources.http.cache import Fetched, checksum
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, NotCachedError
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
-from semsig_gis.storage.geoparquet import groups_meeting
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import groups_meeting, parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

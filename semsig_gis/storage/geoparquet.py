@@ -22,8 +22,7 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.resources import raise_if_short
+from semsig_gis.core import DatabaseError, raise_if_short
 from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import reason, whole_file
 

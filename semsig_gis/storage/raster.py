@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import CrsError, InputError, SourceError, extra
+from semsig_gis.core import CrsError, InputError, SourceError, extra
 from semsig_gis.storage.text import require_regular
 from semsig_gis.storage.whole import whole_file
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.geometry import GridSpec
+    from semsig_gis.core import GridSpec
 
 TILE = 512
 # 330 km by 330 km at a step of 10 m; a larger raster is a mistake in the data.

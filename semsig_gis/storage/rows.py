@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core import InputError, SemsigError
 from semsig_gis.storage.text import parse_json, read_whole
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import TEMPORARY_PREFIX, remove_abandoned, temporary_folder
+from semsig_gis.core import TEMPORARY_PREFIX, InputError, remove_abandoned, temporary_folder
 from semsig_gis.storage.text import parse_json, read_whole
 from semsig_gis.storage.whole import reason, replace_folder, write_whole
 

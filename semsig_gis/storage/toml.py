@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import CatalogError, InputError, nearest_name
+from semsig_gis.core import CatalogError, InputError, nearest_name
 from semsig_gis.storage.text import parse_json, read_text
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import BACKUP_FOLDER, locked, temporary_folder
+from semsig_gis.core import BACKUP_FOLDER, InputError, locked, temporary_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

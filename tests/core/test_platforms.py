@@ -11,10 +11,8 @@ import filelock
 import pytest
 
 from semsig_gis import open_cache
-from semsig_gis.core.resources import free_address_space
-from semsig_gis.core.temporary import temporary_folder
-from semsig_gis.core.threads import cores
-from semsig_gis.storage.whole import exchange, folder_locked, whole_folder
+from semsig_gis.core import cores, free_address_space, temporary_folder
+from semsig_gis.storage import exchange, folder_locked, whole_folder
 
 if TYPE_CHECKING:
     from pathlib import Path

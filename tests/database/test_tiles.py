@@ -17,40 +17,40 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, CORNER, World, assert_same, worlds
 
-from semsig_gis.core import resources
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
     CrsError,
     DatabaseError,
     EmptyResultError,
+    GridSpec,
     InputError,
+    SignatureSpec,
     SourceError,
+    resources,
 )
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database import tiles
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
-from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
-from semsig_gis.database.tiles import (
+from semsig_gis.database import (
+    MANIFEST,
+    TOLERANCE_M,
+    Footprints,
     TileSpec,
+    ViewpointSpec,
     begin,
+    build_database,
     build_tiles,
     describe,
     finished_tiles,
+    open_database,
+    part_name,
     plan_tiles,
     publish,
+    save_database,
+    tiles,
     touched_tiles,
 )
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
 
 if TYPE_CHECKING:
-    from semsig_gis.core.errors import SemsigError
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import Part
-    from semsig_gis.database.tiles import TilePlan
-    from semsig_gis.database.viewpoints import ViewpointMode
+    from semsig_gis.core import SemsigError
+    from semsig_gis.database import Part, SignatureDatabase, TilePlan, ViewpointMode
 
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:

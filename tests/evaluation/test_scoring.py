@@ -12,26 +12,39 @@ from noisy_cells import database_of, random_database
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.compare import changed_successes, common_cases, compare_evaluations
-from semsig_gis.evaluation.queries.distortions import DISTORTIONS, Detector, Distortion
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import make_locator, parse_method
-from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.reports.evaluation import evaluation_tables
+from semsig_gis.core import InputError, SemsigError
+from semsig_gis.database import ObjectStore
+from semsig_gis.evaluation import (
+    DISTORTIONS,
+    Distortion,
+    QuerySpec,
+    SimulatedDetector,
+    changed_successes,
+    common_cases,
+    compare_evaluations,
+    draw_queries,
+    evaluate,
+)
+from semsig_gis.localization import (
+    NEAR_PLACES,
+    THRESHOLDS,
+    LikelihoodMethod,
+    Method,
+    NoiseSpec,
+    build_index,
+    cell_noise,
+    locate,
+    make_locator,
+    named_noise,
+    parse_method,
+    score_cells,
+)
+from semsig_gis.reports import evaluation_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation
 
 
 ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)
@@ -298,7 +311,7 @@ def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
     # In far more cells than a handful, so that some places are hard to tell.
     cells = random_database(11, cells=300, longest=6, classes=2)
     noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
-    detector = Detector(noise=noise)
+    detector = SimulatedDetector(noise=noise)
     found = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=detector)
     told = found.queries.dropna(subset=["chance"])
     spread = math.sqrt(float((told["chance"] * (1.0 - told["chance"])).sum()))
@@ -306,7 +319,7 @@ def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
     assert 0.2 < told["chance"].mean() < 0.95
     assert 0.86 < told["in_region"].mean() < 0.99
     # A detector that is worse than the method believes: its chances are too high.
-    bad = Detector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
+    bad = SimulatedDetector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
     wrong = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=bad).queries
     assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
 

@@ -11,15 +11,17 @@ from machine import PATIENCE_S
 from sentences import refused
 from workbench import serving
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.threads import share_rows
-from semsig_gis.serve import server
+from semsig_gis.core import InputError, share_rows
+from semsig_gis.serve import open_listener
+from semsig_gis.serve import server as server_module
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from workbench import Page
 
-    from semsig_gis.serve.workbench import Workbench
+    from semsig_gis.serve import Workbench
+
+from semsig_gis.serve import Workbench
 
 
 @pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])
@@ -120,8 +122,8 @@ def test_a_body_that_is_too_long_is_not_read(page: Page, told: bool) -> None:  #
 
 
 def test_a_port_that_another_program_has_is_told() -> None:
-    with server.listening(0) as taken, refused(InputError, "--port"):
-        server.listening(taken.getsockname()[1])
+    with open_listener(0) as taken, refused(InputError, "--port"):
+        open_listener(taken.getsockname()[1])
 
 
 OTHER = 2
@@ -131,7 +133,7 @@ def test_a_newer_question_of_a_page_makes_its_others_obsolete(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     begun, go_on, answered = threading.Event(), threading.Event(), list[int]()
-    arrived, read = threading.Semaphore(0), server._json
+    arrived, read = threading.Semaphore(0), server_module._json
 
     class Slow:
         def answer(self, told: dict[str, int]) -> dict[str, int]:
@@ -146,7 +148,7 @@ def test_a_newer_question_of_a_page_makes_its_others_obsolete(
         arrived.release()
         return told
 
-    monkeypatch.setattr(server, "_json", reading)
+    monkeypatch.setattr(server_module, "_json", reading)
     codes: dict[int, int] = {}
 
     def ask(number: int) -> None:

@@ -20,8 +20,8 @@ from hypothesis.extra.numpy import arrays
 from pyproj import CRS
 from sentences import assert_sentence, refused
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.core import DatabaseError
+from semsig_gis.storage import (
     bounds_by_group,
     bounds_column,
     geo_metadata,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from semsig_gis.storage.text import MAX_TEXT_BYTES, parse_json, read_text, read_whole
+from semsig_gis.storage import MAX_TEXT_BYTES, parse_json, read_text, read_whole
 
 if TYPE_CHECKING:
     from pathlib import Path

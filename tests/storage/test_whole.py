@@ -13,8 +13,8 @@ from unittest.mock import Mock
 import pytest
 from sentences import assert_sentence, refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.whole import exchange, move_folder, whole_file, whole_folder
+from semsig_gis.core import InputError
+from semsig_gis.storage import exchange, move_folder, whole_file, whole_folder
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from semsig_gis.core.errors import CatalogError
+from semsig_gis.core import CatalogError
 from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.rows import (
     WGS84,

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core import CrsError, InputError
 from semsig_gis.sources import parquet
 from semsig_gis.sources.catalog import data_folder, load_catalog
 from semsig_gis.sources.filters import as_text
@@ -28,7 +28,7 @@ from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.probe import probe_file
 from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs
 from semsig_gis.sources.vector.file import read_tables, spatial_layers
-from semsig_gis.storage.toml import parse_toml
+from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

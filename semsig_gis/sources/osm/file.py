@@ -16,9 +16,7 @@ import shapely
 from osmium.filter import KeyFilter
 from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.temporary import temporary_folder
+from semsig_gis.core import HALF_TURN, CatalogError, SourceError, temporary_folder
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import check_compression_ratio
 from semsig_gis.sources.osm.elements import (

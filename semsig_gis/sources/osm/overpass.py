@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.area import Area, join_areas, tiles_of
 from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
@@ -34,7 +34,7 @@ from semsig_gis.sources.osm.elements import (
     way_shape,
 )
 from semsig_gis.sources.rows import BadFeatureError
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -14,21 +14,17 @@ from noisy_cells import parts_of
 from sentences import refused
 from worlds import CORNER, TAXONOMY, World, random_town
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.core import InputError, Taxonomy
+from semsig_gis.database import ObjectStore, ViewpointSpec, build_database
+from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
+from semsig_gis.objects import assemble, choose_layers, read_files
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.queries.draw import Query, SeenFrom
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import SeenFrom, SimulatedQuery
 
 TOWN = random_town()
 DATABASE = TOWN.database
@@ -37,7 +33,7 @@ PLAIN = QuerySpec(number=40, distortions=())
 ANYWHERE = replace(PLAIN, seen_from="anywhere")
 
 
-def rows(query: Query) -> list[tuple[int, float]]:
+def rows(query: SimulatedQuery) -> list[tuple[int, float]]:
     return list(zip(query.asked.codes.tolist(), query.asked.bearings.tolist(), strict=True))
 
 
@@ -124,7 +120,7 @@ def test_more_queries_than_places_outside() -> None:
         draw_queries(DATABASE, replace(ANYWHERE, number=200), store=store_with(house))
 
 
-def row_of(city: SignatureDatabase, query: Query) -> int:
+def row_of(city: SignatureDatabase, query: SimulatedQuery) -> int:
     """Return the row of the cell from whose viewpoint a query is seen, -1 if there is none."""
     (found,) = np.nonzero((city.xy == query.xy).all(axis=1))
     return int(found[0]) if len(found) else -1
