@@ -1,1 +1,1 @@
-"""Pages to look at."""
+"""Interactive maps as HTML pages."""
