@@ -60,12 +60,12 @@ def serving(city: City) -> Iterator[str]:
     bench = Workbench(city=city, store=object_store(city, None, needed=False))
     bench.prepare()
     token = secrets.token_urlsafe(32)
-    with server.listening(0) as listener:
-        running = server.served(bench, listener, token=token)
+    with server.open_listener(0) as listener:
+        running = server.workbench_server(bench, listener, token=token)
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
-            yield server.address(listener, token)
+            yield server.page_address(listener, token)
         finally:
             running.should_exit = True
             thread.join()

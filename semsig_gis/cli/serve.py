@@ -45,11 +45,11 @@ def serve(
     options = [str(database), *(["--objects", str(objects)] if objects is not None else [])]
     bench = Workbench(city=city, store=store, noises=noises, options=options)
     token = secrets.token_urlsafe(32)
-    with server.listening(port) as listener:
+    with server.open_listener(port) as listener:
         bench.prepare()
-        address = server.address(listener, token)
+        address = server.page_address(listener, token)
         say(f"The workbench of {city.path.name} is at {address}")
         remark("it runs until you press Ctrl-C")
         if not no_browser:
             webbrowser.open(address)
-        server.served(bench, listener, token=token).run(sockets=[listener])
+        server.workbench_server(bench, listener, token=token).run(sockets=[listener])

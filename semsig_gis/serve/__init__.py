@@ -1,1 +1,1 @@
-"""The workbench: a page on this machine to ask a city with, and what answers it."""
+"""The workbench: a local page to ask where a photo was taken, and its server."""
