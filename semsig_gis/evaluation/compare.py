@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.evaluation.figures import percentiles
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def compare_evaluations(
     Returns
     -------
     DataFrame
-        One row a figure of `reports.evaluation.experiment_figures` that both have: ``figure``,
+        One row a figure of `experiments.tables.experiment_figures` that both have: ``figure``,
         ``first``, ``second``, ``difference`` (the second less the first), ``low`` and ``high`` (its
         95 % interval); NaN where one of them is infinite. The bootstrap is by pairs, so that what
         is hard for both methods does not blur the difference.

@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-import semsig_gis
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.text import percent
-from semsig_gis.database.database import rows_of_result
+from semsig_gis.core import Displayed, InputError, map_with, percent, plot_with
+from semsig_gis.database import rows_of_result
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
     ELSEWHERE,
@@ -33,7 +30,7 @@ from semsig_gis.evaluation.figures import (
     range_labels,
 )
 from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS, expected_recall
+from semsig_gis.localization import NEAR_PLACES, THRESHOLDS, expected_recall
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,10 +39,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Axes, MapFrame
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import QuerySpec
-    from semsig_gis.localization.locator import AnyMethod
+    from semsig_gis.localization import AnyMethod
 
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),
@@ -172,11 +169,11 @@ class Evaluation(Displayed):
         self, kind: PlotKind = "errors", *, ax: Axes | None = None, label: str | None = None
     ) -> Axes:
         """Draw the curve of errors or of recall, or where queries failed (`plot_evaluation`)."""
-        return semsig_gis.plot_evaluation(self, kind, ax=ax, label=label)
+        return plot_with("plot_evaluation", self, kind, ax=ax, label=label)
 
     def explore(self, database: SignatureDatabase) -> MapFrame:
         """Show the queries on a map in a notebook (see `evaluation_map`)."""
-        return semsig_gis.show_map(semsig_gis.evaluation_map(self, database))
+        return map_with("evaluation_map", self, database)
 
     @property
     def query_bearings(self) -> list[list[float]]:

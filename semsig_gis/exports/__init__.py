@@ -14,15 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import (
-    EmptyResultError,
-    InputError,
-    UnknownNameError,
-    extra,
-    nearest_name,
-)
-from semsig_gis.database.city import open_city
-from semsig_gis.database.database import require_same_place
+from semsig_gis.core import EmptyResultError, InputError, UnknownNameError, extra, nearest_name
+from semsig_gis.database import open_city, require_same_place
 from semsig_gis.evaluation.error_field import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
@@ -35,22 +28,19 @@ from semsig_gis.exports.layers import (
     objects_layer,
 )
 from semsig_gis.exports.rasters import cell_errors, export_field, export_geotiff
-from semsig_gis.localization.answers import REGION_SHARE
-from semsig_gis.objects.table import open_objects
+from semsig_gis.localization import REGION_SHARE
+from semsig_gis.objects import open_objects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.table import CellGeometry
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.database import CellGeometry, SignatureDatabase
+    from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.exports.layers import Layer
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.localization.regions import SearchRegions
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.localization import Answer, SearchRegions
+    from semsig_gis.objects import StreetObjects
 
     Progress = Callable[[int, int], None]
 
@@ -421,7 +411,7 @@ def export_answer(
             f"{path} would contain the chance of every cell, which this method does not compute; "
             "use the likelihood method, or write a GeoPackage."
         )
-    from semsig_gis.localization.regions import search_regions  # noqa: PLC0415 - only where it is used
+    from semsig_gis.localization import search_regions  # noqa: PLC0415 - only where it is used
 
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:

@@ -17,16 +17,17 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
+    MAX_CODE,
     CatalogError,
     CrsError,
     EmptyResultError,
+    ObjectClass,
     SemsigError,
     SourceError,
+    require_metric_crs,
+    temporary_folder,
 )
-from semsig_gis.core.geometry import require_metric_crs
-from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
-from semsig_gis.core.temporary import own_folder
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,
@@ -37,13 +38,20 @@ from semsig_gis.objects.guesses import (
     samples_of,
 )
 from semsig_gis.objects.load import assemble, read_files
-from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.filters import ANY_VALUE, BETWEEN_SLASHES, Condition
-from semsig_gis.sources.keywords import words_of
-from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.rows import WGS84, off_the_globe
+from semsig_gis.sources import (
+    ANY_VALUE,
+    BETWEEN_SLASHES,
+    NO_GEOMETRY,
+    WGS84,
+    Condition,
+    LayerSpec,
+    catalog_names,
+    load_catalog,
+    off_the_globe,
+    paper_taxonomy,
+    reader,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -153,7 +161,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
 
 def _require_loads(text: str, path: Path) -> None:
     """Refuse a draft by which its own file does not load, with what a load says of it."""
-    with own_folder(Path(tempfile.gettempdir())) as folder:
+    with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
         file.write_text(text, encoding="utf-8")
         try:

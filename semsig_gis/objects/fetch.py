@@ -8,16 +8,21 @@ from typing import TYPE_CHECKING
 
 from platformdirs import user_cache_path
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.sources import mapillary, overture
-from semsig_gis.sources.area import clip_layer, names_place, parse_area
-from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
-from semsig_gis.sources.http.secret import Secret
+from semsig_gis.core import InputError
+from semsig_gis.sources import (
+    DEFAULT_HTTP,
+    AccessToken,
+    Cache,
+    HttpSpec,
+    clip_layer,
+    find_place,
+    mapillary,
+    names_place,
+    overture,
+    parse_area,
+)
 from semsig_gis.sources.osm import overpass
-from semsig_gis.sources.osm.overpass import find_place
-from semsig_gis.sources.services import pages
-from semsig_gis.sources.services.pages import SERVICES
+from semsig_gis.sources.services import fetch as services
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -25,10 +30,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer
 
 # Readers whose service sends an area in parts, each a file.
 TILED: Mapping[str, ModuleType] = {
@@ -90,13 +92,13 @@ def fetch_layers(
     semsig_gis.core.errors.InputError: catalogue 'montpellier' has no service to fetch from; use
     `semsig load` on files.
     """
-    if not catalog.endpoints or catalog.reader not in {*SERVICES, *TILED}:
+    if not catalog.endpoints or catalog.reader not in {*services.SERVICES, *TILED}:
         raise InputError(
             f"catalogue {catalog.name!r} has no service to fetch from; use `semsig load` on files."
         )
     layers: list[RawLayer] = []
     if catalog.token is not None and not http.offline:
-        http = replace(http, secret=Secret.of_environment(catalog.token))
+        http = replace(http, token=AccessToken.from_environment(catalog.token))
     service = TILED.get(catalog.reader)
     if service is not None:
         tiles = service.fetch_layers(
@@ -106,7 +108,7 @@ def fetch_layers(
             layers.append(clip_layer(layer, area))
             tell(f"{layer.spec.name}: {len(layers[-1].table):,} rows; {layer.spec.terms}")
         return tuple(layers)
-    for download in pages.fetch_layers(
+    for download in services.fetch_layers(
         catalog.reader,
         specs,
         endpoints=catalog.endpoints,
@@ -160,7 +162,7 @@ def open_cache(
     True
     """
     return Cache(Path(folder or user_cache_path("semsig", appauthor=False))), HttpSpec(
-        offline=offline, deadline_s=deadline_s, tell=tell
+        offline=offline, deadline_s=deadline_s, report=tell
     )
 
 

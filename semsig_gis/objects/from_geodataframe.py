@@ -8,16 +8,32 @@ from typing import TYPE_CHECKING
 
 import geopandas as gpd
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, nearest_name
-from semsig_gis.core.geometry import LICENSES, SOURCE_ID
+from semsig_gis.core import (
+    LICENSES,
+    SOURCE_ID,
+    CrsError,
+    EmptyResultError,
+    InputError,
+    nearest_name,
+)
 from semsig_gis.objects.load import assemble, choose_layers
 from semsig_gis.objects.table import Licence
-from semsig_gis.sources import TAGS_READER
-from semsig_gis.sources.catalog import Catalog, built_in_taxonomy, load_catalog
-from semsig_gis.sources.filters import as_text
-from semsig_gis.sources.layers import ClassBy, LayerSpec
-from semsig_gis.sources.osm.features import frame_fields, frame_layers, holds_tags, tells_elements
-from semsig_gis.sources.rows import RowRules, Rows, raw_layer
+from semsig_gis.sources import (
+    TAGS_READER,
+    Catalog,
+    ClassBy,
+    LayerSpec,
+    RowRules,
+    Rows,
+    as_text,
+    built_in_taxonomy,
+    frame_fields,
+    frame_layers,
+    has_element_columns,
+    has_tag_columns,
+    load_catalog,
+    raw_layer,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -129,11 +145,11 @@ def _require_frame(frame: object) -> None:
 def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
     """Refuse a table without tags of OpenStreetMap, or, to be sure, without its elements."""
     fields = frame_fields(frame)
-    tells = tells_elements if sure else holds_tags
+    tells = has_element_columns if sure else has_tag_columns
     if tells(fields):
         return
     told = ", ".join(fields[:COLUMNS_TOLD]) + (", ..." if len(fields) > COLUMNS_TOLD else "")
-    if sure and holds_tags(fields):
+    if sure and has_tag_columns(fields):
         msg = (
             f"the table does not say what its columns ({told}) are; give tags=True if they are "
             "tags of OpenStreetMap, or else class_column or catalog."

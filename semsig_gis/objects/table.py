@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-import semsig_gis
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed, bounds_text
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
     CLASS_CODE,
     CLASS_NAME,
     COUNT,
@@ -24,10 +21,15 @@ from semsig_gis.core.geometry import (
     NOTES,
     SOURCE,
     SOURCE_ID,
+    DatabaseError,
+    Displayed,
+    Taxonomy,
+    bounds_text,
     crs_label,
+    map_with,
+    plot_with,
 )
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.storage import (
     BBOX,
     COVERING,
     GROUP_ROWS,
@@ -49,7 +51,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.display import Axes, MapFrame
+    from semsig_gis.core import Axes, MapFrame
     from semsig_gis.sources import RawLayer
 
 KIND = "street objects"
@@ -179,11 +181,11 @@ class StreetObjects(Displayed):
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw the objects with the signs of their classes (see `plot_objects`)."""
-        return semsig_gis.plot_objects(self, ax=ax, legend=legend)
+        return plot_with("plot_objects", self, ax=ax, legend=legend)
 
     def explore(self) -> MapFrame:
         """Show the objects on a map in a notebook (see `objects_map`)."""
-        return semsig_gis.show_map(semsig_gis.objects_map(self))
+        return map_with("objects_map", self)
 
 
 class _OpenedObjects(StreetObjects):

@@ -21,12 +21,11 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.core.threads import NotWantedError, while_wanted
+from semsig_gis.core import InputError, SemsigError, WorkCancelledError, cancellable
 from semsig_gis.serve.page import security_policy, workbench_page
 from semsig_gis.serve.streets import city_streets
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -122,7 +121,7 @@ class _Api:
 
         def answer() -> dict[str, Any]:
             # Stops as soon as the same page requests a newer answer.
-            with while_wanted(lambda: number == self.requests[page]):
+            with cancellable(lambda: number == self.requests[page]):
                 return self.bench.answer(body)
 
         return await self._json_response(answer)
@@ -189,7 +188,7 @@ async def _error_response(request: Request, error: Exception) -> Response:
     code, text = 500, "the answer failed because of a fault in semsig, not in your input."
     if isinstance(error, SemsigError):
         code, text = 422, str(error)
-    elif isinstance(error, NotWantedError):
+    elif isinstance(error, WorkCancelledError):
         code, text = 409, "a newer question was asked meanwhile."
     elif isinstance(error, HTTPException):
         code, text = error.status_code, error.detail
@@ -211,7 +210,7 @@ def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     app = Starlette(
         routes=routes,
         exception_handlers=dict.fromkeys(
-            (SemsigError, NotWantedError, HTTPException, Exception), _error_response
+            (SemsigError, WorkCancelledError, HTTPException, Exception), _error_response
         ),
     )
     return _Guard(app, port=port, token=token)

@@ -17,13 +17,10 @@ from pyproj import Transformer
 from sentences import refused
 from workbench import decompression_bomb
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.sightings import views_at
-from semsig_gis.observation.detectors.camera import Camera
-from semsig_gis.observation.view import View
-from semsig_gis.serve.question import Question
-from semsig_gis.serve.streets import city_streets
-from semsig_gis.serve.workbench import Workbench
+from semsig_gis.core import InputError
+from semsig_gis.database import visible_objects_at
+from semsig_gis.observation import Camera, View
+from semsig_gis.serve import Question, Workbench, city_streets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,7 +54,9 @@ def photo(bench: Workbench, cell: int, middle: float, **known: Any) -> dict[str,
     """Return a photo from the middle of a cell with marks on all visible objects."""
     assert bench.store is not None
     spec, place = bench.database.spec, bench.database.xy[cell : cell + 1]
-    seen = views_at(bench.store.objects, place, index=bench.store.index, radius=spec.radius)
+    seen = visible_objects_at(
+        bench.store.objects, place, index=bench.store.index, radius=spec.radius
+    )
     camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
     angles = np.radians(seen.bearings - middle)
     pixels = camera.pixels(np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1))

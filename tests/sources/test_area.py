@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 from pyproj import Geod
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError, SemsigError
-from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.area import (
+from semsig_gis.core import CrsError, InputError, SemsigError
+from semsig_gis.sources import (
+    LayerSpec,
+    RawLayer,
+    RowCounts,
     clip_layer,
     clip_layers,
     join_areas,
@@ -24,7 +26,6 @@ from semsig_gis.sources.area import (
     note_outside,
     parse_area,
 )
-from semsig_gis.sources.layers import LayerSpec
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,10 +10,15 @@ import pytest
 import shapely
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.sources import file_reader, find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.osm.features import frame_layers, read_layers, tells_elements
+from semsig_gis.core import SourceError
+from semsig_gis.sources import (
+    file_reader,
+    find_files,
+    frame_layers,
+    has_element_columns,
+    load_catalog,
+)
+from semsig_gis.sources.osm.features import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,7 +71,7 @@ FORMS = {
 @pytest.mark.parametrize("columns", FORMS.values(), ids=FORMS)
 def test_elements_are_told_by_their_columns(columns: dict[str, list[Any]]) -> None:
     table = frame(**columns)
-    assert tells_elements(table.columns) or "type" in columns
+    assert has_element_columns(table.columns) or "type" in columns
     layers = frame_layers(table, SPECS)
     assert ids(layers) == [["node/1"], ["node/2"]]
     assert [layer.notes for layer in layers] == [(), ()]

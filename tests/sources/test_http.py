@@ -20,20 +20,19 @@ from sentences import assert_sentence, refused
 from servers import Answer, published, zipped
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.http import cache as _http_cache
-from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import (
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import (
+    AccessToken,
+    Cache,
     HttpError,
     HttpSpec,
     NotCachedError,
     TooLargeError,
-    _failure,
-    _require_named_host,
     fetch,
     read_text,
 )
-from semsig_gis.sources.http.secret import Secret
+from semsig_gis.sources.http import cache as _http_cache
+from semsig_gis.sources.http.fetch import _check_redirect, _connection_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 
     from servers import Script, Seen, Server
 
-    from semsig_gis.sources.http.cache import Fetched
+    from semsig_gis.sources import Fetched
 
     Get = Callable[..., Fetched]
 
@@ -302,24 +301,24 @@ def test_the_only_way_to_another_scheme_is_the_safer_one(
     source: str, target: str, *, allowed: bool
 ) -> None:
     with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
-        _require_named_host(source, target, HttpSpec())
+        _check_redirect(source, target, HttpSpec())
 
 
 @pytest.mark.parametrize(
-    ("target", "secret", "allowed"),
+    ("target", "token", "allowed"),
     [
         ("https://b.example/y", None, True),
         ("http://b.example/y", None, False),
-        ("https://b.example/y", Secret("word"), False),
+        ("https://b.example/y", AccessToken("word"), False),
         ("https://c.example/y", None, False),
     ],
 )
 def test_a_redirect_leads_to_a_named_host_and_never_with_a_secret(
-    target: str, secret: Secret | None, *, allowed: bool
+    target: str, token: AccessToken | None, *, allowed: bool
 ) -> None:
-    spec = HttpSpec(hosts=frozenset({"b.example"}), secret=secret)
+    spec = HttpSpec(hosts=frozenset({"b.example"}), token=token)
     with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
-        _require_named_host("https://a.example/x", target, spec)
+        _check_redirect("https://a.example/x", target, spec)
 
 
 @pytest.mark.parametrize(
@@ -336,7 +335,7 @@ def test_a_slow_drip_is_tried_once_more_and_told(
 ) -> None:
     server.on("/trees", answer)
     told: list[str] = []
-    failure_of(get, words, "2 times", timeout=(PATIENCE_S, 0.5), attempts=5, tell=told.append)
+    failure_of(get, words, "2 times", timeout=(PATIENCE_S, 0.5), attempts=5, report=told.append)
     assert len(server.seen) == 2
     (line,) = told
     assert words in line
@@ -348,7 +347,7 @@ def test_a_request_ends_by_its_deadline(server: Server, get: Get, *, slow_head: 
     drip, remedy = ((1, 0.02), "ask for less") if slow_head else ((50, 0.02), "run it again to go")
     server.on("/trees", Answer(status=302, headers={"Location": "/slow"}))
     server.on("/slow", Answer(CONTENT, drip=drip, slow_head=slow_head, headers={"ETag": '"1"'}))
-    failure_of(get, "not done after 1 s", remedy, "--timeout", deadline_s=1.0, slowest=1.0)
+    failure_of(get, "not done after 1 s", remedy, "--timeout", deadline_s=1.0, min_bytes_per_s=1.0)
     assert server.paths() == ["/trees", "/slow"]
 
 
@@ -395,7 +394,7 @@ def test_only_http_addresses_are_taken(cache: Cache, url: str, words: str) -> No
 
 
 def test_a_certificate_that_is_not_trusted_is_not_tried_again() -> None:
-    error = _failure(SSLError("certificate verify failed"), "https://a.example/x")
+    error = _connection_error(SSLError("certificate verify failed"), "https://a.example/x")
     assert isinstance(error, HttpError)
     assert_sentence(error, "a.example has no certificate that this machine trusts")
 
@@ -408,7 +407,7 @@ def test_a_cache_that_cannot_be_written_is_said(
         fetch(server.url, cache=Cache(tmp_path / "file"))
     server.on("/trees", Answer(CONTENT))
     full = Mock(side_effect=OSError(28, "No space left on device"))
-    monkeypatch.setattr(_http_cache.Entry, "store", full)
+    monkeypatch.setattr(_http_cache.CacheEntry, "store", full)
     with refused(InputError, "No space left", "make room"):
         get()
     with refused(InputError, "attempts is 0", "at least 1"):
@@ -447,7 +446,7 @@ def test_a_copy_that_nobody_can_confirm_is_used_for_a_while(server: Server, get:
 def test_a_superseded_copy_goes_when_nobody_has_used_it_for_long(
     server: Server, cache: Cache, get: Get, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_http_cache, "KEPT_S", -60.0)
+    monkeypatch.setattr(_http_cache, "SUPERSEDED_S", -60.0)
     server.on("/trees", Answer(CONTENT), Answer(b"{}"))
     first, second = get(), get(fresh_s=0.0)
     assert not first.path.exists()

@@ -9,12 +9,17 @@ import pytest
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.area import parse_area
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.http.fetch import HttpError, HttpSpec
-from semsig_gis.sources.http.secret import Secret
-from semsig_gis.sources.mapillary import MOST_FEATURES, fetch_layers, read_layers
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import (
+    MOST_FEATURES,
+    AccessToken,
+    HttpError,
+    HttpSpec,
+    fetch_layers,
+    load_catalog,
+    parse_area,
+)
+from semsig_gis.sources.mapillary import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,7 +27,7 @@ if TYPE_CHECKING:
 
     from servers import Seen, Server
 
-    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources import Cache
 
 CATALOG = load_catalog("mapillary")
 AREA = parse_area("2.30,48.85,2.31,48.86")
@@ -112,7 +117,7 @@ def test_a_full_box_is_asked_for_in_quarters(
 ) -> None:
     server.on("/map_features", Service(crowd))
     told: list[str] = []
-    spec = HttpSpec(sleep=slept.append, tell=told.append, secret=Secret(TOKEN))
+    spec = HttpSpec(sleep=slept.append, report=told.append, token=AccessToken(TOKEN))
     benches = [CATALOG.layer("benches"), CATALOG.layer("signs")]
     options: Any = {"endpoints": [server.url], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
@@ -136,7 +141,7 @@ def test_a_full_box_is_asked_for_in_quarters(
 
 def test_a_refused_token_is_not_told(server: Server, cache: Cache) -> None:
     server.on("/map_features", Service([]))
-    spec = HttpSpec(attempts=1, secret=Secret("MLY|1|other"))
+    spec = HttpSpec(attempts=1, token=AccessToken("MLY|1|other"))
     words = ("401", "Invalid token OAuth (token)", "access token is still valid")
     with refused(HttpError, *words):
         fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
@@ -147,7 +152,7 @@ def test_a_connection_that_is_cut_leaves_no_token(server: Server, cache: Cache) 
     body = json.dumps({"data": [], "next": TOKEN}).encode()
     server.on("/map_features", Answer(body, headers={"ETag": '"1"'}, cut=len(body) - 8),
               Answer(body))  # fmt: skip
-    spec = HttpSpec(sleep=lambda _: None, secret=Secret(TOKEN))
+    spec = HttpSpec(sleep=lambda _: None, token=AccessToken(TOKEN))
     fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
     assert "range" not in server.seen[1].headers
     assert not any("0123456789" in text for text in texts(cache.folder))
@@ -156,12 +161,12 @@ def test_a_connection_that_is_cut_leaves_no_token(server: Server, cache: Cache) 
 def test_a_token_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MAPILLARY_ACCESS_TOKEN", raising=False)
     with refused(InputError, "MAPILLARY_ACCESS_TOKEN", "is not set"):
-        Secret.of_environment("MAPILLARY_ACCESS_TOKEN")
+        AccessToken.from_environment("MAPILLARY_ACCESS_TOKEN")
     monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", " MLY|1\n2 ")
     with pytest.raises(InputError, match=r"^[^|]*MAPILLARY_ACCESS_TOKEN contains blanks[^|]*$"):
-        Secret.of_environment("MAPILLARY_ACCESS_TOKEN")
+        AccessToken.from_environment("MAPILLARY_ACCESS_TOKEN")
     monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", f"{TOKEN}\n")
-    assert Secret.of_environment("MAPILLARY_ACCESS_TOKEN") == Secret(TOKEN)
+    assert AccessToken.from_environment("MAPILLARY_ACCESS_TOKEN") == AccessToken(TOKEN)
 
 
 @pytest.mark.parametrize("size", [1, 3, 7, 1000])
@@ -169,7 +174,7 @@ def test_a_token_is_strained_out_of_blocks(size: int) -> None:
     spelt = ["a/b", r"a\/b", "a%2fb", r"a\u002Fb"]
     body = "".join(f"<{text}>" for text in spelt).encode()
     blocks = [body[start : start + size] for start in range(0, len(body), size)]
-    assert b"".join(Secret("a/b").strained(blocks)) == b"<(token)>" * 4
+    assert b"".join(AccessToken("a/b").redact_blocks(blocks)) == b"<(token)>" * 4
 
 
 def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:

@@ -12,11 +12,15 @@ import shapely
 from sentences import refused
 from stores import keep_in_bucket
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources import find_files
-from semsig_gis.sources.area import clip_layer, parse_area
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.http.fetch import HttpSpec, NotCachedError
+from semsig_gis.core import CatalogError, SourceError
+from semsig_gis.sources import (
+    HttpSpec,
+    NotCachedError,
+    clip_layer,
+    find_files,
+    load_catalog,
+    parse_area,
+)
 from semsig_gis.sources.overture import fetch_layers, read_layers
 
 if TYPE_CHECKING:
@@ -26,8 +30,7 @@ if TYPE_CHECKING:
     from servers import Server
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources import Cache, RawLayer
 
 CATALOG = load_catalog("overture")
 SPECS = CATALOG.layers
@@ -154,7 +157,7 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
     pq.write_table(table, land, row_group_size=10)
     address = keep_in_bucket(server, "maps", release.parent)
     told: list[str] = []
-    spec = HttpSpec(attempts=1, tell=told.append)
+    spec = HttpSpec(attempts=1, report=told.append)
     options: Any = {"endpoints": [address], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
     files = fetch_layers(SPECS, spec=spec, progress=lambda *s: steps.append(s), **options)

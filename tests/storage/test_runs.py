@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import MACHINE
-from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
+from semsig_gis.core import MACHINE_PREFIX, InputError
+from semsig_gis.storage import RunKind, finish, partial_folder, read_json, write_json
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,7 +42,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_run_is_taken_up_by_the_same_recipe(folder: Path) -> None:
-    (folder / "deep" / f"{MACHINE}x").mkdir(parents=True)  # a killed process leaves such a folder
+    (folder / "deep" / f"{MACHINE_PREFIX}x").mkdir(parents=True)  # as a killed process leaves
     RUN.begin(folder, RECIPE)
     assert sorted(path.name for path in folder.iterdir()) == ["deep", "part_1", "recipe.json"]
     assert list((folder / "deep").iterdir()) == []

@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-import semsig_gis
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.core.text import percent
-from semsig_gis.database.city import City
-from semsig_gis.localization.likelihood.index import index_fingerprint
-from semsig_gis.localization.noise.model import noise_from_dict
+from semsig_gis.core import (
+    DatabaseError,
+    Displayed,
+    InputError,
+    SemsigError,
+    map_with,
+    percent,
+    plot_with,
+)
+from semsig_gis.database import City
+from semsig_gis.localization import index_fingerprint, noise_from_dict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,9 +29,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.core import Axes, MapFrame
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Noise
 
 
 NAME = "identifiability"
@@ -118,11 +122,11 @@ class Identifiability(Displayed):
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
         """Draw the chance of every cell to be found (see `plot_identifiability`)."""
-        return semsig_gis.plot_identifiability(self, ax=ax, legend=legend)
+        return plot_with("plot_identifiability", self, ax=ax, legend=legend)
 
     def explore(self) -> MapFrame:
         """Show the chances and what is taken for what on a map (see `identifiability_map`)."""
-        return semsig_gis.show_map(semsig_gis.identifiability_map(self))
+        return map_with("identifiability_map", self)
 
     def require_cells_of(self, database: SignatureDatabase) -> None:
         """Raise InputError where another database has other cells."""

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN, cell_ids
-from semsig_gis.core.jit import compiled
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.core.threads import share_rows
-from semsig_gis.database.sightings import Views
+from semsig_gis.core import BEARING_UNITS, DISTANCE_UNITS, FULL_TURN, cell_ids, compiled, share_rows
+from semsig_gis.database import VisibleObjects
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 CELLS_A_PART = 64  # that are worth a thread
 # The cells around a cell, at 3 * (columns + 1) + (rows + 1).
@@ -28,7 +25,7 @@ TINY = 1e-300  # an object at exactly the place counts as north of it
 
 def views_aside(
     database: SignatureDatabase, cells: NDArray[np.int64], places: NDArray[np.float64]
-) -> Views:
+) -> VisibleObjects:
     """Return what is seen from places beside the centres of some cells, using only the cells.
 
     The places, shape (p, 2), are metres to the east and north of the centre and less than a cell
@@ -70,7 +67,7 @@ def views_aside(
         np.concatenate(values)
         for values in zip(*(parts[first] for first in sorted(parts)), strict=True)
     )
-    return Views(
+    return VisibleObjects(
         offsets=np.append(0, np.cumsum(lengths)),
         objects=np.full(len(codes), -1),
         codes=codes,

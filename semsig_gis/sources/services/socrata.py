@@ -7,13 +7,13 @@ import functools
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
 from semsig_gis.sources.services.pages import (
     NOT_FOUND,
     Page,
-    Query,
+    ServiceQuery,
     geojson_page,
     json_value,
 )
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     Box = tuple[float, float, float, float]
 
 PAGE_ROWS = 10_000
-LOCATION = "location"  # coordinates and an address, of which there is no GeoJSON
+LOCATION = "location"  # coordinates and an address; it cannot be exported as GeoJSON
 TEXT = "text"
 POINTS = frozenset({"location", "multipoint", "point"})
 SHAPES = frozenset({"line", "multiline", "multipolygon", "polygon"})
 
 
 def fetch_layer(client: Client, area: Area | None) -> Download:
-    """Fetch a dataset by its identifier, such as ``uvpi-gqnh``, ordered by its rows' own.
+    """Fetch a dataset by its identifier, such as ``uvpi-gqnh``, ordered by the ids of its rows.
 
-    ``server_where`` is a condition in SoQL. Of several columns with a geometry, that of an alias
-    holds, or the first.
+    ``server_where`` is a condition in SoQL. Of several geometry columns, the one of an alias is
+    used, or else the first.
     """
     about = _about(client)
     types = _types(about)
-    layer = client.licensed((about.get("license") or {}).get("name"), about.get("attribution"))
+    layer = client.with_license((about.get("license") or {}).get("name"), about.get("attribution"))
     places = [name for name, kind in types.items() if kind in POINTS | SHAPES]
     place = find_field(SHAPE, layer, places) or find_field(POINT, layer, places)
     place = place or next(iter(places), None)
@@ -54,27 +54,27 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     fields = client.fields(list(types))
     if not fields and len(places) > 1:
         fields = [name for name in types if name not in places]
-    beside = (place, *_coordinates(client, list(types)))
-    listed = dict.fromkeys([*fields, *(name for name in beside if name)])
+    position_fields = filter(None, (place, *_coordinates(client, list(types))))
+    listed = dict.fromkeys([*fields, *position_fields])
     files: tuple[Fetched, ...] = ()
     for box in area.boxes if area is not None else (None,):
         where = _where(client, types, place, box)
         params: dict[str, str | float] = {"$where": where} if where else {}
-        counted = client.document(
-            Query(f"{address}.json", {**params, "$select": "count(*)"}),
+        total = client.document(
+            ServiceQuery(f"{address}.json", {**params, "$select": "count(*)"}),
             lambda content: _count(content, client),
         )
         if fields:
             params["$select"] = ",".join(listed)
         params |= {"$order": ":id", "$limit": PAGE_ROWS}
-        files += _fetch_pages(client, Query(f"{address}.{kind}", params), told=counted)
+        files += _fetch_pages(client, ServiceQuery(f"{address}.{kind}", params), total=total)
     return Download(spec=layer, files=files, fields=tuple(types))
 
 
 def _about(client: Client) -> dict[str, Any]:
     address = f"{client.endpoint}/api/views/{quote(client.dataset, safe='')}.json"
     try:
-        return client.json(Query(address))
+        return client.json(ServiceQuery(address))
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
@@ -86,7 +86,7 @@ def _about(client: Client) -> dict[str, Any]:
 
 
 def _types(about: Mapping[str, Any]) -> dict[str, str]:
-    """Return the columns of a dataset and their types, without those that the portal computes."""
+    """Return the types of a dataset's columns, without columns that the portal computes."""
     columns = about.get("columns")
     if not isinstance(columns, list):
         raise SourceError(
@@ -98,7 +98,7 @@ def _types(about: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | None]:
-    """Return the columns of longitude and latitude, by the catalogue or by their names."""
+    """Return the columns of longitude and latitude from the catalogue or by common names."""
     layer = client.layer
     if layer.x_field and layer.y_field:
         x, y = (find_field(name, layer, fields) for name in (layer.x_field, layer.y_field))
@@ -117,7 +117,7 @@ def _where(
 
 
 def _inside(client: Client, types: Mapping[str, str], place: str | None, box: Box) -> list[str]:
-    """Return the conditions that a row is in a box, none where that cannot be asked."""
+    """Return the conditions that a row is in a box; empty without columns of positions."""
     west, south, east, north = (f"{number:.7f}" for number in box)
     if place is not None and types[place] in POINTS:
         return [f"within_box({place}, {north}, {west}, {south}, {east})"]
@@ -133,17 +133,19 @@ def _inside(client: Client, types: Mapping[str, str], place: str | None, box: Bo
     ]
 
 
-def _fetch_pages(client: Client, query: Query, *, told: int | None) -> tuple[Fetched, ...]:
-    def then(page: Page, rows: int) -> Query | None:
-        rest = page.rows and (told is None or rows < told)
-        return Query(query.url, {**query.params, "$offset": rows}) if rest else None
+def _fetch_pages(client: Client, query: ServiceQuery, *, total: int | None) -> tuple[Fetched, ...]:
+    def then(page: Page, rows: int) -> ServiceQuery | None:
+        rest = page.rows and (total is None or rows < total)
+        return ServiceQuery(query.url, {**query.params, "$offset": rows}) if rest else None
 
     read = functools.partial(_page, client=client)
-    return client.pages(Query(query.url, {**query.params, "$offset": 0}), read, then, told=told)
+    return client.pages(
+        ServiceQuery(query.url, {**query.params, "$offset": 0}), read, then, total=total
+    )
 
 
 def _page(content: bytes, client: Client) -> Page:
-    """Return a page of GeoJSON, or a list of rows."""
+    """Parse a page of GeoJSON, or a list of rows."""
     value = json_value(content, client.endpoint)
     if isinstance(value, list):
         return Page(value)
@@ -151,7 +153,7 @@ def _page(content: bytes, client: Client) -> Page:
 
 
 def _count(content: bytes, client: Client) -> int | None:
-    """Return the only number in the only row of an answer."""
+    """Return the number in an answer with one row and one column, or None."""
     value = json_value(content, client.endpoint)
     try:
         return int(next(iter(value[0].values())))

@@ -15,12 +15,10 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.checks import MOST_SEED, require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import CLASS_NAME, SOURCE_ID
-from semsig_gis.sources import RawLayer, RowCounts
+from semsig_gis.core import CLASS_NAME, MOST_SEED, SOURCE_ID, InputError, require_number
 from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.layers import LayerSpec
+from semsig_gis.sources.layer import RawLayer, RowCounts
+from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.synthetic.streets import counted, furnish, lay_streets
 
 if TYPE_CHECKING:
@@ -28,8 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.geometry import Bounds
-    from semsig_gis.sources.layers import GeometryKind, Role
+    from semsig_gis.core import Bounds
+    from semsig_gis.sources.layer_spec import GeometryKind, Role
     from semsig_gis.sources.synthetic.streets import Network
 
     Ints = NDArray[np.int64]

@@ -17,40 +17,48 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis import __version__
-from semsig_gis.core.defaults import DEFAULT_METHOD
-from semsig_gis.core.effort import announce
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import angular_distance, cell_ids, wrap_degrees
+from semsig_gis.core import (
+    DEFAULT_METHOD,
+    InputError,
+    angular_distance,
+    announce,
+    cell_ids,
+    wrap_degrees,
+)
 from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.search import DistanceLocator
-from semsig_gis.localization.distance.ties import (
+from semsig_gis.localization import (
     NEAR_METRES,
     NEAR_PLACES,
     THRESHOLDS,
+    LikelihoodMethod,
+    Method,
     best_cells,
     chance_within,
     expected_best,
+    make_locator,
+    parse_method,
     rank_range,
     top_candidates,
 )
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import make_locator, parse_method
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import Query
-    from semsig_gis.localization.answers import Answer, DistanceMemo, Locator, Ranking
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.locator import AnyMethod
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.localization import (
+        Answer,
+        AnyMethod,
+        DistanceMemo,
+        LikelihoodIndex,
+        Locator,
+        Ranking,
+    )
+    from semsig_gis.observation import Photo
 
 # Seconds that a query, and a cell of a query, takes: only for telling how long the work is.
 QUERY_S, PAIR_S = 5e-3, 1e-7
@@ -141,10 +149,10 @@ def evaluate(
             used = replace(used, on_grid=True)
         locator = make_locator(database, used)
     elif isinstance(method, Method):
-        used, locator = method, DistanceLocator(database=database, method=method)
+        used, locator = method, make_locator(database, method)
     elif method.database is database:
         used = LikelihoodMethod(noise=method.noise, on_grid=True)
-        locator = LikelihoodLocator(index=method)
+        locator = make_locator(database, used, index=method)
     else:
         raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."

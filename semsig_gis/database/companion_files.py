@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import HALF_DONE, is_abandoned, remove_abandoned
+from semsig_gis.core import TEMPORARY_PREFIX, InputError, is_abandoned, remove_abandoned
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import store_path, waiting_store
-from semsig_gis.storage.whole import alone_in, reason
+from semsig_gis.storage import folder_locked, reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -76,7 +75,7 @@ def remove_companions(
     if dry_run or not chosen:
         return chosen
     # A store that another program was just putting in place is there no more after the wait.
-    with alone_in(Path(os.path.realpath(database)).parent):
+    with folder_locked(Path(os.path.realpath(database)).parent):
         removed = tuple(one for one in chosen if os.path.lexists(one.path))
         for one in removed:
             try:
@@ -98,7 +97,7 @@ def _found(city: City) -> Iterator[tuple[Path, str]]:
     for name in sorted({str(city.path.absolute()), str(file)}):  # a link had its own
         for index in sorted(glob.glob(f"{glob.escape(name)}.*.likelihood")):  # noqa: PTH207
             yield Path(index), INDEX
-    for folder in sorted(file.parent.glob(f"{HALF_DONE}*")):
+    for folder in sorted(file.parent.glob(f"{TEMPORARY_PREFIX}*")):
         if folder.is_dir():
             yield folder, LEFT if is_abandoned(folder) else AT_WORK
 
