@@ -16,7 +16,7 @@ from semsig_gis.sources import describe, members, read_each, read_whole
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from semsig_gis.sources import Layer, Member
+    from semsig_gis.sources import LayerDescription, Member
 
 REPEATS = 3
 
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _read_all(
-    layers: Sequence[tuple[Member, Layer]],
+    layers: Sequence[tuple[Member, LayerDescription]],
     read: Callable[[Member, Sequence[str], int], object],
     _: int,
 ) -> None:

@@ -10,7 +10,6 @@ from .companion_files import companions as companions
 from .companion_files import remove_companions as remove_companions
 from .database import CellGeometry as CellGeometry
 from .database import CellTable as CellTable
-from .database import SequenceTable as SequenceTable
 from .database import SignatureDatabase as SignatureDatabase
 from .database import join_databases as join_databases
 from .database import require_same_place as require_same_place
@@ -36,6 +35,7 @@ from .occlusion import TOLERANCE_M as TOLERANCE_M
 from .occlusion import Footprints as Footprints
 from .occlusion import buildings_near as buildings_near
 from .occlusion import hidden as hidden
+from .sequences import SequenceTable as SequenceTable
 from .sequences import checked_sequence as checked_sequence
 from .sightings import SightingPairs as SightingPairs
 from .sightings import VisibleObjects as VisibleObjects

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Taxonomy
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
 
 _COMPARISON = re.compile(r"(\S)\s*(>=|<=|=)\s*(\d+)")
 _AMOUNT = re.compile(r"(\d*)\s*(\S)")

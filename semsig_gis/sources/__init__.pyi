@@ -111,7 +111,7 @@ from .synthetic.city import synthetic_streets as synthetic_streets
 from .synthetic.city import synthetic_surroundings as synthetic_surroundings
 from .synthetic.streets import Network as Network
 from .vector.by_fiona import read_each as read_each
-from .vector.by_pyogrio import Layer as Layer
+from .vector.by_pyogrio import LayerDescription as LayerDescription
 from .vector.by_pyogrio import describe as describe
 from .vector.by_pyogrio import read_whole as read_whole
 from .vector.file import LayerInfo as LayerInfo

@@ -14,8 +14,13 @@ from worlds import ARRAYS, TAXONOMY, assert_same
 
 import semsig_gis
 from semsig_gis.core import DatabaseError, GridSpec, InputError, SignatureSpec, UnknownNameError
-from semsig_gis.database import ViewpointSpec, checked_sequence, join_databases, open_database
-from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.database import (
+    SequenceTable,
+    ViewpointSpec,
+    checked_sequence,
+    join_databases,
+    open_database,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -46,9 +46,13 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import ViewpointSpec, build_database
 from semsig_gis.evaluation import Identifiability, evaluate
-from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.geopackage import read_geopackage
-from semsig_gis.exports.styles import CLASS_MARKERS, by_class
+from semsig_gis.exports import (
+    CLASS_MARKERS,
+    by_class,
+    export_answer,
+    export_database,
+    read_geopackage,
+)
 from semsig_gis.localization import Method
 from semsig_gis.objects import Licence, StreetObjects, open_objects, save_objects
 from semsig_gis.sources import paper_taxonomy

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core import WILDCARD, InputError, UnknownNameError
-from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.database import SequenceTable
 from semsig_gis.localization import DistanceMemo, Requirement
 from semsig_gis.sources import paper_taxonomy
 

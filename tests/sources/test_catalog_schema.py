@@ -29,7 +29,7 @@ from semsig_gis.sources import (
     data_folder,
     paper_taxonomy,
 )
-from semsig_gis.sources.catalog import _catalog
+from semsig_gis.sources.catalog import _parse_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,7 +52,7 @@ BEYOND = (
 def accepts(content: dict[str, Any]) -> bool:
     """Tell whether the reader takes a catalogue."""
     try:
-        _catalog(copy.deepcopy(content), "it")
+        _parse_catalog(copy.deepcopy(content), "it")
     except CatalogError:
         return False
     return True

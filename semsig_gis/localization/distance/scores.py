@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.core import Signature
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable, SignatureDatabase
     from semsig_gis.localization.distance.method import Method
 
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-THRESHOLDS = (
+THRESHOLDS: tuple[float, ...] = (
     *(0, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 80, 90, 100),
     *(150, 200, 300, 400, 500, 1000, 2000, 5000),
 )
 """Errors in metres; the columns ``p0``, ``p5``... of a query are their probabilities."""
 
-NEAR_PLACES = (1, 5, 10, 20)
+NEAR_PLACES: tuple[int, ...] = (1, 5, 10, 20)
 """Numbers N of best places; the columns ``near1``, ``near5``... say whether one is near."""
 
 NEAR_METRES = 25

@@ -20,7 +20,7 @@ GEOJSON = "GeoJSON"
 SHAPEFILE = "ESRI Shapefile"
 CONTAINER = "GPKG"  # the only driver with several layers in a file
 # The only drivers that may open a file: GDAL has about 80, and some of them follow links.
-DRIVERS = {
+DRIVERS: dict[str, str] = {
     ".csv": CSV,
     ".fgb": "FlatGeobuf",
     ".geojson": GEOJSON,

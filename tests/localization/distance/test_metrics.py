@@ -16,7 +16,7 @@ from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
 from semsig_gis.core import InputError
-from semsig_gis.database.sequences import SequenceTable
+from semsig_gis.database import SequenceTable
 from semsig_gis.localization import BLOCK_SEQUENCES, METRICS, BitPlanes, EditWeights, metric
 from semsig_gis.localization.distance.metrics import edit
 

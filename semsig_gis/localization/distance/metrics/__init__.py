@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
     from semsig_gis.localization.distance.metrics.edit import EditWeights
 
 

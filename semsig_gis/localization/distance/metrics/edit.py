@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
 
 PLANE_WORDS = 64  # enough work for a loop, and a plane still fits the first-level cache
 BLOCK_SEQUENCES = 64 * PLANE_WORDS

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
 
 
 def distances(
