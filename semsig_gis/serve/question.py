@@ -19,6 +19,7 @@ from semsig_gis.observation import (
     Camera,
     Leg,
     View,
+    mappings,
     parse_view,
     placed,
 )
@@ -66,7 +67,7 @@ class Question:
     def parse(cls, value: object, *, taxonomy: Taxonomy, radius: float) -> Question:
         """Parse the JSON of a page; InputError or UnknownNameError if it is not a question."""
         body = _mapping(value, "the question")
-        rows = _mappings(body, "views", most=MOST_PHOTOS)
+        rows = mappings(body.get("views"), "views", most=MOST_PHOTOS)
         places: list[list[tuple[View, list[MarkNumber]]]] = []
         steps: list[Leg] = []
         place_of_view: list[int] = []
@@ -179,11 +180,11 @@ def _photos(
     row: Mapping[str, Any], view: int, taxonomy: Taxonomy, radius: float
 ) -> list[tuple[View, list[MarkNumber]]]:
     """Return each photo of a view that has marks, and the numbers of the marks by object."""
-    items = [row] if "compass" in row else _mappings(row, "photos", most=MOST_PHOTOS)
+    items = [row] if "compass" in row else mappings(row.get("photos"), "photos", most=MOST_PHOTOS)
     photos = []
     for index, photo in enumerate(items):
         name = "compass" if "compass" in photo else "marks"
-        marks = _mappings(photo, name, most=MOST_MARKS)
+        marks = mappings(photo.get(name), name, most=MOST_MARKS)
         if not marks:
             continue
         if name == "compass":
@@ -348,15 +349,6 @@ def _mapping(value: object, what: str) -> Mapping[str, Any]:
             f"{what} was given as {str(value)[:60]!r}; give a mapping of names to values."
         )
     return value
-
-
-def _mappings(row: Mapping[str, Any], name: str, *, most: int) -> list[Mapping[str, Any]]:
-    values = row.get(name)
-    if not isinstance(values, list) or len(values) > most:
-        raise InputError(
-            f"{name} were given as {str(values)[:60]!r}; give a list of at most {most}."
-        )
-    return [_mapping(value, f"one of the {name}") for value in values]
 
 
 def _whole(value: object, what: str, *, least: int = 0, most: int) -> int:
