@@ -26,7 +26,7 @@ from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
 from .objects.conflation import conflate as conflate
 from .objects.draft import draft_catalog as draft_catalog
-from .objects.fetch import (
+from .sources.fetch import (
     fetch_layers as fetch_layers,
     find_area as find_area,
     open_cache as open_cache,
@@ -128,7 +128,7 @@ from .evaluation.queries.distortions import (
 from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.scoring import evaluate as evaluate
-from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
+from .evaluation.error_fields import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from machine import PATIENCE_S
 
-from semsig_gis.serve import server
+from semsig_gis.serve import make_server, open_listener
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,8 +70,8 @@ class Page:
 @contextlib.contextmanager
 def serving(bench: Workbench) -> Iterator[Page]:
     """Serve a workbench in a thread for as long as the block runs."""
-    with server.open_listener(0) as listener:
-        running = server.workbench_server(bench, listener, token=TOKEN)
+    with open_listener(0) as listener:
+        running = make_server(bench, listener, token=TOKEN)
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]})
         thread.start()
         try:

@@ -218,8 +218,8 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """Download the street objects of an area."""
-    from semsig_gis.objects import assemble, choose_layers, fetch_layers, find_area, open_cache
-    from semsig_gis.sources import load_catalog
+    from semsig_gis.objects import assemble, choose_layers
+    from semsig_gis.sources import fetch_layers, find_area, load_catalog, open_cache
 
     keep_inputs(out, buildings, streets, read=(name, area))
     require_suffix(".parquet", out, buildings, streets)

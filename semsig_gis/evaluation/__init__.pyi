@@ -3,10 +3,11 @@
 from .compare import changed_successes as changed_successes
 from .compare import common_cases as common_cases
 from .compare import compare_evaluations as compare_evaluations
-from .error_field import ENOUGH as ENOUGH
-from .error_field import RADII as RADII
-from .error_field import ErrorField as ErrorField
-from .error_field import guess_error as guess_error
+from .error_fields import ENOUGH as ENOUGH
+from .error_fields import RADII as RADII
+from .error_fields import ErrorField as ErrorField
+from .error_fields import error_field as error_field
+from .error_fields import guess_error as guess_error
 from .experiments.run import ExperimentWork as ExperimentWork
 from .experiments.run import Part as Part
 from .experiments.run import open_results as open_results

@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core import ERROR_BREAKS, FAILURES, OUTCOMES, percent
-from semsig_gis.evaluation import ENOUGH, Evaluation, chain_text
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation import ENOUGH, Evaluation, chain_text, error_field
 from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.page_elements import (
     OUTLINES,

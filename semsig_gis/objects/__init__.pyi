@@ -10,9 +10,6 @@ from .conflation import ConflationReport as ConflationReport
 from .conflation import conflate as conflate
 from .draft import draft_catalog as draft_catalog
 from .extent import settle_extent as settle_extent
-from .fetch import fetch_layers as fetch_layers
-from .fetch import find_area as find_area
-from .fetch import open_cache as open_cache
 from .from_geodataframe import objects_from_frame as objects_from_frame
 from .guesses import Column as Column
 from .guesses import Sample as Sample

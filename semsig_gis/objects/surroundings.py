@@ -23,10 +23,10 @@ from semsig_gis.sources import (
     join_areas,
     load_catalog,
     parse_area,
+    read_layer,
     read_parquet,
     reader,
 )
-from semsig_gis.sources import vector as vector_file
 from semsig_gis.storage import (
     GROUP_ROWS,
     WRITE_CHECKSUMS,
@@ -221,7 +221,7 @@ def _read_file(
         return _with_licences(layer), layer.notes
     if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()
-    layer = vector_file.read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
+    layer = read_layer(path, LayerSpec(name=role, class_name="", geometry=kind))
     if layer.errors:
         raise SourceError(
             f"{path} has {layer.counts.unreadable} features that cannot be read "

@@ -235,7 +235,7 @@ def open_listener(port: int) -> socket.socket:
     return listener
 
 
-def workbench_server(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.Server:
+def make_server(bench: Workbench, listener: socket.socket, *, token: str) -> uvicorn.Server:
     """Return the server of a workbench; its `run` serves until it is interrupted."""
     port = listener.getsockname()[1]
     settings = uvicorn.Config(
@@ -249,6 +249,6 @@ def workbench_server(bench: Workbench, listener: socket.socket, *, token: str) -
     return uvicorn.Server(settings)
 
 
-def page_address(listener: socket.socket, token: str) -> str:
+def server_address(listener: socket.socket, token: str) -> str:
     """Return the address of the page."""
     return f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"

@@ -17,9 +17,6 @@ from semsig_gis.database import build_database, open_database, save_database
 from semsig_gis.objects import (
     assemble,
     choose_layers,
-    fetch_layers,
-    find_area,
-    open_cache,
     open_objects,
     passed_by,
     quality_report,
@@ -35,7 +32,10 @@ from semsig_gis.sources import (
     RowCounts,
     RowRules,
     Rows,
+    fetch_layers,
+    find_area,
     load_catalog,
+    open_cache,
     paper_taxonomy,
 )
 from semsig_gis.sources.osm import file as osm_file

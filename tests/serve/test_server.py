@@ -12,13 +12,16 @@ from sentences import refused
 from workbench import serving
 
 from semsig_gis.core import InputError, share_rows
-from semsig_gis.serve import server
+from semsig_gis.serve import open_listener
+from semsig_gis.serve import server as server_module
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from workbench import Page
 
     from semsig_gis.serve import Workbench
+
+from semsig_gis.serve import Workbench
 
 
 @pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])
@@ -119,8 +122,8 @@ def test_too_long_body_is_refused(page: Page, with_length: bool) -> None:  # noq
 
 
 def test_used_port_is_refused() -> None:
-    with server.open_listener(0) as listener, refused(InputError, "--port"):
-        server.open_listener(listener.getsockname()[1])
+    with open_listener(0) as listener, refused(InputError, "--port"):
+        open_listener(listener.getsockname()[1])
 
 
 OTHER = 2
@@ -130,7 +133,7 @@ def test_newer_question_cancels_older_ones_of_the_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     begun, go_on, answered = threading.Event(), threading.Event(), list[int]()
-    arrived, read = threading.Semaphore(0), server._json
+    arrived, read = threading.Semaphore(0), server_module._json
 
     class Slow:
         def answer(self, body: dict[str, int]) -> dict[str, int]:
@@ -145,7 +148,7 @@ def test_newer_question_cancels_older_ones_of_the_page(
         arrived.release()
         return body
 
-    monkeypatch.setattr(server, "_json", reading)
+    monkeypatch.setattr(server_module, "_json", reading)
     codes: dict[int, int] = {}
 
     def ask(number: int) -> None:

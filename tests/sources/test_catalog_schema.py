@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import tomllib
 from functools import cache
@@ -30,6 +29,7 @@ from semsig_gis.sources import (
     paper_taxonomy,
 )
 from semsig_gis.sources.catalog import _parse_catalog
+from semsig_gis.storage import toml_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,7 +52,7 @@ BEYOND = (
 def accepts(content: dict[str, Any]) -> bool:
     """Tell whether the reader takes a catalogue."""
     try:
-        _parse_catalog(copy.deepcopy(content), "it")
+        _parse_catalog(toml_text(content), "it")
     except CatalogError:
         return False
     return True

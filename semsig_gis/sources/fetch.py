@@ -9,18 +9,11 @@ from typing import TYPE_CHECKING
 from platformdirs import user_cache_path
 
 from semsig_gis.core import InputError
-from semsig_gis.sources import (
-    DEFAULT_HTTP,
-    AccessToken,
-    Cache,
-    HttpSpec,
-    clip_layer,
-    find_place,
-    mapillary,
-    names_place,
-    overture,
-    parse_area,
-)
+from semsig_gis.sources import mapillary, overture
+from semsig_gis.sources.clip import clip_layer, names_place, parse_area
+from semsig_gis.sources.http.access_token import AccessToken
+from semsig_gis.sources.http.cache import Cache
+from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
 from semsig_gis.sources.osm import overpass
 from semsig_gis.sources.services import fetch as services
 
@@ -30,7 +23,10 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
-    from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer
+    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
 
 # Readers whose service sends an area in parts, each a file.
 TILED: Mapping[str, ModuleType] = {
@@ -202,4 +198,4 @@ def find_area(
             f"catalogue {catalog.name!r} names no geocoder, so {text!r} cannot be looked up; give "
             "west,south,east,north in degrees or a polygon file."
         )
-    return find_place(text, endpoint=catalog.geocoder, cache=cache, spec=http)
+    return overpass.find_place(text, endpoint=catalog.geocoder, cache=cache, spec=http)
