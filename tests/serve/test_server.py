@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.serve import Workbench
 
-from semsig_gis.serve import Workbench
-
 
 @pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])
 @pytest.mark.parametrize("token", ["", "wrong", "the-token-of-the-testt"])
