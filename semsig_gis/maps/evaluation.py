@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis.core import ERROR_BREAKS, FAILURES, OUTCOMES, percent
-from semsig_gis.evaluation import ENOUGH, Evaluation, chain_text, error_field
+from semsig_gis.evaluation import ENOUGH_QUERIES, Evaluation, chain_text, error_field
 from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.page_elements import (
     OUTLINES,
@@ -291,7 +291,7 @@ def _packed_field(
         "height": height,
         "breaks": [1.0 + SHARE_STEPS * least if least else 0.0 for least in FAILURES],
         "colours": list(FAILURES.values()),
-        "enough": WEIGHT_STEPS * ENOUGH,
+        "enough": WEIGHT_STEPS * ENOUGH_QUERIES,
     }
     return arrays, about
 
@@ -315,7 +315,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     field = (
         f"<p>Share of the queries within {radius:,g} m that failed, the nearer counting more"
         f"{class_bar(list(FAILURES.values()), limits)}"
-        f'<i class="hatched"></i>fewer than {ENOUGH:g} queries count</p>'
+        f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
     return (
         "<summary>Localization errors</summary>"

@@ -26,8 +26,7 @@ from semsig_gis.core import (
     wrap_degrees,
 )
 from semsig_gis.database import visible_objects_at
-from semsig_gis.evaluation import CitySights, Sight, ready_chain
-from semsig_gis.evaluation import Detector as FailingDetector
+from semsig_gis.evaluation import CitySights, Sight, SimulatedDetector, prepare_chain
 from semsig_gis.exports import export_answer
 from semsig_gis.localization import (
     NOISES,
@@ -456,11 +455,11 @@ class Workbench:
         noise = body.get("noise")
         chain = []
         if noise is not None:
-            chain.append(FailingDetector(noise=self.noises[self._checked_noise(noise)]))
+            chain.append(SimulatedDetector(noise=self.noises[self._checked_noise(noise)]))
         seed = body.get("seed", 0)
         if not isinstance(seed, int) or not 0 <= seed <= 10**18:
             raise InputError(f"a seed was given as {seed!r}; give a whole number from 0 to 10**18.")
-        distorted = ready_chain(chain, CitySights.of(database))(sight, seed, 0)
+        distorted = prepare_chain(chain, CitySights.of(database))(sight, seed, 0)
         return {
             "view": {
                 "compass": self._compass(distorted),
