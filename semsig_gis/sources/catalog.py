@@ -313,7 +313,6 @@ def data_folder() -> Traversable:
 
 @functools.lru_cache
 def _parse_catalog(text: str, where: str) -> Catalog:
-    """Return the checked catalogue of a TOML text."""
     content = parse_toml(text, where)
     where = f"catalogue {where}"
     check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
