@@ -21,7 +21,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import semsig_gis
 from semsig_gis.cli import main as semsig
-from semsig_gis.evaluation.identifiability import identify as identifying
+from semsig_gis.evaluation.identifiability import analysis
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +84,7 @@ def load_all() -> None:
 
 def shorten() -> None:
     """Let `identify` try less often: what it writes is as large."""
-    identifying.identify = functools.partial(identifying.identify, trials=60, class_trials=5)
+    analysis.identify = functools.partial(analysis.identify, trials=60, class_trials=5)
 
 
 def main() -> None:

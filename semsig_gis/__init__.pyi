@@ -14,8 +14,8 @@ from .sources.catalog import (
     load_catalog as load_catalog,
     paper_taxonomy as paper_taxonomy,
 )
-from .sources.area import clip_layers as clip_layers
-from .sources.layers import LayerSpec as LayerSpec
+from .sources.clip import clip_layers as clip_layers
+from .sources.layer_spec import LayerSpec as LayerSpec
 from .sources.synthetic.city import (
     CitySpec as CitySpec,
     PARIS_LIKE as PARIS_LIKE,
@@ -24,9 +24,9 @@ from .sources.synthetic.city import (
 )
 from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
-from .objects.conflate import conflate as conflate
+from .objects.conflation import conflate as conflate
 from .objects.draft import draft_catalog as draft_catalog
-from .objects.fetch import (
+from .sources.fetch import (
     fetch_layers as fetch_layers,
     find_area as find_area,
     open_cache as open_cache,
@@ -38,7 +38,7 @@ from .objects.load import (
     choose_layers as choose_layers,
     read_files as read_files,
 )
-from .reports.quality import quality_report as quality_report
+from .objects.quality import quality_report as quality_report
 from .objects.surroundings import (
     read_surroundings as read_surroundings,
     save_surroundings as save_surroundings,
@@ -61,7 +61,7 @@ from .observation.north import North as North
 from .observation.sentences import parse_view as parse_view
 from .database.occlusion import Footprints as Footprints
 from .database.summary import database_summary as database_summary
-from .localization.answers import Requirement as Requirement
+from .localization.requirement import Requirement as Requirement
 from .database.store import (
     ObjectStore as ObjectStore,
     open_store as open_store,
@@ -74,7 +74,7 @@ from .database.update import (
     update_file as update_file,
     update_tiles as update_tiles,
 )
-from .database.sightings import ViewpointSpec as ViewpointSpec
+from .database.viewpoints import ViewpointSpec as ViewpointSpec
 from .localization.distance.method import Method as Method
 from .localization.distance.scores import score_cells as score_cells
 from .localization.distance.search import Localization as Localization
@@ -118,7 +118,7 @@ from .localization.likelihood.priors import (
     raster_prior as raster_prior,
     weight_prior as weight_prior,
 )
-from .localization.route import Leg as Leg
+from .observation.leg import Leg as Leg
 from .evaluation.queries.draw import QuerySpec as QuerySpec, draw_queries as draw_queries
 from .evaluation.queries.distortions import (
     Distortion as Distortion,
@@ -127,14 +127,14 @@ from .evaluation.queries.distortions import (
 )
 from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
-from .evaluation.evaluate import evaluate as evaluate
-from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
+from .evaluation.scoring import evaluate as evaluate
+from .evaluation.error_maps import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,
     check_identifiability as check_identifiability,
 )
-from .evaluation.identifiability.identify import identify as identify
+from .evaluation.identifiability.analysis import identify as identify
 from .evaluation.identifiability.result import (
     Identifiability as Identifiability,
     open_identifiability as open_identifiability,
@@ -155,7 +155,7 @@ from .maps.location import localization_map as localization_map
 from .maps.location import location_map as location_map, posterior_map as posterior_map
 from .maps.objects import ground_map as ground_map, objects_map as objects_map
 from .maps.page import save_map as save_map, show_map as show_map
-from .exports import (
+from .exports.export import (
     export_answer as export_answer,
     export_database as export_database,
     export_item as export_item,
@@ -174,7 +174,7 @@ from .reports.axes import (
     plot_objects as plot_objects,
 )
 from .reports.evaluation import evaluation_tables as evaluation_tables
-from .reports.evaluation_page import evaluation_page as evaluation_page
+from .reports.evaluation_html import evaluation_page as evaluation_page
 from .reports.page import write_page as write_page
 from .reports.report_model import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables
@@ -184,8 +184,8 @@ from .reports.scenes import (
     draw_scene as draw_scene,
     draw_scenes as draw_scenes,
 )
-from .reports.tables import Table as Table
-from .evaluation.experiments.run import open_results as open_results
+from .core.tables import Table as Table
+from .evaluation.experiments.results import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (
     run_experiment as run_experiment,

@@ -25,18 +25,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.database.database import views_in
-from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import View
+from semsig_gis.database import visible_objects_in
+from semsig_gis.localization import database_tables
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.model import Noise, NoiseSpec
-    from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Noise, NoiseSpec, NoiseTable
+    from semsig_gis.observation import Photo
 
 LAPS = range(-4, 5)
 
@@ -218,7 +217,7 @@ def scene_of(
 ) -> Scene:
     """Return what a cell sees by a noise model."""
     limits = database.taxonomy.ranges(database.spec.radius)
-    views = views_in(database, np.array([cell]))
+    views = visible_objects_in(database, np.array([cell]))
     row = int(table.length_rows(views.lengths)[0])
     things = []
     for code, bearing, distance in zip(
@@ -297,7 +296,7 @@ def random_view(
     A third have ranges, a third of these errors of their own, and a third have scores.
     """
     parts, codes = [], database.present_codes
-    first = views_in(database, np.array([0]))
+    first = visible_objects_in(database, np.array([0]))
     for photo in photos:
         near = rng.integers(0, len(first.codes), size)
         real = rng.random(size) < 0.5

@@ -35,21 +35,14 @@ from semsig_gis.cli.options import (
     command,
     seen_north,
 )
-from semsig_gis.core.defaults import LIKELIHOOD
-from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
-from semsig_gis.core.text import percent
+from semsig_gis.core import LIKELIHOOD, EmptyResultError, InputError, UnknownNameError, percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.database.city import City
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import PartitionedDatabase
-    from semsig_gis.localization.answers import Answer, Locator
-    from semsig_gis.localization.distance.method import Method
-    from semsig_gis.observation.files import QueryLine
-    from semsig_gis.observation.north import North
-    from semsig_gis.observation.view import View
+    from semsig_gis.database import City, PartitionedDatabase, SignatureDatabase
+    from semsig_gis.localization import Answer, Locator, Method
+    from semsig_gis.observation import North, QueryLine, View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +71,7 @@ class RankedOptions(QueryOptions):
 
     def read_queries(self, dataset: SignatureDatabase | PartitionedDatabase) -> Iterator[QueryLine]:
         """Return the queries of --queries, each when it is needed."""
-        from semsig_gis.observation.files import parse_queries, read_queries
+        from semsig_gis.observation import parse_queries, read_queries
 
         city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
         if self.queries == "-":
@@ -166,17 +159,18 @@ def localize(options: LocalizeOptions) -> None:
     --explain, --share and the options from --noise to --objects work only with the likelihood
     method.
     """
-    from semsig_gis.database.city import open_city
+    from semsig_gis.database import open_city
 
     method = None
     if options.ranking != LIKELIHOOD:
-        from semsig_gis.localization.distance.method import Method
+        from semsig_gis.localization import Method
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
     # The database is read while another core loads what answers; what fails there fails here, too.
-    answering = "likelihood.kernels" if method is None else "matching.search"
-    ThreadPoolExecutor(1).submit(importlib.import_module, f"semsig_gis.{answering}")
+    answering = "likelihood.kernels" if method is None else "distance.search"
+    module = f"semsig_gis.localization.{answering}"
+    ThreadPoolExecutor(1).submit(importlib.import_module, module)
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = seen_north(city, options.north, options.date)
 
@@ -207,7 +201,7 @@ def _beside(
             f"the query has {what}, which the method {ranking!r} cannot take; give directions to "
             "all objects or to none, or leave out the method."
         )
-    from semsig_gis.localization.suggest import with_unplaced
+    from semsig_gis.localization import with_unplaced
 
     likelihood: Any = locator
     return with_unplaced(likelihood, query, unplaced, absent=absent)
@@ -217,24 +211,15 @@ def _locator(
     options: LocalizeOptions, city: City, method: Method | None, north: North
 ) -> Locator[Any]:
     """Return what answers the queries."""
-    if method is not None:
-        return _distance_locator(options, city, method, north)
-    usual = options.usual_noise(city.dataset.taxonomy)
-    top, explain = options.top, options.explain
-    return options.locator(city, north, usual_noise=usual, top=top, explain=explain)
+    taxonomy, top = city.dataset.taxonomy, options.top
+    if method is None:
+        usual = options.usual_noise(taxonomy)
+        return options.locator(city, north, usual_noise=usual, top=top, explain=options.explain)
+    from semsig_gis.localization import Requirement, make_locator
 
-
-def _distance_locator(
-    options: LocalizeOptions, city: City, method: Method, north: North
-) -> Locator[Any]:
-    from semsig_gis.localization.answers import Requirement
-    from semsig_gis.localization.distance.search import DistanceLocator
-
-    database, require = city.dataset, options.require
-    requirement = None if require is None else Requirement.parse(require, database.taxonomy)
-    return DistanceLocator(
-        database=database, method=method, requirement=requirement, top=options.top, north=north
-    )
+    require = options.require
+    requirement = None if require is None else Requirement.parse(require, taxonomy)
+    return make_locator(city, method, requirement=requirement, top=top, north=north)
 
 
 def _answer_lines(
@@ -244,7 +229,7 @@ def _answer_lines(
 
     Lines of a file are answered side by side, those of standard input one by one as they come.
     """
-    from semsig_gis.core.threads import each_in_order
+    from semsig_gis.core import each_in_order
 
     source, first_error, answered, failed = options.source, "", 0, 0
 
@@ -279,8 +264,7 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
     with progress("answering"):
         answer = locator.locate(query)
     if options.map_ is not None:
-        from semsig_gis.maps.location import localization_map, location_map
-        from semsig_gis.maps.page import save_map
+        from semsig_gis.maps import localization_map, location_map, save_map
 
         with progress("drawing the map"):
             if options.ranking == LIKELIHOOD:
@@ -314,7 +298,7 @@ def _write(
 ) -> dict[str, Any]:
     """Write the regions to search, or all chances, and return what there is to say of regions."""
     from semsig_gis.exports import export_answer
-    from semsig_gis.localization.answers import REGION_SHARE
+    from semsig_gis.localization import REGION_SHARE
 
     if answer.tied_beyond:
         # No cell is left out of the search that is as good as the last candidate.

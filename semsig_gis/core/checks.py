@@ -1,18 +1,18 @@
-"""Ranges of numbers that callers give."""
+"""Checks that numbers are in a range."""
 
 from __future__ import annotations
 
 from semsig_gis.core.errors import InputError
 
 MOST_SEED = 10**18
-"""What 64 bits hold, with room for the seeds that are counted on from it."""
+"""Fits into 64 bits, with room for seeds that are derived by adding to it."""
 MOST_METRES = 1_000_000
 MOST_WORKERS = 1024
 """Processes or threads of one machine."""
 
 
 def require_number(what: str, value: float, *, least: float, most: float, unit: str = "") -> None:
-    """Raise InputError unless a number is in a range; NaN is in none.
+    """Raise InputError if `value` is not from `least` to `most`, or is NaN.
 
     Examples
     --------

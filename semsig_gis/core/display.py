@@ -1,4 +1,4 @@
-"""What a result shows of itself: its main facts, on one line and as a small table."""
+"""Text and HTML representations of results: the main facts on one line or in a small table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.symbology import one_line
+from semsig_gis.core.text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
 
 LONGEST_FACT = 60  # letters
 
-# What the packages of pictures and of maps alone import, for readers of a signature.
-Axes = Any  # of matplotlib
-MapFrame = Any  # of `maps.page`
+# Names for type hints: these classes belong to packages that core does not import.
+Axes = Any  # matplotlib.axes.Axes
+MapFrame = Any  # semsig_gis.maps.page.MapFrame
 
 
 class Displayed(ABC):
-    """Something that shows its main facts, in a terminal and in a notebook.
+    """Base class of results with a short text (``repr``) and HTML form for notebooks.
 
-    A dataclass keeps this form with ``repr=False``.
+    A dataclass needs ``repr=False`` to inherit them.
     """
 
     __slots__ = ()
 
     @abstractmethod
     def _facts(self) -> Mapping[str, object]:
-        """Return the main facts by what they are called, without looking into files."""
+        """Return the main facts by name, without reading files."""
 
     @property
     def _public_name(self) -> str:
-        kinds = (kind.__name__ for kind in type(self).__mro__)
-        return next(name for name in kinds if not name.startswith("_"))
+        names = (base.__name__ for base in type(self).__mro__)
+        return next(name for name in names if not name.startswith("_"))
 
     def __repr__(self) -> str:
         """Return the facts on one line."""
@@ -44,7 +44,7 @@ class Displayed(ABC):
         return f"<{self._public_name}: {facts}>"
 
     def _repr_html_(self) -> str:
-        """Return the facts as a table, with texts from data escaped."""
+        """Return the facts as an HTML table; text from data is escaped."""
         rows = "".join(
             f'<tr><th style="text-align: left">{escape(name)}</th>'
             f'<td style="text-align: left">{escape(_brief(fact))}</td></tr>'
@@ -55,13 +55,13 @@ class Displayed(ABC):
 
 
 def _brief(fact: object) -> str:
-    """Return a fact as a short text on one line."""
+    """Return a fact on one line, truncated to `LONGEST_FACT` characters."""
     text = one_line(f"{fact:,}" if isinstance(fact, int) else str(fact))
     return text if len(text) <= LONGEST_FACT else f"{text[: LONGEST_FACT - 1]}…"
 
 
 def bounds_text(xy: NDArray[np.float64]) -> str:
-    """Return between which metres places lie, shape (n, 2); of none there is nothing to say."""
+    """Return the bounds of places in metres, shape (n, 2), as text; 'none' without places."""
     if not len(xy):
         return "none"
     (west, south), (east, north) = xy.min(axis=0).tolist(), xy.max(axis=0).tolist()

@@ -1,4 +1,4 @@
-"""The errors that the package raises on purpose, all children of `SemsigError`."""
+"""Exceptions of the package, all subclasses of `SemsigError`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class SemsigError(Exception):
-    """Root of the package's errors: the message is one plain sentence for the user.
+    """Base class of the package's exceptions; the message is one plain sentence for the user.
 
     Examples
     --------
@@ -25,11 +25,11 @@ class SemsigError(Exception):
 
 
 class InputError(SemsigError, ValueError):
-    """A value that the caller gave cannot be used."""
+    """An argument or input value cannot be used."""
 
 
 class UnknownNameError(SemsigError, LookupError):
-    """A name (class, symbol, layer, method...) is not in the list it was looked up in."""
+    """A name (of a class, symbol, layer, method...) does not exist."""
 
 
 class CatalogError(SemsigError, ValueError):
@@ -45,25 +45,26 @@ class CrsError(SemsigError, ValueError):
 
 
 class EmptyResultError(SemsigError, ValueError):
-    """A step would have produced nothing."""
+    """The result of a step is empty."""
 
 
 class DatabaseError(SemsigError, RuntimeError):
-    """A file that the package wrote is damaged or does not fit the request."""
+    """A file written by the package is damaged or does not fit the request."""
 
 
-def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Return ``"; the nearest is 'x'"`` for a misspelt name, or nothing where no name is near."""
-    lowered = {candidate.lower(): candidate for candidate in known}
-    close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.5)
-    return f"; the nearest is {lowered[close[0]]!r}" if close else ""
+def nearest_name(name: str, names: Iterable[str]) -> str:
+    """Return ``"; the nearest is 'x'"`` for a misspelt name; empty if no name is similar."""
+    lower_case = {candidate.lower(): candidate for candidate in names}
+    matches = difflib.get_close_matches(name.lower(), lower_case, n=1, cutoff=0.5)
+    return f"; the nearest is {lower_case[matches[0]]!r}" if matches else ""
 
 
 @contextlib.contextmanager
 def extra(name: str, what: str) -> Iterator[None]:
-    """Import packages of an extra in the block; InputError says how to install one that is missing.
+    """Raise InputError if an optional package that is imported in the block is not installed.
 
-    `what` needs them, such as "the workbench".
+    `name` is the extra that installs it; `what` is the feature that needs it, such as
+    "the workbench".
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""The metric plane: coordinate system, names of columns, bearings, and the grid of cells."""
+"""Metric coordinate systems, bearings, the grid of cells, and names of columns."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from pyproj import CRS, Geod, Proj, Transformer
 from pyproj.exceptions import CRSError
 
 from semsig_gis.core.checks import require_number
-from semsig_gis.core.effort import require_memory
 from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core.resources import require_memory
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -24,14 +24,14 @@ FULL_TURN, HALF_TURN = 360.0, 180.0
 
 
 def wrap_degrees(angles: ArrayLike) -> NDArray[np.float64]:
-    """Return any finite angles in degrees as the same directions in [0, 360)."""
+    """Return angles in degrees wrapped to [0, 360)."""
     wrapped = np.mod(np.asarray(angles, dtype=np.float64), FULL_TURN)
     # The remainder of a tiny negative angle rounds to 360 itself.
     return np.where(wrapped >= FULL_TURN, 0.0, wrapped)
 
 
 def signed_degrees(angles: ArrayLike) -> NDArray[np.float64]:
-    """Return angles in degrees as the same directions in [-180, 180)."""
+    """Return angles in degrees wrapped to [-180, 180)."""
     return np.asarray((np.asarray(angles) + HALF_TURN) % FULL_TURN - HALF_TURN)
 
 
@@ -55,15 +55,15 @@ NOTES = "notes"
 """Key of the warnings in the metadata of a file."""
 
 LICENSES = "licenses"
-"""Whom to name for a table of buildings or streets: a key of its `attrs`."""
+"""Key of the attribution lines in the `attrs` of a table of buildings or streets."""
 
 
 def require_metric_crs(crs: CRS | str | int | None) -> CRS:
-    """Return a coordinate system, without its height, if distances in metres can be taken in it.
+    """Return a coordinate system, without its height, if it is metric.
 
-    Raises CrsError if it is missing, unknown, in degrees or feet, a Mercator or cylindrical
-    projection, where lengths grow with the latitude (1.5 times at Paris), or if its axes do not
-    point east and north, from which bearings are counted.
+    CrsError if it is missing, unknown, in degrees or feet, a Mercator or cylindrical projection
+    (where lengths grow with the latitude: 1.5 times at Paris), or if its axes do not point east
+    and north.
     """
     advice = (
         "give a projected CRS in metres, such as 'EPSG:2154' for France or the UTM zone of the city"
@@ -74,25 +74,26 @@ def require_metric_crs(crs: CRS | str | int | None) -> CRS:
         system = CRS.from_user_input(crs).to_2d()
     except CRSError as error:
         raise CrsError(f"coordinate reference system {crs!r} is unknown; {advice}.") from error
-    fault = _fault(system)
-    if fault:
-        raise CrsError(f"{system.name} {fault}; {advice}.")
+    problem = _metric_problem(system)
+    if problem:
+        raise CrsError(f"{system.name} {problem}; {advice}.")
     return system
 
 
-def _fault(system: CRS) -> str:
-    """Return why distances and bearings cannot be taken in a system, or nothing."""
+def _metric_problem(system: CRS) -> str:
+    """Return why distances and bearings cannot be computed in a system; empty if they can."""
     if system.is_geographic:
         return "is in degrees"
     if not system.is_projected:
         return f"is {system.type_name.removesuffix(' CRS').lower()}, not projected"
-    # The operation of a bound system is its datum shift; the projection is its source's.
+    # The operation of a bound CRS is its datum shift; the projection belongs to its source CRS.
     plane = system.source_crs if system.is_bound else system
     operation = plane.coordinate_operation if plane else None
     method = operation.method_name.lower() if operation else ""
-    # Transverse and oblique ones (UTM, the Swiss and Hungarian grids) are true near their line.
+    # Transverse and oblique projections (UTM, the Swiss and Hungarian grids) preserve lengths near
+    # their central line.
     if re.search("mercator|cylindrical", method) and not re.search("transverse|oblique", method):
-        return "is a Mercator or cylindrical projection, whose lengths grow with latitude"
+        return "is a Mercator or cylindrical projection, where lengths grow with latitude"
     if any(axis.unit_conversion_factor != 1.0 for axis in system.axis_info):
         return "is not in metres"
     if {axis.direction for axis in system.axis_info} != {"east", "north"}:
@@ -102,11 +103,11 @@ def _fault(system: CRS) -> str:
 
 Bounds = tuple[float, float, float, float]
 
-# Places along each side of an extent at which a plane is compared with the ground.
+# Sample points along each side of an extent, where the plane is compared with the ellipsoid.
 SAMPLES = 11
-# Points of an edge of the extent whose degrees are looked at: in degrees an edge is a curve.
+# Sample points along each edge of an extent that is transformed to degrees, where it is a curve.
 EDGE_POINTS = 21
-# Long against the rounding of coordinates, short against how fast the angle changes.
+# Large compared to the rounding of coordinates, small compared to changes of the convergence.
 STEP_M = 10.0
 
 
@@ -133,22 +134,22 @@ def grid_convergence(crs: CRS, xy: ArrayLike) -> NDArray[np.float64]:
     >>> grid_convergence(require_metric_crs("EPSG:2154"), [(770_000, 6_280_000)]).round(2).tolist()
     [0.63]
     """
-    azimuth, _ = _on_the_ground(crs, xy, (0.0, STEP_M))
+    azimuth, _ = _geodesic_step(crs, xy, (0.0, STEP_M))
     return signed_degrees(azimuth)
 
 
 def crs_label(crs: CRS) -> str:
-    """Return a short name for messages: the code where there is one."""
+    """Return the EPSG code of a CRS, or else its name, for messages."""
     code = crs.to_epsg()
     return crs.name if code is None else f"EPSG:{code}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distortion:
-    """How a metric CRS differs from the ground over an extent.
+    """Distortion of angles and lengths by a metric CRS over an extent.
 
-    `convergence` are the least and the largest angle from true to grid north, in degrees clockwise;
-    `scale` the least and the largest length in the plane of a metre on the ground.
+    `convergence` is the minimum and maximum angle from true to grid north, in degrees clockwise;
+    `scale` is the minimum and maximum length in the plane of a metre on the ground.
     """
 
     convergence: tuple[float, float]
@@ -156,56 +157,58 @@ class Distortion:
 
     @property
     def angle(self) -> float:
-        """The largest angle between grid and true north, in degrees."""
+        """Maximum angle between grid and true north, in degrees."""
         return max(map(abs, self.convergence))
 
     @property
     def turn(self) -> float:
-        """By how many degrees grid north turns over the extent."""
+        """Range of the convergence over the extent, in degrees."""
         return self.convergence[1] - self.convergence[0]
 
     @property
     def stretch(self) -> float:
-        """The largest share by which a length is off."""
+        """Maximum relative error of a length."""
         return max(abs(scale - 1.0) for scale in self.scale)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields, ``angle`` and ``stretch`` for JSON, None for what is infinite."""
-        values = (*self.convergence, self.angle, *self.scale, self.stretch)
-        # More decimals would be those of the rounding.
-        known = [round(value, 7) if math.isfinite(value) else None for value in values]
+        """Return the fields, ``angle`` and ``stretch`` for JSON; None for infinite values."""
+
+        def rounded(value: float) -> float | None:
+            # Further decimals contain only rounding errors.
+            return round(value, 7) if math.isfinite(value) else None
+
         return {
-            "convergence": known[:2],
-            "angle": known[2],
-            "scale": known[3:5],
-            "stretch": known[5],
+            "convergence": [*map(rounded, self.convergence)],
+            "angle": rounded(self.angle),
+            "scale": [*map(rounded, self.scale)],
+            "stretch": rounded(self.stretch),
         }
 
 
 def plane_distortion(crs: CRS, bounds: Bounds) -> Distortion:
-    """Return how a metric CRS differs from the ground within ``xmin, ymin, xmax, ymax``.
+    """Return the distortion of a metric CRS within ``xmin, ymin, xmax, ymax``.
 
-    It is measured at 11 x 11 places; infinite where one of them is not on the Earth.
+    It is computed at 11 x 11 points; infinite if one of them is not on the Earth.
     """
     if not np.isfinite(bounds).all():
         return Distortion(convergence=(-math.inf, math.inf), scale=(0.0, math.inf))
     x, y = np.linspace(bounds[:2], bounds[2:], SAMPLES).T
     xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    north, lengths = _on_the_ground(crs, xy, (0.0, STEP_M))
-    _, others = _on_the_ground(crs, xy, (STEP_M, 0.0))
-    angles = signed_degrees(north)
+    azimuth, north_lengths = _geodesic_step(crs, xy, (0.0, STEP_M))
+    _, east_lengths = _geodesic_step(crs, xy, (STEP_M, 0.0))
+    angles = signed_degrees(azimuth)
     if np.isnan(angles).any():
         return plane_distortion(crs, (math.nan,) * 4)
-    scales = STEP_M / np.concatenate([lengths, others])
+    scales = STEP_M / np.concatenate([north_lengths, east_lengths])
     return Distortion(
         convergence=(float(angles.min()), float(angles.max())),
         scale=(float(scales.min()), float(scales.max())),
     )
 
 
-@functools.lru_cache(maxsize=8)  # it takes longer to find than a query to answer
+@functools.lru_cache(maxsize=8)  # creating one takes longer than answering a query
 def to_degrees(crs: CRS) -> Transformer:
-    """Return what turns x and y in a CRS into longitudes and latitudes of WGS 84."""
+    """Return the transformer from a CRS to longitude and latitude of WGS 84."""
     return Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
 
 
@@ -219,39 +222,41 @@ def degree_bounds(crs: CRS, bounds: Bounds) -> Bounds:
 
 
 def across_180(longitudes: ArrayLike, crs: CRS, *, turn: float = FULL_TURN) -> NDArray[np.float64]:
-    """Return longitudes of places in a metric CRS such that neighbours are near each other.
+    """Return longitudes in the area of use of a metric CRS without a jump at 180 degrees.
 
-    Those across 180 degrees from the middle of where the CRS is used go beyond 180 or -180. A CRS
-    that does not say where it is used leaves them as they are. `turn` is a full turn, in degrees or
-    as x of a web map.
+    Longitudes on the other side of 180 degrees than the middle of the area of use become greater
+    than 180 or less than -180. They are unchanged if the CRS has no area of use. `turn` is a full
+    turn in their unit: degrees, or x of a web map.
     """
     degrees = np.asarray(longitudes, dtype=np.float64)
     area = crs.area_of_use
     width = 0.0 if area is None else float(wrap_degrees(area.east - area.west))
-    if area is None or width == 0.0:  # or it is used all the way round
+    if area is None or width == 0.0:  # 0: the area of use goes all the way round
         return degrees
     middle = float(signed_degrees(area.west + width / 2)) * turn / FULL_TURN
     degrees = np.where(degrees - middle > turn / 2, degrees - turn, degrees)
     return np.where(degrees - middle < -turn / 2, degrees + turn, degrees)
 
 
-def _on_the_ground(
+def _geodesic_step(
     crs: CRS, xy: ArrayLike, step: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return true azimuth and length of a step in the plane from places, along the ellipsoid."""
+    """Return the true azimuth, and the length on the ellipsoid, of a step in the plane."""
     plane, ellipsoid = Proj(crs), crs.get_geod() or Geod(ellps="WGS84")
-    here = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-    from_to = [plane(xy[:, 0], xy[:, 1], inverse=True) for xy in (here, here + step)]
-    azimuth, _, metres = ellipsoid.inv(*from_to[0], *from_to[1])
+    start = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    end = start + step
+    first = plane(start[:, 0], start[:, 1], inverse=True)
+    last = plane(end[:, 0], end[:, 1], inverse=True)
+    azimuth, _, metres = ellipsoid.inv(*first, *last)
     return np.where(np.isfinite(metres), azimuth, np.nan), np.asarray(metres)
 
 
 ROW_SPAN = 10**8
-CELL_BYTES = 48  # for a cell, while all are gathered
+CELL_BYTES = 48  # peak memory of `cells_near` for each cell
 LEAST_STEP, MOST_STEP = 0.01, 100_000
-# More cells on each side of a point than this would fill the memory.
+# Cells on each side of a point; more would fill the memory.
 MAX_REACH = 1000
-# Rows that a cell number can hold, with room for the cells around a point.
+# Greatest row that fits into a cell number, with room for the cells around a point.
 MAX_CELL = ROW_SPAN // 2 - MAX_REACH - 1
 
 
@@ -264,13 +269,12 @@ class GridSpec:
     step : float, default 10
         Side of a cell in metres (the paper's s), from 0.01 to 100,000.
     origin : tuple of (float, float), default (0, 0)
-        Lower-left corner of the cell in column 0 and row 0, in metres. Only its remainder by
-        `step` matters for where cells lie; it also sets where columns and rows count from.
+        Lower-left corner of the cell in column 0 and row 0, in metres.
 
     Raises
     ------
     InputError
-        If the step is out of its range or the origin is not finite.
+        If the step is out of range or the origin is not finite.
 
     Examples
     --------
@@ -299,10 +303,10 @@ class GridSpec:
         )
 
     def cells_at(self, xy: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the columns and rows of the cells in which points, shape (n, 2) in metres, lie.
+        """Return the columns and rows of the cells that contain points, shape (n, 2) in metres.
 
-        A point on an edge belongs to the cell east or north of it. InputError if a point is so far
-        from the origin that its cell cannot be numbered.
+        A point on an edge belongs to the cell east or north of it. InputError if a point is too
+        far from the origin for a cell number.
         """
         cells = np.floor((np.asarray(xy, dtype=np.float64) - self.origin) / self.step)
         if not (np.abs(cells) <= MAX_CELL).all():
@@ -314,9 +318,9 @@ class GridSpec:
 
 
 def cell_ids(columns: ArrayLike, rows: ArrayLike) -> NDArray[np.int64]:
-    """Return ``column * 10**8 + row``, a cell's number that stays the same when the area grows.
+    """Return cell numbers, ``column * 10**8 + row``, which do not change when the area grows.
 
-    Rows must be within 50 million of 0.
+    Rows are from -50 million to 50 million.
     """
     return np.asarray(columns, np.int64) * ROW_SPAN + np.asarray(rows, np.int64)
 
@@ -329,7 +333,7 @@ def split_ids(ids: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the whole numbers of some ranges, one range after the other."""
+    """Return the concatenated integer ranges that begin at `first` and have `size` elements."""
     ends = np.cumsum(size)
     return np.repeat(first - ends + size, size) + np.arange(size.sum())
 
@@ -337,11 +341,11 @@ def consecutive(first: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np
 def cells_near(
     xy: NDArray[np.float64], *, grid: GridSpec, radius: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the columns and rows of every cell whose centre may be within `radius` of a point.
+    """Return the columns and rows of the cells with centres possibly within `radius` of a point.
 
     Points, shape (n, 2), and radius are in metres. Cells are distinct, ordered by column, then row.
-    The square around a point is taken, so that some cells see nothing in the end. InputError if
-    there would be more than the memory holds.
+    They fill the square around each point, so some are farther than `radius` from all points.
+    InputError if there are more cells than fit into memory.
     """
     require_step(grid, radius)
     reach = math.ceil(radius / grid.step + 0.5)
@@ -354,12 +358,13 @@ def cells_near(
             f"up to {most:,} cells of {grid.step:g} m within {radius:g} m of {len(xy):,} points",
             advice="make the step larger or the range smaller, or build in tiles",
         )
+    # Extend the cells in both directions: by rows as minor part of the number, then by columns.
     rows, columns = split_ids(_widened(cell_ids(rows, columns), reach))
     return split_ids(_widened(cell_ids(columns, rows), reach))
 
 
 def require_step(grid: GridSpec, radius: float) -> None:
-    """Raise InputError if the step is so small that a range would hold too many cells."""
+    """Raise InputError if the step is too small for a range, which would contain too many cells."""
     if radius > (MAX_REACH - 1) * grid.step:
         raise InputError(
             f"a step of {grid.step:g} m is too small for a range of {radius:g} m; make the step "
@@ -368,10 +373,9 @@ def require_step(grid: GridSpec, radius: float) -> None:
 
 
 def _widened(ids: NDArray[np.int64], reach: int) -> NDArray[np.int64]:
-    """Return all numbers at most `reach` from some of the given ones, ascending."""
+    """Return all numbers that differ by at most `reach` from one of `ids`, sorted and distinct."""
     ids = np.sort(ids)
-    new = np.append(True, np.diff(ids) > 2 * reach + 1)
-    first = ids[new] - reach
-    lengths = ids[np.append(new[1:], True)] + reach + 1 - first
-    ends = np.cumsum(lengths)
-    return np.repeat(first - ends + lengths, lengths) + np.arange(ends[-1])
+    # Numbers with overlapping or adjacent neighbourhoods form one range.
+    starts = np.append(True, np.diff(ids) > 2 * reach + 1)
+    first = ids[starts] - reach
+    return consecutive(first, ids[np.append(starts[1:], True)] + reach + 1 - first)

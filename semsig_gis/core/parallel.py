@@ -1,4 +1,4 @@
-"""Tasks done one after the other, or side by side by processes of dask, here or elsewhere."""
+"""Tasks run in this process, or in parallel by dask workers on this machine or others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from semsig_gis import __version__
 from semsig_gis.core.checks import MOST_WORKERS, require_number
 from semsig_gis.core.errors import InputError, SemsigError, extra
-from semsig_gis.core.temporary import own_folder
+from semsig_gis.core.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -31,14 +31,13 @@ _Task = TypeVar("_Task")
 _Value = TypeVar("_Value")
 
 ATTEMPTS = 3
-MOST_FAILED = 10  # when so many tasks have failed, the rest would too
-# For a scheduler to answer, in seconds.
-PATIENCE_S = 10
+MOST_FAILED = 10  # failed tasks that end a run, because the others would probably fail too
+TIMEOUT_S = 10  # for an answer of the scheduler
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome(Generic[_Task, _Value]):
-    """What a task gave, or why it failed, without a full stop; then its value is None."""
+    """Value of a task, or None and the reason why it failed (without a full stop)."""
 
     task: _Task
     value: _Value | None = None
@@ -46,7 +45,7 @@ class Outcome(Generic[_Task, _Value]):
 
 
 def check_workers(workers: int, scheduler: str | None) -> None:
-    """Refuse a number of workers out of range, an empty scheduler address, or both at once."""
+    """Raise InputError for a number of workers out of range, an empty scheduler, or both given."""
     if workers < 0 or (workers and scheduler is not None) or scheduler == "":
         raise InputError(
             f"{workers} workers and the scheduler {scheduler!r} were given; give a number of "
@@ -63,13 +62,13 @@ def run_tasks(
     scheduler: str | None = None,
     files: Sequence[Path] = (),
 ) -> Generator[Outcome[_Task, _Value]]:
-    """Do tasks, and yield the outcome of each when it is done or has failed three times.
+    """Run tasks, and yield the outcome of each when it has succeeded or has failed three times.
 
-    `workers` is the number of processes of this machine, 0 to work here, in the order of the tasks
-    and without dask; `scheduler` is the address of a dask scheduler instead. Workers import `work`
-    (a `functools.partial` will do), so a script that gives them needs the guard ``if __name__ ==
-    "__main__":``, and they must see `files` under the same paths. Tasks are distinct, and all
-    hashable or none. InputError if no worker can be used.
+    `workers` is the number of worker processes on this machine; with 0, tasks run in this process,
+    in order and without dask. `scheduler` is the address of a dask scheduler instead. Workers
+    import `work` (which may be a `functools.partial`), so a script that calls this with workers
+    needs the guard ``if __name__ == "__main__":``. They need `files` under the same paths. Tasks
+    are distinct, and all or none of them are hashable. InputError if no worker can be used.
     """
     check_workers(workers, scheduler)
     if not tasks:
@@ -79,10 +78,10 @@ def run_tasks(
             yield _attempt(work, task)
         return
     with extra("cluster", "work in several processes"):
-        from distributed import KilledWorker, as_completed  # noqa: PLC0415 - only where it is used
+        from distributed import KilledWorker, as_completed  # noqa: PLC0415 - optional, 0.4 s
 
-    with _answering(scheduler), _client(workers, scheduler) as client:
-        _require_same_view(client, files)
+    with _timeouts_explained(scheduler), _client(workers, scheduler) as client:
+        _require_same_files(client, files)
         futures = client.map(partial(_attempt, work), tasks, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
         for future in as_completed(futures, loop=client.loop):
@@ -99,21 +98,21 @@ def finish_tasks(
     work: Callable[[_Task], _Value],
     tasks: Sequence[_Task],
     *,
-    done: Callable[[_Task, _Value | None], None],
+    on_success: Callable[[_Task, _Value | None], None],
     workers: int = 0,
     scheduler: str | None = None,
     files: Sequence[Path] = (),
 ) -> dict[_Task, str]:
-    """Do tasks as `run_tasks` does until ten have failed; return why, in the order of failing.
+    """Run tasks like `run_tasks` until ten have failed; return the reasons by task.
 
-    `done` is called with each task that was done and its value.
+    `on_success` is called with each successful task and its value.
     """
     failed: dict[_Task, str] = {}
     outcomes = run_tasks(work, tasks, workers=workers, scheduler=scheduler, files=files)
     with contextlib.closing(outcomes):
         for outcome in outcomes:
             if outcome.reason is None:
-                done(outcome.task, outcome.value)
+                on_success(outcome.task, outcome.value)
             else:
                 failed[outcome.task] = outcome.reason
             if len(failed) == MOST_FAILED:
@@ -122,7 +121,7 @@ def finish_tasks(
 
 
 def _attempt(work: Callable[[_Task], _Value], task: _Task) -> Outcome[_Task, _Value]:
-    """Do a task, again where it fails; what went wrong is returned as words, not raised."""
+    """Run a task up to three times; return the error message as reason instead of raising."""
     reason = ""
     for _ in range(ATTEMPTS):
         try:
@@ -135,39 +134,40 @@ def _attempt(work: Callable[[_Task], _Value], task: _Task) -> Outcome[_Task, _Va
 
 
 @contextlib.contextmanager
-def _answering(scheduler: str | None) -> Iterator[None]:
-    """Say in a sentence that processes do not answer in time, as on a loaded machine."""
+def _timeouts_explained(scheduler: str | None) -> Iterator[None]:
+    """Raise InputError if processes do not answer in time, for example on a busy machine."""
     try:
         yield
     except (TimeoutError, OSError) as error:
-        whose = "the processes" if scheduler is None else f"the scheduler {scheduler}"
+        what = "the processes" if scheduler is None else f"the scheduler {scheduler}"
         raise InputError(
-            f"{whose} did not answer in time ({type(error).__name__}); run the same command again, "
+            f"{what} did not answer in time ({type(error).__name__}); run the same command again, "
             "with fewer workers or when the machine is less busy."
         ) from error
 
 
 @contextlib.contextmanager
 def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
-    """Give a client of the scheduler, or of processes that end with the block."""
-    import dask  # noqa: PLC0415 - only where it is used
+    """Give a client of the scheduler, or of worker processes that end with the block."""
+    import dask  # noqa: PLC0415 - optional, 0.2 s
 
     with contextlib.ExitStack() as stack:
-        scratch = stack.enter_context(own_folder(Path(tempfile.gettempdir())))
+        folder = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
         settings = {
-            "temporary-directory": str(scratch),
+            "temporary-directory": str(folder),
             "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
-            # A task that kills its worker must not take the tasks down that wait there.
+            # No tasks wait at a worker, because they would fail with a task that kills it.
             "distributed.scheduler.worker-saturation": 1.0,
-            # Not with a MALLOC_TRIM_THRESHOLD_: giving all memory back at once takes twice the
-            # time of the work.
+            # Without dask's MALLOC_TRIM_THRESHOLD_: freeing all memory at once makes work take
+            # twice as long.
             "distributed.nanny.pre-spawn-environ": {
                 f"{name}_NUM_THREADS": 1 for name in ("MKL", "OMP", "OPENBLAS")
             },
         }
         stack.enter_context(dask.config.set(settings))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResourceWarning)  # of what dask leaves half made
+            # If dask cannot start, it leaves open resources, which are collected here silently.
+            warnings.simplefilter("ignore", ResourceWarning)
             client = _connect(workers, scheduler, stack)
             if client is None:
                 gc.collect()
@@ -182,19 +182,23 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             yield stack.enter_context(client)
         finally:
             if scheduler is None:
-                _await_processes(client, workers)
+                # dask cannot end workers that are being restarted, so wait for them.
+                end = time.monotonic() + TIMEOUT_S
+                with contextlib.suppress(OSError):
+                    while len(client.nthreads()) < workers and time.monotonic() < end:
+                        time.sleep(0.05)
 
 
 def _connect(workers: int, scheduler: str | None, stack: ExitStack) -> Client | None:
-    """Return a client of the scheduler, or of processes that end with the stack; else None.
+    """Return a client of the scheduler, or of new processes that end with the stack.
 
-    On a loaded machine, dask fails in ways of its own.
+    None if that fails: on a busy machine, dask raises many kinds of error.
     """
-    from distributed import Client, LocalCluster  # noqa: PLC0415 - only where it is used
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - optional, 0.4 s
 
     try:
         if scheduler is not None:
-            return Client(scheduler, timeout=PATIENCE_S, set_as_default=False)
+            return Client(scheduler, timeout=TIMEOUT_S, set_as_default=False)
         with _interrupts_ignored():
             cluster = LocalCluster(
                 n_workers=workers,
@@ -204,63 +208,54 @@ def _connect(workers: int, scheduler: str | None, stack: ExitStack) -> Client | 
                 dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
             )
-        stack.callback(_end, cluster)
-        return Client(cluster, timeout=PATIENCE_S, set_as_default=False)
-    except Exception:  # noqa: BLE001 - whatever it is, nothing was begun
+        stack.callback(_close, cluster)
+        return Client(cluster, timeout=TIMEOUT_S, set_as_default=False)
+    except Exception:  # noqa: BLE001 - no task has begun, whatever the error is
         return None
 
 
-def _end(cluster: LocalCluster) -> None:
-    """End processes; where dask fails at it, what they did stands."""
+def _close(cluster: LocalCluster) -> None:
+    """End worker processes; errors of dask are ignored, because the results are complete."""
     with contextlib.suppress(Exception):
-        cluster.close(timeout=PATIENCE_S)
-
-
-def _await_processes(client: Client, workers: int) -> None:
-    """Wait for processes that are being started again: dask cannot end them before."""
-    until = time.monotonic() + PATIENCE_S
-    with contextlib.suppress(OSError):
-        while len(client.nthreads()) < workers and time.monotonic() < until:
-            time.sleep(0.05)
+        cluster.close(timeout=TIMEOUT_S)
 
 
 @contextlib.contextmanager
 def _interrupts_ignored() -> Iterator[None]:
-    """Start processes that leave it to this one to answer the interrupt key."""
+    """Ignore the interrupt key in processes started in the block; only this one handles it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, handler)
 
 
-def _require_same_view(client: Client, files: Sequence[Path]) -> None:
-    """Refuse workers that have another version of the package, or other files."""
-    ours = _view(files)
-    views = client.run(_view, files, on_error="return")
-    if not views:
+def _require_same_files(client: Client, files: Sequence[Path]) -> None:
+    """Raise InputError if a worker has another version of the package, or other files."""
+    version, sizes = _version_and_sizes(files)
+    answers = client.run(_version_and_sizes, files, on_error="return")
+    if not answers:
         raise InputError("the scheduler has no workers; start some with `dask worker ADDRESS`.")
-    for worker, view in views.items():
-        if isinstance(view, BaseException):
+    for worker, answer in answers.items():
+        if isinstance(answer, BaseException):
             raise InputError(
-                f"the worker {worker} cannot run semsig_gis ({view}); install it there."
-            ) from view
-        if view[0] != ours[0]:
+                f"the worker {worker} cannot run semsig_gis ({answer}); install it there."
+            ) from answer
+        if answer[0] != version:
             raise InputError(
-                f"the worker {worker} has semsig_gis {view[0]}; install {ours[0]} there."
+                f"the worker {worker} has semsig_gis {answer[0]}; install {version} there."
             )
-        for path, here, there in zip(files, ours[1:], view[1:], strict=True):
-            if here != there:
+        for path, size, worker_size in zip(files, sizes, answer[1], strict=True):
+            if size != worker_size:
                 raise InputError(
                     f"the worker {worker} does not see {path} as it is here; give paths on a file "
                     "system that all machines share."
                 )
 
 
-def _view(paths: Sequence[Path]) -> tuple[str | int | None, ...]:
-    """Return what a process sees: its version of the package, and the sizes of files."""
-    sizes = [path.stat().st_size if path.exists() else None for path in paths]
-    return (__version__, *sizes)
+def _version_and_sizes(paths: Sequence[Path]) -> tuple[str, list[int | None]]:
+    """Return the version of the package, and the sizes of files, None for a missing one."""
+    return __version__, [path.stat().st_size if path.exists() else None for path in paths]

@@ -1,7 +1,7 @@
-"""Catalogues and readers that other installed packages bring, found by entry points.
+"""Catalogues and readers of other installed packages, found by their entry points.
 
-``data_sources/README.md`` shows how a package announces them. Its code is imported only when a
-function below is called.
+``data_sources/README.md`` shows how a package declares them. Its code is imported only when one
+of the functions below is called.
 """
 
 from __future__ import annotations
@@ -26,44 +26,45 @@ CATALOGS = "semsig_gis.catalogs"
 READERS = "semsig_gis.readers"
 
 
-def installed_catalogs(*, taken: Collection[str] = ()) -> Mapping[str, Path]:
-    """Return the names and TOML files of other packages' catalogues, sorted by name, not read.
+def installed_catalogs(*, reserved: Collection[str] = ()) -> Mapping[str, Path]:
+    """Return the TOML files of other packages' catalogues by name, sorted; they are not read.
 
-    `taken` are names that are no longer free. Raises CatalogError if a name is taken or stands
-    twice. An entry that fails to load or is not the path of a TOML file is left out with a warning.
+    CatalogError if a name is in `reserved` or provided twice. An entry that fails to load or is
+    not the path of a TOML file is skipped with a warning.
     """
-    return _installed(CATALOGS, _toml_path, taken, CatalogError)
+    return _installed(CATALOGS, _toml_path, reserved, CatalogError)
 
 
-def installed_readers(*, taken: Collection[str] = ()) -> Mapping[str, Callable[..., Any]]:
-    """Return the names and functions of other packages' readers, sorted by name.
+def installed_readers(*, reserved: Collection[str] = ()) -> Mapping[str, Callable[..., Any]]:
+    """Return the functions of other packages' readers by name, sorted.
 
-    As `installed_catalogs`, but SourceError, and an entry that is not a function is left out.
+    SourceError if a name is in `reserved` or provided twice. An entry that fails to load or is not
+    a function is skipped with a warning.
     """
-    return _installed(READERS, _function, taken, SourceError)
+    return _installed(READERS, _function, reserved, SourceError)
 
 
 def _installed(
     group: str,
-    use: Callable[[Any], Any],
-    taken: Collection[str],
-    fault: type[SemsigError],
+    check: Callable[[object], Any],
+    reserved: Collection[str],
+    error_type: type[SemsigError],
 ) -> dict[str, Any]:
-    """Load the entries of a group, by name."""
+    """Load the entries of a group, by name; `check` returns the value of an entry or raises."""
     entries: dict[str, EntryPoint] = {}
-    for entry in _announced(group, tuple(sys.path)):
-        if entry.name in taken or entry.name in entries:
+    for entry in _entries(group, tuple(sys.path)):
+        if entry.name in reserved or entry.name in entries:
             other = _package(entries[entry.name]) if entry.name in entries else "semsig_gis itself"
-            raise fault(
+            raise error_type(
                 f"{entry.name!r} of {group} is provided by {other} and by {_package(entry)}; "
                 "uninstall one of the two packages or rename its entry."
             )
         entries[entry.name] = entry
-    found = {}
+    values = {}
     for name, entry in entries.items():
-        # Whatever is wrong with somebody else's package, even one that exits, is not fatal here.
+        # No error of another package is fatal here, not even one that exits the process.
         try:
-            found[name] = use(entry.load())
+            values[name] = check(entry.load())
         except (Exception, SystemExit) as error:  # noqa: BLE001
             cause = " ".join(str(error).split()).rstrip(".") or type(error).__name__
             warnings.warn(
@@ -71,12 +72,12 @@ def _installed(
                 f"cannot be loaded ({cause}); correct or uninstall that package.",
                 stacklevel=3,  # the caller of the public function
             )
-    return found
+    return values
 
 
-@cache  # because all that is installed is looked through
-def _announced(group: str, _path: tuple[str, ...]) -> list[EntryPoint]:
-    """Return the entries of a group that packages on the import path announce."""
+@cache  # finding them reads the metadata of all installed packages
+def _entries(group: str, _path: tuple[str, ...]) -> list[EntryPoint]:
+    """Return the entries of a group, for one state of ``sys.path``."""
     return sorted(entry_points(group=group), key=lambda entry: (entry.name, _package(entry)))
 
 
@@ -85,11 +86,11 @@ def _package(entry: EntryPoint) -> str:
 
 
 def _toml_path(value: object) -> Path:
-    """Return the path that an entry gives, or raise what is wrong with it."""
-    given = value() if callable(value) else value
-    if not isinstance(given, str | os.PathLike):
-        raise TypeError(f"it gives {given!r}, not the path of a .toml file")
-    path = Path(given)
+    """Return the path of a TOML file, or raise if an entry has another value."""
+    location = value() if callable(value) else value
+    if not isinstance(location, str | os.PathLike):
+        raise TypeError(f"it gives {location!r}, not the path of a .toml file")
+    path = Path(location)
     if path.suffix != ".toml" or not path.is_file():
         what = "does not exist" if path.suffix == ".toml" else "is not a .toml file"
         raise FileNotFoundError(f"{path} {what}")
@@ -97,7 +98,7 @@ def _toml_path(value: object) -> Path:
 
 
 def _function(value: object) -> object:
-    """Return the function that an entry gives, or raise what is wrong with it."""
+    """Return a function, or raise if an entry has another value."""
     if not callable(value):
         raise TypeError(f"it gives {value!r}, not a function")
     return value

@@ -1,7 +1,7 @@
-"""R-trees over street objects: which of them lie near a viewpoint.
+"""R-trees over street objects, to find the objects near a viewpoint.
 
-Two trees with one question: `ObjectIndex` (libspatialindex) for some places, `PackedIndex` (GEOS)
-for very many; it answers for boxes too.
+`ObjectIndex` (libspatialindex) is faster for a few viewpoints, `PackedIndex` (GEOS) for very many;
+the latter also answers queries by box.
 """
 
 from __future__ import annotations
@@ -19,16 +19,18 @@ from semsig_gis.core.geometry import consecutive
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# More than the distance between neighbouring floats anywhere on Earth.
+# More than the rounding error of a coordinate anywhere on Earth.
 ROUNDING_M = 1e-6
-BLOCKS = 3  # a radius: places in one block ask the tree together
+# Viewpoints in the same square, of a third of the radius, share one query of the tree.
+SQUARES_PER_RADIUS = 3
 
 
 class ObjectIndex:
     """An R-tree over points in metres, shape (n, 2).
 
-    InputError if there is no point, or one is not finite. The tree is packed in one go and asked
-    for many boxes at once. As a tree belongs to its thread, each makes its own when it asks.
+    InputError without points, or for one that is not finite. The tree is bulk-loaded and queried
+    for many boxes at once. It can be used by one thread only, so each thread builds its own at its
+    first query.
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
@@ -41,27 +43,29 @@ class ObjectIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the rows of viewpoint and point of every pair within a radius, by viewpoint.
+        """Return the indices of viewpoint and point of all pairs within a radius, by viewpoint.
 
         Viewpoints, shape (v, 2), and radius are in metres; a point at exactly the radius counts.
         """
         places = np.ascontiguousarray(viewpoints, dtype=np.float64)
-        reach = _a_touch_more(radius)
-        side = reach / BLOCKS
-        corners, block = np.unique(np.floor(places / side) * side, axis=0, return_inverse=True)
+        reach = _padded(radius)
+        side = reach / SQUARES_PER_RADIUS
+        # Query the tree once for each square, with a box that contains all circles around it.
+        corners, square = np.unique(np.floor(places / side) * side, axis=0, return_inverse=True)
         if not hasattr(self._own, "tree"):
             self._own.tree = rtree_index.Index((np.arange(len(self._xy)), self._xy, self._xy))
-        found, counts = self._own.tree.intersection_v(corners - reach, corners + (reach + side))
+        points, counts = self._own.tree.intersection_v(corners - reach, corners + (reach + side))
+        # Repeat the points of a square for each of its viewpoints.
         sizes = counts.astype(np.int64)
-        point = found[consecutive((np.cumsum(sizes) - sizes)[block], sizes[block])]
-        viewpoint = np.repeat(np.arange(len(places)), sizes[block])
-        return _near(viewpoint, point.astype(np.int64), places, self._xy, radius)
+        point = points[consecutive((np.cumsum(sizes) - sizes)[square], sizes[square])]
+        viewpoint = np.repeat(np.arange(len(places)), sizes[square])
+        return _within(viewpoint, point.astype(np.int64), places, self._xy, radius)
 
 
 class PackedIndex:
-    """An R-tree over points that is packed once and asked by very many viewpoints.
+    """A packed R-tree over points in metres, shape (n, 2), for very many viewpoints.
 
-    Positions are in metres, shape (n, 2). InputError if there is none, or one is not finite.
+    InputError without points, or for one that is not finite.
     """
 
     def __init__(self, xy: NDArray[np.float64]) -> None:
@@ -71,17 +75,17 @@ class PackedIndex:
     def pairs_within(
         self, viewpoints: NDArray[np.float64], *, radius: float
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return all pairs within a radius, as `ObjectIndex.pairs_within` does."""
+        """Return all pairs within a radius, like `ObjectIndex.pairs_within`."""
         places = np.ascontiguousarray(viewpoints, dtype=np.float64)
         viewpoint, point = self._tree.query(
-            shapely.points(places), predicate="dwithin", distance=_a_touch_more(radius)
+            shapely.points(places), predicate="dwithin", distance=_padded(radius)
         )
-        return _near(viewpoint, point, places, self._xy, radius)
+        return _within(viewpoint, point, places, self._xy, radius)
 
     def pairs_in(
         self, low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the rows of box and point of every point in a box, ordered by box.
+        """Return the indices of box and point of all points in a box, ordered by box.
 
         Lower left and upper right corners have shape (b, 2); a point on an edge counts.
         """
@@ -90,26 +94,26 @@ class PackedIndex:
 
 
 def checked_points(xy: ArrayLike) -> NDArray[np.float64]:
-    """Return a C-ordered copy of points, shape (n, 2); refuse none, or one that is not finite."""
-    points = np.array(xy, dtype=np.float64, order="C")  # a copy, as the tree has one too
+    """Return a C-ordered copy of points, shape (n, 2); InputError for none or one not finite."""
+    points = np.array(xy, dtype=np.float64, order="C")  # a copy, because the tree keeps one too
     if len(points) == 0 or not np.isfinite(points).all():
         raise InputError("an R-tree needs at least one point, and finite coordinates.")
     return points
 
 
-def _a_touch_more(radius: float) -> float:
-    """Return a reach that no rounding in a tree makes too small; `_near` decides alone."""
+def _padded(radius: float) -> float:
+    """Return a radius with a margin for rounding errors in a tree; `_within` is exact."""
     return radius * (1 + 1e-12) + ROUNDING_M
 
 
-def _near(
+def _within(
     viewpoint: NDArray[np.int64],
     point: NDArray[np.int64],
     places: NDArray[np.float64],
     xy: NDArray[np.float64],
     radius: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Keep the pairs that are at most so far apart."""
+    """Return the pairs that are at most `radius` apart."""
     delta = xy[point] - places[viewpoint]
-    near = np.hypot(delta[:, 0], delta[:, 1]) <= radius
-    return viewpoint[near], point[near]
+    within = np.hypot(delta[:, 0], delta[:, 1]) <= radius
+    return viewpoint[within], point[within]

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
 
 MAX_LEVELS = 255
-# Steps of a full turn that are stored. Divisible by 8, 16, 24, 32 and 72, so that the usual angle
-# levels come out exactly. A unit is a hundredth of the noise of a good detector.
+# Stored steps of a full turn. The number is divisible by 8, 16, 24, 32 and 72, so that the usual
+# angle levels are exact. A unit is 1 % of the noise of a good detector.
 BEARING_UNITS = 7200
-# In the range that is seen furthest; a unit is 12 cm where that is 30 m.
+# Stored steps of the largest visibility range; a unit is 12 cm if that is 30 m.
 DISTANCE_UNITS = 255
 
 
 @dataclass(frozen=True, slots=True)
 class SignatureSpec:
-    """How a signature is made.
+    """Parameters of a signature.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class SignatureSpec:
     Raises
     ------
     InputError
-        If a value is out of its range.
+        If a value is out of range.
 
     Examples
     --------
@@ -75,13 +75,13 @@ def quantize(bearings: ArrayLike, levels: int) -> NDArray[np.uint8]:
 
 
 def distance_units_of(distances: NDArray[np.float64], reach: float) -> NDArray[np.uint8]:
-    """Return the nearest whole units of distances in metres; `reach` and beyond are all of them."""
+    """Return distances in metres rounded to units of ``reach / 255``, at most 255."""
     units = np.rint(distances * (DISTANCE_UNITS / reach))
     return np.minimum(units, DISTANCE_UNITS).astype(np.uint8)
 
 
 def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return degrees clockwise from north, -360 to 360, on one turn; InputError for any other."""
+    """Return bearings from -360 to 360 degrees wrapped to [0, 360); InputError for others."""
     try:
         angles = np.asarray(bearings, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -97,13 +97,12 @@ def wrapped_bearings(bearings: Sequence[float] | NDArray[np.float64]) -> NDArray
 
 
 def _listed(numbers: NDArray[Any] | None) -> str:
-    """Return numbers as text."""
     return "unknown" if numbers is None else " ".join(f"{number:g}" for number in numbers.tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Signature(Displayed):
-    """One signature: of a cell, or a query.
+    """The signature of a cell or of a query.
 
     Parameters
     ----------
@@ -115,7 +114,7 @@ class Signature(Displayed):
     Raises
     ------
     InputError
-        If neither part is given, the parts differ in length, or a bearing is out of range.
+        If neither is given, their lengths differ, or a bearing is out of range.
 
     Examples
     --------
@@ -135,7 +134,7 @@ class Signature(Displayed):
             object.__setattr__(self, "codes", np.asarray(self.codes, dtype=np.uint8))
         if self.bearings is not None:
             bearings = np.asarray(self.bearings, dtype=np.float64)
-            # Others would get a wrong angle level without an error.
+            # A bearing out of range would get a wrong angle level without an error.
             wrong = bearings[~((bearings >= 0.0) & (bearings < FULL_TURN))]
             if len(wrong):
                 raise InputError(
@@ -165,9 +164,9 @@ class Signature(Displayed):
         return 0 if part is None else len(part)
 
     def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
-        """Return ``types`` (symbols), ``bearings`` (degrees) and ``length``, ready for JSON.
+        """Return ``types`` (symbols), ``bearings`` (degrees) and ``length`` for JSON.
 
-        A part that is unknown is None.
+        Unknown types or bearings are None.
         """
         return {
             "types": None if self.codes is None else taxonomy.decode(self.codes),
@@ -176,20 +175,20 @@ class Signature(Displayed):
         }
 
     def among(self, codes: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which objects are of these classes or of unknown class, shape (n,)."""
+        """Return a mask of the objects of these classes or of unknown class, shape (n,)."""
         if self.codes is None:
             return np.ones(len(self), np.bool_)
         return np.asarray(np.isin(self.codes, codes) | (self.codes == WILDCARD))
 
     def select(self, objects: NDArray[np.bool_ | np.int64]) -> Signature:
-        """Return the signature of some of the objects, by their row numbers or a mask."""
+        """Return the signature of some of the objects, by indices or a mask."""
         return Signature(
             None if self.codes is None else self.codes[objects],
             None if self.bearings is None else self.bearings[objects],
         )
 
     def turned(self, degrees: float) -> Signature:
-        """Return the signature with bearings that are so many degrees larger, in their order."""
+        """Return the signature with `degrees` added to all bearings, sorted by bearing."""
         if self.bearings is None:
             return self
         bearings = wrap_degrees(self.bearings + degrees)
@@ -197,7 +196,7 @@ class Signature(Displayed):
         return Signature(None if self.codes is None else self.codes[order], bearings[order])
 
     def levels(self, levels: int) -> NDArray[np.uint8]:
-        """Return the angle level of each bearing, shape (n,); InputError where they are unknown."""
+        """Return the angle level of each bearing, shape (n,); InputError if they are unknown."""
         if self.bearings is None:
             raise InputError("the query has no bearings; give them, or use a method on types.")
         return quantize(self.bearings, levels)
@@ -210,13 +209,12 @@ class Signature(Displayed):
         *,
         taxonomy: Taxonomy,
     ) -> Signature:
-        """Make a query, sorted clockwise from north, from what a person or a detector says.
+        """Return a query, sorted clockwise from north, from symbols and bearings.
 
-        `types` are symbols such as ``"DDBL"``, clockwise where no bearings are given; `bearings`
-        are degrees clockwise from north, -360 to 360, one for each type in any order. Either may
-        be empty, where nothing was seen. UnknownNameError if a symbol belongs to no class;
-        InputError if neither is given, the lengths differ, or a bearing is not a number or out of
-        range.
+        `types` are symbols such as ``"DDBL"``, clockwise if no bearings are given; `bearings` are
+        degrees clockwise from north, -360 to 360, one for each type in any order. Both are empty
+        if nothing was seen. UnknownNameError if a symbol belongs to no class; InputError if
+        neither is given, the lengths differ, or a bearing is not a number or out of range.
 
         >>> query = Signature.parse("DB", [200, -10], taxonomy=demo_database.taxonomy)
         >>> query.codes.tolist(), query.bearings.tolist()

@@ -1,4 +1,4 @@
-"""Intervals of confidence for chances, rates and deviations."""
+"""Confidence intervals, and a logistic regression of shares."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
 
 def wilson_interval(share: float, trials: float, *, percent: float = 95.0) -> tuple[float, float]:
-    """Return Wilson's interval for a chance.
+    """Return the Wilson score interval of a probability.
 
     Parameters
     ----------
     share : float
-        Share of the trials that went well, 0 to 1.
+        Share of successful trials, 0 to 1.
     trials : float
         Number of trials, 0 or more, not necessarily whole.
     percent : float, default 95
-        How often the interval shall hold the true chance, above 0 and below 100.
+        Confidence level in percent, above 0 and below 100.
 
     Returns
     -------
     low, high : float
-        The interval; all of 0 to 1 where there was no trial.
+        The interval; 0 and 1 without trials.
 
     Examples
     --------
@@ -48,9 +48,9 @@ def wilson_interval(share: float, trials: float, *, percent: float = 95.0) -> tu
 
 
 def poisson_interval(rate: float, trials: float, *, percent: float = 95.0) -> tuple[float, float]:
-    """Return the score interval for a Poisson rate, in events a trial.
+    """Return the score interval of a Poisson rate, in events per trial.
 
-    The number of trials need not be whole; without any, the interval goes up to infinity.
+    The number of trials may have decimals; without trials, the interval is 0 to infinity.
     """
     z = _deviations(percent)
     if trials <= 0:
@@ -61,7 +61,7 @@ def poisson_interval(rate: float, trials: float, *, percent: float = 95.0) -> tu
 
 
 def log_interval(value: float, deviation: float, *, percent: float = 95.0) -> tuple[float, float]:
-    """Return an interval around a value above 0 that is even in the logarithm.
+    """Return a confidence interval of a value above 0 that is symmetric in its logarithm.
 
     `deviation` is the standard deviation of the natural logarithm.
     """
@@ -70,10 +70,10 @@ def log_interval(value: float, deviation: float, *, percent: float = 95.0) -> tu
 
 
 def quantile_ranks(size: int, share: float, *, percent: float = 95.0) -> tuple[int, int]:
-    """Return the ranks, from 1, of the ordered values between which a quantile lies.
+    """Return the ranks, from 1, of the sorted values that bound the interval of a quantile.
 
-    They are the least and the largest where the sample is too small to say more. Whatever the
-    distribution, the number of values below the quantile is binomial; here it is taken as normal.
+    For small samples these are the first and the last rank. For any distribution, the number of
+    values below the quantile is binomial; its normal approximation is used.
     """
     half = _deviations(percent) * math.sqrt(size * share * (1.0 - share))
     low = math.floor(size * share - half)
@@ -82,8 +82,8 @@ def quantile_ranks(size: int, share: float, *, percent: float = 95.0) -> tuple[i
 
 
 def binomial_tail(hits: int, trials: int, chance: float) -> float:
-    """Return the chance of so many hits or fewer; that of one hit is above 0 and below 1."""
-    parts = (
+    """Return the probability of at most `hits` successes in `trials`; 0 < `chance` < 1."""
+    probabilities = (
         math.exp(
             math.lgamma(trials + 1)
             - math.lgamma(hit + 1)
@@ -93,11 +93,11 @@ def binomial_tail(hits: int, trials: int, chance: float) -> float:
         )
         for hit in range(hits + 1)
     )
-    return min(math.fsum(parts), 1.0)
+    return min(math.fsum(probabilities), 1.0)
 
 
 def _deviations(percent: float) -> float:
-    """Return how many standard deviations an interval reaches each way."""
+    """Return half the width of an interval, in standard deviations."""
     if not 0.0 < percent < 100.0:  # noqa: PLR2004
         raise InputError(
             f"an interval of {percent} % was asked for; give a number between 0 and 100."
@@ -106,19 +106,20 @@ def _deviations(percent: float) -> float:
 
 
 DEGREE = 3
-RIDGE = 1e-3  # keeps a power that tells nothing from growing
-STEPS = 100
-SETTLED = 1e-9
-LARGEST = 30.0  # logits beyond it are as good as certain
+RIDGE = 1e-3  # keeps the weights of uninformative terms small
+MAX_STEPS = 100
+TOLERANCE = 1e-9
+MAX_LOGIT = 30.0  # avoids overflow; the probability is 0 or 1 to 13 digits
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ShareFit:
-    """A curve that `fit_shares` found, over f features and with p terms.
+    """Result of `fit_shares`, with p polynomial terms of f features.
 
-    `low` and `high` are the range of each feature in the examples, beyond which the curve stays
-    what it is at its ends; `middle` and `spread` are mean and standard deviation of each. `powers`,
-    shape (p, f), are the powers of the features in each term.
+    `low` and `high`, shape (f,), are the range of each feature in the examples; features are
+    clipped to it. `middle` and `spread`, shape (f,), are their means and standard deviations.
+    `powers`, shape (p, f), are the powers of the features in each term, `weights`, shape (p,),
+    their coefficients.
     """
 
     low: NDArray[np.float64]
@@ -129,39 +130,37 @@ class ShareFit:
     weights: NDArray[np.float64]
 
     def predict(self, features: ArrayLike) -> NDArray[np.float64]:
-        """Return the shares to expect, from 0 to 1, of cases, shape (n, f)."""
+        """Return the expected shares, shape (n,), for features, shape (n, f)."""
         inside = np.clip(np.asarray(features, dtype=np.float64), self.low, self.high)
         terms = _terms((inside - self.middle) / self.spread, self.powers)
         return _logistic(terms @ self.weights)
 
 
 def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
-    """Fit a curve to examples: features of shape (m, f), and m shares from 0 to 1, or 0 and 1.
+    """Fit shares (0 to 1, or outcomes 0 and 1), shape (m,), to features, shape (m, f).
 
-    Logistic regression on the products of the features up to the third degree, by Newton's method
-    on the log-likelihood less a small penalty on all weights but the constant. So the mean of the
-    curve over the examples is that of the shares.
+    Logistic regression on a polynomial of the third degree, by Newton's method, with a small ridge
+    penalty on all weights except the constant. So the mean of the predictions for the examples
+    equals the mean of the shares.
     """
-    given = np.asarray(features, dtype=np.float64)
+    examples = np.asarray(features, dtype=np.float64)
     targets = np.asarray(shares, dtype=np.float64)
-    if given.ndim != 2 or len(given) != len(targets) or not len(targets):  # noqa: PLR2004
+    if examples.ndim != 2 or len(examples) != len(targets) or not len(targets):  # noqa: PLR2004
         raise InputError(
-            f"{given.shape} features and {targets.shape} shares were given; give a row for each."
+            f"{examples.shape} features and {targets.shape} shares were given; give a row for each."
         )
-    if not (np.isfinite(given).all() and ((targets >= 0) & (targets <= 1)).all()):
+    if not (np.isfinite(examples).all() and ((targets >= 0) & (targets <= 1)).all()):
         raise InputError(
             "a feature is not finite or a share is not from 0 to 1; leave such examples out."
         )
-    kinds = given.shape[1]
-    powers = np.array(
-        [one for one in itertools.product(range(DEGREE + 1), repeat=kinds) if sum(one) <= DEGREE]
-    )
-    middle, spread = given.mean(axis=0), given.std(axis=0)
+    exponents = itertools.product(range(DEGREE + 1), repeat=examples.shape[1])
+    powers = np.array([term for term in exponents if sum(term) <= DEGREE])
+    middle, spread = examples.mean(axis=0), examples.std(axis=0)
     spread = np.where(spread > 0, spread, 1.0)
-    terms = _terms((given - middle) / spread, powers)
+    terms = _terms((examples - middle) / spread, powers)
     return ShareFit(
-        low=given.min(axis=0),
-        high=given.max(axis=0),
+        low=examples.min(axis=0),
+        high=examples.max(axis=0),
         middle=middle,
         spread=spread,
         powers=powers,
@@ -170,27 +169,28 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
 
 
 def _newton(terms: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights of the terms, the first of which is constant."""
+    """Return the weights of the terms by Newton's method; the first term is constant."""
     penalty = np.full(terms.shape[1], RIDGE * len(shares))
     penalty[0] = 0.0
     weights = np.zeros(terms.shape[1])
-    # Where all shares are 0, or all 1, the best constant would be infinite.
-    mean = np.clip(shares.mean(), *_logistic(np.array([-LARGEST, LARGEST]) / 2))
+    # Start at the mean; clipped, because the constant is infinite if all shares are 0, or all 1.
+    mean = np.clip(shares.mean(), *_logistic(np.array([-MAX_LOGIT, MAX_LOGIT]) / 2))
     weights[0] = np.log(mean / (1.0 - mean))
     loss = _loss(terms, shares, weights, penalty)
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         expected = _logistic(terms @ weights)
-        slope = terms.T @ (shares - expected) - penalty * weights
-        bend = (terms * (expected * (1.0 - expected))[:, None]).T @ terms + np.diag(penalty)
-        step = np.linalg.solve(bend + 1e-9 * np.eye(len(bend)), slope)
+        gradient = terms.T @ (shares - expected) - penalty * weights
+        hessian = (terms * (expected * (1.0 - expected))[:, None]).T @ terms + np.diag(penalty)
+        step = np.linalg.solve(hessian + 1e-9 * np.eye(len(hessian)), gradient)
+        # Halve the step until the loss decreases.
         size = 1.0
         while (
-            new := _loss(terms, shares, weights + size * step, penalty)
-        ) > loss and size > SETTLED:
+            new_loss := _loss(terms, shares, weights + size * step, penalty)
+        ) > loss and size > TOLERANCE:
             size /= 2.0
-        if loss - new < SETTLED * len(shares):
+        if loss - new_loss < TOLERANCE * len(shares):
             break
-        weights, loss = weights + size * step, new
+        weights, loss = weights + size * step, new_loss
     return weights
 
 
@@ -200,6 +200,7 @@ def _loss(
     weights: NDArray[np.float64],
     penalty: NDArray[np.float64],
 ) -> float:
+    """Return the penalized cross-entropy."""
     logits = terms @ weights
     entropy = np.logaddexp(0.0, logits) - shares * logits
     return float(entropy.sum() + 0.5 * (penalty * weights**2).sum())
@@ -207,13 +208,13 @@ def _loss(
 
 def _terms(scaled: NDArray[np.float64], powers: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the products of powers of the features, shape (n, p)."""
-    rows = np.ascontiguousarray(scaled.T)
-    ladder = np.cumprod([np.ones_like(rows), *[rows] * DEGREE], axis=0)
+    columns = np.ascontiguousarray(scaled.T)
+    features_to_power = np.cumprod([np.ones_like(columns), *[columns] * DEGREE], axis=0)
     terms = np.ones((len(powers), len(scaled)))
-    for row, feature in np.argwhere(powers):
-        terms[row] *= ladder[powers[row, feature], feature]
+    for term, feature in np.argwhere(powers):
+        terms[term] *= features_to_power[powers[term, feature], feature]
     return terms.T
 
 
 def _logistic(logits: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logits, -LARGEST, LARGEST))))
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(logits, -MAX_LOGIT, MAX_LOGIT))))

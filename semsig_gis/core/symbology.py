@@ -1,9 +1,8 @@
-"""How data is shown on maps, in QGIS and in reports: signs of classes, colours, text made fit."""
+"""Symbols and colours of classes and results on maps, in QGIS and in reports."""
 
 from __future__ import annotations
 
 import itertools
-import unicodedata
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -18,8 +17,8 @@ if TYPE_CHECKING:
     from semsig_gis.core.taxonomy import Taxonomy
 
 
-# Those of Okabe and Ito, and two of Tol, which colour-blind people tell apart; then a lighter or
-# darker one of each. Green comes first because trees do.
+# The palette of Okabe and Ito and two colours of Tol, which colour-blind people can distinguish;
+# then a lighter or darker variant of each. Green is first because trees are the first class.
 COLOURS = (
     "#009e73",
     "#0072b2",
@@ -41,18 +40,18 @@ COLOURS = (
     "#dddd99",
 )
 SHAPES = ("circle", "square", "diamond", "triangle", "hexagon", "triangle_down", "cross")
-"""Names of the shapes, all with room for a letter; who draws a sign knows how each looks."""
+"""Names of the shapes of symbols, which leave room for a letter; each output format draws them."""
 
-# Triangles have more room where they are wider.
+# A triangle has more room for the letter at its wider side.
 DROPS = {"triangle": 0.4, "triangle_down": -0.4}
 
 BLACK, WHITE = "#000000", "#ffffff"
-DARK = 0.04045
+LINEAR_LIMIT = 0.04045  # sRGB is linear below
 
 
 @dataclass(frozen=True, slots=True)
 class ClassSign:
-    """What an object of a class looks like: its symbol on one of `SHAPES`, coloured ``#rrggbb``."""
+    """Symbol of a class on a map: a letter on one of `SHAPES` in a colour ``#rrggbb``."""
 
     symbol: str
     title: str
@@ -66,12 +65,12 @@ class ClassSign:
 
     @property
     def drop(self) -> float:
-        """How far below the middle the letter stands, in radii of a circle of the same size."""
+        """Offset of the letter below the centre, in radii of a circle of the same size."""
         return DROPS.get(self.shape, 0.0)
 
 
 def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
-    """Return the sign of each class.
+    """Return the map symbol of each class.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
     Returns
     -------
     dict of int to ClassSign
-        By class code. Up to 18 classes differ in colour, and up to 126 in colour or shape.
+        By class code. Up to 18 classes differ in colour, up to 126 in colour or shape.
 
     Examples
     --------
@@ -97,48 +96,49 @@ def class_signs(taxonomy: Taxonomy) -> dict[int, ClassSign]:
     }
 
 
-def _contrast(one: str, other: str) -> float:
-    """Return the contrast of two colours as WCAG 2 defines it: 1 to 21; text needs 4.5."""
-    darker, lighter = sorted((_luminance(one), _luminance(other)))
+def _contrast(*colours: str) -> float:
+    """Return the contrast ratio of two colours by WCAG 2, from 1 to 21; text needs 4.5."""
+    darker, lighter = sorted(map(_luminance, colours))
     return (lighter + 0.05) / (darker + 0.05)
 
 
 def _luminance(colour: str) -> float:
-    """Return the relative luminance of a colour of sRGB, which is a line in the dark."""
-    shares = [part / 255 for part in bytes.fromhex(colour[1:])]
+    """Return the relative luminance of an sRGB colour."""
+    values = [channel / 255 for channel in bytes.fromhex(colour[1:])]
     red, green, blue = (
-        share / 12.92 if share <= DARK else ((share + 0.055) / 1.055) ** 2.4 for share in shares
+        value / 12.92 if value <= LINEAR_LIMIT else ((value + 0.055) / 1.055) ** 2.4
+        for value in values
     )
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """What stands for one thing alone: one of `SHAPES`, coloured ``#rrggbb``."""
+    """Symbol without a letter: one of `SHAPES` in a colour ``#rrggbb``."""
 
     shape: str
     colour: str
 
     @property
     def edge(self) -> str:
-        """Colour of the edge, which sets it off from whatever is below: black or white."""
+        """Colour of the outline: black or white, whichever contrasts more with the fill."""
         return max(BLACK, WHITE, key=lambda edge: _contrast(edge, self.colour))
 
 
 OUTCOMES: Mapping[str, Mark] = MappingProxyType(
     {"successful": Mark("circle", "#4bb7f5"), "failed": Mark("triangle", "#570079")}
 )
-"""What became of a query."""
+"""Symbols of query outcomes."""
 
 ANSWERS: Mapping[str, Mark] = MappingProxyType(
     {"given": Mark("diamond", "#aaff66"), "withheld": Mark("square", "#ee3311")}
 )
-"""The best place for a query, whether it is given as the answer or not."""
+"""Symbols of the best place of a query, given as the answer or withheld."""
 
 ERROR_BREAKS = (5, 10, 25, 50, 100)
-"""Metres at which errors are told apart, on maps and in tables."""
+"""Limits of the error classes on maps and in tables, in metres."""
 
-# From the first that is seen on light and on dark, getting darker steadily.
+# The first colour is visible on light and dark grounds; the others get steadily darker.
 FAILURES: Mapping[float, str] = MappingProxyType(
     {
         0.0: "#fac712",
@@ -149,14 +149,14 @@ FAILURES: Mapping[float, str] = MappingProxyType(
         0.9: "#853b02",
     }
 )
-"""Colour of a place by the least share of the queries around it that failed."""
+"""Colour of a place by the minimum share of failed queries around it."""
 
 RANK_RAMP = ("#fde0dd", "#fa9fb5", "#dd3497", "#7a0177")
-"""Colours of the places of an answer, the best the darkest."""
+"""Colours of the places of an answer; the best is darkest."""
 
-CANDIDATE_RAMP = ("#31688e", "#35b779", "#fde725")  # of which none is lost in the dark
+CANDIDATE_RAMP = ("#31688e", "#35b779", "#fde725")  # all visible on a dark ground
 
-# Its lightness rises steadily.
+# Lightness increases steadily.
 FOUND_RAMP = (
     "#344d35",
     "#455631",
@@ -169,20 +169,20 @@ FOUND_RAMP = (
     "#d7bd50",
     "#f3d260",
 )
-"""Colour of a cell by tenths of the chance to be found."""
+"""Colour of a cell by tenths of the probability to be found."""
 
 SHADES: Mapping[int, str] = MappingProxyType(
     {1: "#dfdfdb", 5: "#c8c8c2", 10: "#aeaea7", 20: "#8f8f88"}
 )
-"""Colour of a cell by the smallest number of objects that are seen from it."""
+"""Colour of a cell by the minimum number of visible objects."""
 
 CELL_CHANCES: Mapping[float, str] = MappingProxyType(
     {1e-5: "#d9bdf2", 1e-4: "#bd8be8", 1e-3: "#9650d2", 1e-2: "#6a1cb0", 1e-1: "#35006b"}
 )
-"""Colour of a cell by the least chance that the place is in it, or near it."""
+"""Colour of a cell by the minimum probability that the place is in it, or near it."""
 
 CHANCES: Mapping[float, str] = MappingProxyType({0.5: "#00441b", 0.9: "#41ab5d", 0.99: "#c7e9c0"})
-"""Colour of the fewest cells that hold a share of the chance."""
+"""Colour of the smallest region that contains a share of the probability."""
 
 VERDICTS: Mapping[str, str] = MappingProxyType(
     {
@@ -193,7 +193,7 @@ VERDICTS: Mapping[str, str] = MappingProxyType(
         "outside": "#bababa",
     }
 )
-"""Colour of what became of an object."""
+"""Colour of an object by the result of matching it with a query."""
 
 GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
     {
@@ -205,61 +205,33 @@ GROUP_COLOURS: Mapping[int, str] = MappingProxyType(
         10_000: "#6b000c",
     }
 )
-"""Colour of a cell by the smallest number of cells with its signature, itself among them."""
+"""Colour of a cell by the minimum number of cells with its signature, itself included."""
 
 
 def group_labels() -> list[str]:
-    """Return what is said of the cells of each of `GROUP_COLOURS`."""
+    """Return the legend text of each of `GROUP_COLOURS`."""
     starts = list(GROUP_COLOURS)[1:]
     between = [f"{low:,} to {high - 1:,}" for low, high in itertools.pairwise(starts)]
     return ["no other", *between, f"{starts[-1]:,} or more"]
 
 
 SAME_TYPES, SAME_LEVELS = "#f5f5ff", "#ffd43b"
-"""Colours of the cells with the same types, and with the same angle levels, too."""
+"""Colours of cells with the same types, and with the same types and angle levels."""
 
 DRIFT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"same": "#b3b3ad", "changed": "#ecc980", "appeared": "#73802e", "vanished": "#9c4263"}
 )
-"""Colour of a cell by what became of it."""
+"""Colour of a cell by its change between two dates."""
 
 OBJECT_COLOURS: Mapping[str, str] = MappingProxyType(
     {"added": "#3d4a0c", "removed": "#6d1a47", "moved": "#c98a1b", "of another class": "#1f6a9c"}
 )
-"""Colour of an object by what became of it."""
+"""Colour of an object by its change between two dates."""
 
 
 def mixed(values: NDArray[np.float64], ramp: Sequence[str]) -> list[str]:
-    """Return the colour of each value in [0, 1] on a ramp of evenly spaced colours."""
+    """Return the interpolated colour of each value in [0, 1] on a ramp of evenly spaced colours."""
     anchors = np.array([list(bytes.fromhex(colour[1:])) for colour in ramp])
     stops = np.linspace(0.0, 1.0, len(ramp))
-    parts = np.stack([np.interp(values, stops, part) for part in anchors.T], axis=1)
-    return [f"#{bytes(row).hex()}" for row in np.rint(parts).astype(np.uint8)]
-
-
-# They join letters and emoji; every other character of their kind only hides or turns text.
-JOINERS = "\u200c\u200d"
-
-
-def escaped(text: str) -> str:
-    """Return text on one line that cannot break a Markdown table or become HTML."""
-    plain = " ".join(text.split())
-    return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
-
-
-def one_line(text: str) -> str:
-    """Return text from data on one line, without characters that hide or turn other text.
-
-    Those are control characters and marks of direction. Halves of characters, which no file can
-    hold, become U+FFFD.
-    """
-    plain = " ".join(text.split())
-    # What is left out may have stood between two spaces.
-    return plain if plain.isprintable() else " ".join("".join(map(_shown, plain)).split())
-
-
-def _shown(character: str) -> str:
-    kind = unicodedata.category(character)
-    if kind == "Cs" or ord(character) & 0xFFFE == 0xFFFE:  # noqa: PLR2004 - Unicode's own number
-        return "\ufffd"
-    return "" if kind in {"Cc", "Cf"} and character not in JOINERS else character
+    rgb = np.stack([np.interp(values, stops, channel) for channel in anchors.T], axis=1)
+    return [f"#{bytes(row).hex()}" for row in np.rint(rgb).astype(np.uint8)]

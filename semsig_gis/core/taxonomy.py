@@ -1,4 +1,4 @@
-"""The kinds of street object: stable code, one-character symbol and name."""
+"""Classes of street objects: stable code, one-character symbol and name."""
 
 from __future__ import annotations
 
@@ -19,37 +19,36 @@ if TYPE_CHECKING:
 
 MAX_CODE = 255
 WILDCARD = 0
-"""The code of an object whose class is not known; no class has it."""
+"""Code of an object of unknown class."""
 MAX_RANGE_M = 6000.0
 MAX_HEIGHT_M = 500.0
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectClass:
-    """One kind of street object.
+    """A class of street objects.
 
     Parameters
     ----------
     code : int
         Stable number, 1 to 255.
     symbol : str
-        One ASCII letter or digit, which stands for the class in a type sequence.
+        ASCII letter or digit of the class in a type sequence.
     name : str
         Lower-case identifier such as ``street_light``.
     title : str
-        Name to show to people.
+        Name in reports and legends.
     range_m : float, optional
-        The distance from which an object of the class is seen, in metres; None for the range of
-        all classes.
+        Distance from which an object of the class is visible, in metres; None for the default.
     height_m, height_sigma : float, optional
-        How tall an object of the class is, from the ground to its top, and the standard deviation
-        of that, in metres; None if the height says nothing about the distance.
+        Mean and standard deviation of the height of an object above the ground, in metres; None if
+        the distance cannot be estimated from the height.
 
     Raises
     ------
     CatalogError
-        If the code, the symbol or the name is not of that form, the range is not above 0, or of
-        the height and its deviation one is missing or not above 0.
+        If the code, symbol or name has another form, the range is not above 0, or only one of
+        height and deviation is given or it is not above 0.
 
     Examples
     --------
@@ -66,7 +65,7 @@ class ObjectClass:
     height_sigma: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        # The type exactly: True is an int to Python, never a code.
+        # Not isinstance: a bool is an int, but not a code.
         if type(self.code) is not int or not 1 <= self.code <= MAX_CODE:
             raise CatalogError(
                 f"class {self.name!r} has code {self.code!r}; codes are whole numbers 1 to 255."
@@ -90,9 +89,9 @@ class ObjectClass:
 
 
 def check_height(height: float | None, sigma: float | None, what: str) -> None:
-    """Refuse a height without its deviation, a deviation alone, and what is not above 0 (metres).
+    """Raise CatalogError if only one of height and deviation (metres) is given, or is not above 0.
 
-    CatalogError calls it the height of `what`.
+    `what` names the object in the message.
     """
     if height is None and sigma is None:
         return
@@ -105,7 +104,7 @@ def check_height(height: float | None, sigma: float | None, what: str) -> None:
 
 @dataclass(frozen=True, repr=False)
 class Taxonomy(Displayed):
-    """An immutable list of object classes without double codes, symbols or names.
+    """An immutable list of object classes with unique codes, symbols and names.
 
     Parameters
     ----------
@@ -115,7 +114,7 @@ class Taxonomy(Displayed):
     Raises
     ------
     CatalogError
-        If a code, symbol or name stands twice.
+        If a code, symbol or name is not unique.
 
     Examples
     --------
@@ -130,15 +129,15 @@ class Taxonomy(Displayed):
 
     def __post_init__(self) -> None:  # noqa: D105
         for attribute in ("code", "symbol", "name"):
-            seen: dict[object, str] = {}
+            names: dict[object, str] = {}
             for item in self.classes:
                 value = getattr(item, attribute)
-                if value in seen:
+                if value in names:
                     raise CatalogError(
-                        f"{attribute} {value!r} is given to both {seen[value]!r} and "
+                        f"{attribute} {value!r} is given to both {names[value]!r} and "
                         f"{item.name!r}; give each class a {attribute} of its own."
                     )
-                seen[value] = item.name
+                names[value] = item.name
 
     def _facts(self) -> dict[str, object]:
         symbols = "".join(item.symbol for item in self.classes)
@@ -146,24 +145,24 @@ class Taxonomy(Displayed):
 
     @classmethod
     def from_list(cls, items: Iterable[Mapping[str, Any]]) -> Taxonomy:
-        """Make a taxonomy from plain mappings, the inverse of `to_list`."""
+        """Return a taxonomy from plain mappings, the inverse of `to_list`."""
         return cls(tuple(ObjectClass(**item) for item in items))
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the classes as plain mappings, ready for JSON; what is not set is left out."""
+        """Return the classes as plain mappings for JSON, without fields that are None."""
         return [
             {key: value for key, value in asdict(item).items() if value is not None}
             for item in self.classes
         ]
 
     def extended(self, classes: Iterable[ObjectClass]) -> Taxonomy:
-        """Return a taxonomy with further classes, whose codes, symbols and names are free."""
+        """Return a taxonomy with further classes; their codes, symbols and names must be new."""
         return Taxonomy((*self.classes, *classes))
 
     def with_ranges(self, ranges: Mapping[str, float]) -> Taxonomy:
-        """Return a taxonomy in which some classes, by name, are seen from so many metres.
+        """Return a taxonomy with the visibility ranges (metres) of some classes, by name, replaced.
 
-        The others keep the range they have, if any.
+        The other classes keep their range.
         """
         for name in ranges:
             self.by_name(name)
@@ -175,31 +174,34 @@ class Taxonomy(Displayed):
         )
 
     def by_name(self, name: str) -> ObjectClass:
-        """Return the class of a name; UnknownNameError offers the nearest where there is none."""
-        if item := next((one for one in self.classes if one.name == name), None):
-            return item
-        known = [item.name for item in self.classes]
+        """Return the class with a name; UnknownNameError, with the nearest name, if none has it."""
+        if result := self._class_with("name", name):
+            return result
+        names = [item.name for item in self.classes]
         raise UnknownNameError(
-            f"class {name!r} is unknown{nearest_name(name, known)}; "
-            f"the classes are {', '.join(known)}."
+            f"class {name!r} is unknown{nearest_name(name, names)}; "
+            f"the classes are {', '.join(names)}."
         )
 
     def by_code(self, code: int) -> ObjectClass:
-        """Return the class of a code; UnknownNameError where there is none."""
-        if item := next((one for one in self.classes if one.code == code), None):
-            return item
+        """Return the class with a code; UnknownNameError if none has it."""
+        if result := self._class_with("code", code):
+            return result
         raise UnknownNameError(
             f"class code {code} is unknown; the codes are {[c.code for c in self.classes]}."
         )
 
     def by_symbol(self, symbol: str) -> ObjectClass:
-        """Return the class of a symbol; UnknownNameError where there is none."""
-        if item := next((one for one in self.classes if one.symbol == symbol), None):
-            return item
+        """Return the class with a symbol; UnknownNameError if none has it."""
+        if result := self._class_with("symbol", symbol):
+            return result
         raise self._unknown_symbol(symbol)
 
+    def _class_with(self, attribute: str, value: object) -> ObjectClass | None:
+        return next((item for item in self.classes if getattr(item, attribute) == value), None)
+
     def encode(self, symbols: str) -> NDArray[np.uint8]:
-        """Turn symbols such as ``"DDBL"`` into class codes, shape (n,); ``?`` is `WILDCARD`."""
+        """Return the class codes of symbols such as ``"DDBL"``, shape (n,); ``?`` is `WILDCARD`."""
         codes = {item.symbol: item.code for item in self.classes}
         codes["?"] = WILDCARD
         unknown = next((symbol for symbol in symbols if symbol not in codes), None)
@@ -213,12 +215,12 @@ class Taxonomy(Displayed):
         return UnknownNameError(f"symbol {symbol!r} is unknown{near}; the symbols are {legend}.")
 
     def decode(self, codes: ArrayLike) -> str:
-        """Turn class codes, shape (n,), into symbols, the inverse of `encode`."""
+        """Return the symbols of class codes, shape (n,), the inverse of `encode`."""
         return self.symbol_bytes[np.asarray(codes, dtype=np.uint8)].tobytes().decode("ascii")
 
     @functools.cached_property
     def symbol_bytes(self) -> NDArray[np.uint8]:
-        """ASCII value of the symbol of every code, shape (256,); ``?`` where there is no class."""
+        """ASCII values of the symbols of all codes, shape (256,); ``?`` for unused codes."""
         table = np.full(MAX_CODE + 1, ord("?"), dtype=np.uint8)
         for item in self.classes:
             table[item.code] = ord(item.symbol)
@@ -226,9 +228,9 @@ class Taxonomy(Displayed):
         return table
 
     def ranges(self, radius: float) -> NDArray[np.float64]:
-        """Return from how far each class code is seen, in metres, shape (256,).
+        """Return the visibility range of each class code in metres, shape (256,).
 
-        `radius` is for classes without a range of their own, and where there is no class.
+        It is `radius` for classes without a range and for unused codes.
         """
         table = np.full(MAX_CODE + 1, float(radius))
         for item in self.classes:

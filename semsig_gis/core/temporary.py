@@ -1,7 +1,8 @@
-"""Hidden folders for what is half done: each belongs to one process and does not outlive it.
+"""Hidden temporary folders, each locked by its process, and removed later if that is killed.
 
-A process that is killed cannot tidy up. So each folder holds a file that its process keeps locked,
-and whoever makes a folder beside it removes those that nobody holds any more.
+A killed process cannot remove its folders. So each folder contains a file that its process keeps
+locked, and the next process that needs such a folder in the same place removes all folders with
+an unlocked file.
 """
 
 from __future__ import annotations
@@ -15,123 +16,125 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import filelock
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-HALF_DONE = ".semsig-"
-"""How the names of these folders begin."""
+TEMPORARY_PREFIX = ".semsig-"
+"""First part of the names of these folders."""
 
-# Locks may be seen by one machine only, so that those of others are left alone.
-MACHINE = f"{HALF_DONE}{hashlib.blake2b(platform.node().encode(), digest_size=4).hexdigest()}-"
-OWNER = f"{HALF_DONE}owner"
-ASIDE = f"{HALF_DONE}aside"
-"""Folder in such a folder; what it holds belongs in the place of that name beside the folder."""
+# Locks may be invisible to other machines, so each removes only its own folders.
+MACHINE_PREFIX = (
+    f"{TEMPORARY_PREFIX}{hashlib.blake2b(platform.node().encode(), digest_size=4).hexdigest()}-"
+)
+LOCK_FILE = f"{TEMPORARY_PREFIX}owner"
+BACKUP_FOLDER = f"{TEMPORARY_PREFIX}aside"
+"""Subfolder for a folder that is being replaced; it is put back if the process is killed."""
 
 
 @contextlib.contextmanager
-def own_folder(parent: Path) -> Iterator[Path]:
-    """Give a new hidden folder in another, which is removed after the block.
+def temporary_folder(parent: Path) -> Iterator[Path]:
+    """Create a hidden folder in `parent`, and remove it after the block.
 
-    OSError if there is no writing there.
+    OSError if `parent` is not writable.
     """
     remove_abandoned(parent)
-    folder, owner = _claimed(parent)
+    folder, lock = _create_locked(parent)
     try:
         yield folder
     finally:
-        _remove(folder, owner)
+        _remove(folder, lock)
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Remove from a folder the hidden folders of processes of this machine that were killed.
+    """Remove the temporary folders in `parent` of processes of this machine that were killed.
 
-    What such a process had put aside, with nothing in its place yet, is put back.
+    The contents of a backup folder are put back if nothing has replaced them yet.
     """
     folders: list[Path] = []
     with contextlib.suppress(OSError):  # a name that no folder can have
-        folders += parent.glob(f"{MACHINE}*")
+        folders += parent.glob(f"{MACHINE_PREFIX}*")
     for folder in folders:
         with contextlib.suppress(OSError):
             try:
-                owner = _freed(folder)
+                lock = _lock_abandoned(folder)
             except FileNotFoundError:
                 folder.rmdir()  # if it is empty
                 continue
-            if owner is None:
+            if lock is None:
                 continue
-            for kept in (folder / ASIDE).glob("*"):
-                if not os.path.lexists(parent / kept.name):
-                    kept.rename(parent / kept.name)
-            _remove(folder, owner)
+            for backup in (folder / BACKUP_FOLDER).glob("*"):
+                if not os.path.lexists(parent / backup.name):
+                    backup.rename(parent / backup.name)
+            _remove(folder, lock)
 
 
 def is_abandoned(folder: Path) -> bool:
-    """Tell whether a hidden folder is one of a process of this machine that was killed."""
-    if not folder.name.startswith(MACHINE):
+    """Whether a folder is a temporary one of a killed process of this machine."""
+    if not folder.name.startswith(MACHINE_PREFIX):
         return False
     try:
-        owner = _freed(folder)
+        lock = _lock_abandoned(folder)
     except FileNotFoundError:
         return True
     except OSError:
         return False
-    if owner is not None:
-        os.close(owner)
-    return owner is not None
+    if lock is not None:
+        os.close(lock)
+    return lock is not None
 
 
-def _freed(folder: Path) -> int | None:
-    """Return the open, locked file that says whose a folder is; None where its process holds it."""
-    owner = os.open(folder / OWNER, os.O_RDWR)
-    if locked(owner, wait=False):
-        return owner
-    os.close(owner)
+def _lock_abandoned(folder: Path) -> int | None:
+    """Return the opened and locked file of a folder; None if its process still locks it."""
+    lock = os.open(folder / LOCK_FILE, os.O_RDWR)
+    if locked(lock, wait=False):
+        return lock
+    os.close(lock)
     return None
 
 
 def locked(file: int, *, wait: bool) -> bool:
-    """Lock an open file or folder until it is closed; False where that is impossible."""
-    from filelock import lock_descriptor  # noqa: PLC0415 - a query alone writes nothing
-
+    """Lock an open file or folder until it is closed; return False if that is impossible."""
     try:
-        return lock_descriptor(file, blocking=wait)
+        return filelock.lock_descriptor(file, blocking=wait)
     except OSError:
         return False
 
 
-def _claimed(parent: Path) -> tuple[Path, int]:
-    """Make a folder, and return it with the open file that says so."""
+def _create_locked(parent: Path) -> tuple[Path, int]:
+    """Create a folder, and return it with its open and locked file."""
     while True:
-        folder = Path(tempfile.mkdtemp(prefix=MACHINE, dir=parent))
+        folder = Path(tempfile.mkdtemp(prefix=MACHINE_PREFIX, dir=parent))
         try:
-            owner = os.open(folder / OWNER, os.O_CREAT | os.O_RDWR, 0o600)
-        except FileNotFoundError:  # another process took it for abandoned just now
+            lock = os.open(folder / LOCK_FILE, os.O_CREAT | os.O_RDWR, 0o600)
+        except FileNotFoundError:  # another process has just removed it as abandoned
             continue
         except OSError:
             folder.rmdir()
             raise
         try:
-            locked(owner, wait=True)
-        except KeyboardInterrupt:  # likely here, as a module is loaded
-            _remove(folder, owner)
+            locked(lock, wait=True)
+        except KeyboardInterrupt:
+            _remove(folder, lock)
             raise
-        if (folder / OWNER).exists():
-            return folder, owner
-        os.close(owner)
+        if (folder / LOCK_FILE).exists():
+            return folder, lock
+        os.close(lock)
 
 
-def _remove(folder: Path, owner: int) -> None:
-    """Remove a folder, and at last what says whose it is; a later run does what fails."""
+def _remove(folder: Path, lock: int) -> None:
+    """Remove a folder, its locked file last; if that fails, the next process tries again."""
     try:
         for entry in [*folder.iterdir()]:
             if entry.is_dir() and not entry.is_symlink():
                 shutil.rmtree(entry)
-            elif entry.name != OWNER:
+            elif entry.name != LOCK_FILE:
                 entry.unlink()
     except OSError:
         return
     finally:
-        os.close(owner)
+        os.close(lock)
     with contextlib.suppress(OSError):
-        (folder / OWNER).unlink()
+        (folder / LOCK_FILE).unlink()
         folder.rmdir()

@@ -1,4 +1,4 @@
-"""Text from anywhere, as a terminal may show it."""
+"""Text from data, made safe for terminals, labels, Markdown and HTML. Imports no other module."""
 
 from __future__ import annotations
 
@@ -6,27 +6,51 @@ import array
 import sys
 import unicodedata
 
-# Categories of Unicode: control, format, half a character, and ends of lines and paragraphs.
+# Unicode categories: control, format, surrogate, line separator and paragraph separator.
 HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-# They join letters and emoji.
+# Format characters that join letters and emoji; all others only hide or reorder text.
 JOINERS = "\u200c\u200d"
 UTF16 = f"utf-16-{sys.byteorder[0]}e"
 
 
 def visible(text: str) -> str:
-    r"""Return text in which what would move the cursor or turn other text is seen: ``\u001b``.
+    r"""Return text with characters that move the cursor or reorder text escaped: ``\u001b``.
 
-    Control characters, ends of lines among them, marks of direction and halves of characters are
-    written as in JSON.
+    Control characters (also line ends), direction marks and surrogates are escaped as in JSON.
     """
-    return text if text.isprintable() else "".join(map(_shown, text))
+    return text if text.isprintable() else "".join(map(_escape_hidden, text))
 
 
-def _shown(character: str) -> str:
+def _escape_hidden(character: str) -> str:
     if unicodedata.category(character) not in HIDDEN or character in JOINERS:
         return character
     units = array.array("H", character.encode(UTF16, "surrogatepass"))
     return "".join(f"\\u{unit:04x}" for unit in units)
+
+
+def one_line(text: str) -> str:
+    """Return text from data on one line, without control characters and direction marks.
+
+    Surrogates, which no file can hold, become U+FFFD.
+    """
+    plain = " ".join(text.split())
+    if plain.isprintable():
+        return plain
+    # A removed character may leave two spaces next to each other.
+    return " ".join("".join(map(_remove_hidden, plain)).split())
+
+
+def _remove_hidden(character: str) -> str:
+    category = unicodedata.category(character)
+    if category == "Cs" or ord(character) & 0xFFFE == 0xFFFE:  # noqa: PLR2004 - a noncharacter
+        return "\ufffd"
+    return "" if category in {"Cc", "Cf"} and character not in JOINERS else character
+
+
+def escaped(text: str) -> str:
+    """Return text on one line that cannot break a Markdown table or become HTML."""
+    plain = " ".join(text.split())
+    return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
 def percent(share: float, digits: int = 1) -> str:

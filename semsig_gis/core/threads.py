@@ -1,4 +1,4 @@
-"""Work that the cores of this machine share: loops over rows in kernels, and whole tasks."""
+"""Threads for loops over rows in kernels, and for whole tasks."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 
 ROWS_A_PART = 8192
-"""Rows that are worth a thread, where each takes some hundred nanoseconds."""
+"""Minimum number of rows for a thread, where a row takes some hundred nanoseconds."""
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -37,47 +37,50 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(cores())
 
 
-if hasattr(os, "register_at_fork"):  # the threads stay behind
+if hasattr(os, "register_at_fork"):  # a child process does not inherit the threads
     os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
-_here = threading.local()
+_thread_state = threading.local()
 
 
-class NotWantedError(Exception):
-    """What was worked on is not wanted any more."""
+class WorkCancelledError(Exception):
+    """The result of the work is not needed any more."""
 
 
 @contextlib.contextmanager
-def while_wanted(check: Callable[[], bool]) -> Iterator[None]:
-    """Raise `NotWantedError` here, and in `share_rows` of this thread, once the `check` fails."""
-    _here.check = check
+def cancellable(is_needed: Callable[[], bool]) -> Iterator[None]:
+    """Raise `WorkCancelledError` at the start of the block if `is_needed()` is false.
+
+    `share_rows`, called in the block by this thread, raises it as well.
+    """
+    _thread_state.is_needed = is_needed
     try:
-        _go_on()
+        _raise_if_cancelled()
         yield
     finally:
-        del _here.check
+        del _thread_state.is_needed
 
 
-def _go_on() -> None:
-    check = getattr(_here, "check", None)
-    if check is not None and not check():
-        raise NotWantedError
+def _raise_if_cancelled() -> None:
+    is_needed = getattr(_thread_state, "is_needed", None)
+    if is_needed is not None and not is_needed():
+        raise WorkCancelledError
 
 
-def work_alone() -> None:
-    """Let this thread share nothing from now on, as the others have work of their own."""
-    _here.sharing = True
+def _disable_sharing() -> None:
+    """Let `share_rows` of this thread use no other threads, because they are all busy."""
+    _thread_state.sharing = True
 
 
 def each_in_order(
     work: Callable[[_Item], _Result], items: Iterable[_Item], *, threads: int | None = None
 ) -> Iterator[_Result]:
-    """Yield what `work` returns for each of the items, which it is called with side by side.
+    """Yield ``work(item)`` for each item, in order, computed in parallel threads.
 
-    Each thread, one a core by default, has an item of its own, and only a few are taken before what
-    they give is. The first one is worked on by all, so that what is kept for later ones is made
-    once. An error of the items is raised when all before have been yielded.
+    By default, there is a thread for each core. At most two items per thread are taken in advance.
+    The first item is computed before the others start, so that caches are filled only once. If
+    `items` raises an error, it is raised after the results of the items before it.
     """
     rest = iter(items)
     for first in rest:
@@ -85,7 +88,7 @@ def each_in_order(
         break
     waiting: deque[Future[_Result]] = deque()
     threads = cores() if threads is None else threads
-    pool = ThreadPoolExecutor(threads, initializer=work_alone)
+    pool = ThreadPoolExecutor(threads, initializer=_disable_sharing)
     try:
         try:
             for item in rest:
@@ -105,23 +108,26 @@ def each_in_order(
 def share_rows(
     work: Callable[[NDArray[np.int64]], object], rows: int, *, least: int = ROWS_A_PART
 ) -> None:
-    """Call `work` with the first row of each part and the one after its last, all parts at once.
+    """Divide rows into parts of at least `least` rows, and call `work` for each in parallel.
 
-    A part has at least so many rows. What is shared within a part is done by its own thread.
+    `work` gets the first row of its part and the one after the last. Calls of this function by
+    `work` use no further threads.
     """
-    _go_on()
+    _raise_if_cancelled()
     parts = min(2 * cores(), rows // least)
-    if parts <= 1 or cores() == 1 or getattr(_here, "sharing", False):
+    if parts <= 1 or cores() == 1 or getattr(_thread_state, "sharing", False):
         work(np.array([0, rows]))
         return
 
-    def do(part: NDArray[np.int64]) -> None:
-        _here.sharing = True
+    def work_without_sharing(part: NDArray[np.int64]) -> None:
+        _thread_state.sharing = True
         try:
             work(part)
         finally:
-            _here.sharing = False
+            _thread_state.sharing = False
 
     ends = np.linspace(0, rows, parts + 1).astype(np.int64)
-    for done in [_pool().submit(do, ends[part : part + 2]) for part in range(parts)]:
-        done.result()
+    for future in [
+        _pool().submit(work_without_sharing, ends[part : part + 2]) for part in range(parts)
+    ]:
+        future.result()

@@ -1,51 +1,65 @@
-"""The signature database: the signature of every cell as flat arrays.
+"""The signature database: the signatures of all cells as flat arrays.
 
-Many cells of a city share their signature. Every measure therefore looks at each distinct
-sequence once, and `SequenceTable.inverse` spreads the results over the cells.
+Many cells of a city have the same signature. Every metric therefore measures each distinct
+sequence once, and `SequenceTable.inverse` assigns the results to the cells.
 """
 
 from __future__ import annotations
 
+import math
 import operator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
+import lazy_loader
 import numpy as np
 import pyarrow as pa
 from pyproj import CRS
 
-import semsig_gis
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed, bounds_text
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import cell_ids, consecutive, crs_label
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
-from semsig_gis.database.sightings import ViewpointSpec, Views
-from semsig_gis.storage.geoparquet import whole_numbers
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    LICENSES,
+    DatabaseError,
+    Displayed,
+    InputError,
+    Signature,
+    UnknownNameError,
+    bounds_text,
+    cell_ids,
+    consecutive,
+    crs_label,
+    map_with,
+    nearest_name,
+    plot_with,
+    quantize,
+)
+from semsig_gis.database.sequences import SequenceTable, read_only
+from semsig_gis.database.sightings import VisibleObjects
+from semsig_gis.database.viewpoints import ViewpointSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     import geopandas as gpd
+    import shapely
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.core.geometry import GridSpec
-    from semsig_gis.core.signature import SignatureSpec
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.table import CellGeometry
+    from semsig_gis.core import Axes, GridSpec, MapFrame, SignatureSpec, Taxonomy
+else:
+    gpd = lazy_loader.load("geopandas")
+    shapely = lazy_loader.load("shapely")
 
-    _Array = TypeVar("_Array", bound="NDArray[Any]")
+CellGeometry = Literal["polygon", "point"]
 
-WORD_BITS = 64
-HISTOGRAM_BLOCK = 1 << 22  # counters in one step of the histogram: 32 MB of temporaries
-CODES_A_BLOCK = 1 << 16  # as counting makes each of them a number of eight bytes
-LONGEST_VALUE = 80
+CODES_PER_BLOCK = 1 << 16  # counting makes a number of eight bytes of each of them
+CELLS_PER_TABLE = 1 << 16  # small enough for Arrow's 32-bit list offsets
+LONGEST_SETTING = 80  # letters
 
-# What two databases that were made in the same way have in common, and what it is called.
-MADE = {
+# Attributes that are equal in databases built in the same way, and their names in messages.
+SETTINGS = {
     "crs": "coordinate reference system",
     "grid": "grid",
     "spec": "range or angle levels",
@@ -60,26 +74,27 @@ ENTRY_ARRAYS = ("codes", "bearing_units", "distance_units")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SignatureDatabase(Displayed):
-    """The signatures of all cells of a city that see at least one object.
+    """Signatures of all cells of a city from which at least one object is visible.
 
-    Cell i owns the entries ``offsets[i]:offsets[i + 1]`` of the flat arrays, clockwise from north.
+    The entries of cell ``i`` are ``offsets[i]:offsets[i + 1]`` of the flat arrays, clockwise from
+    north.
 
     Parameters
     ----------
     columns, rows : ndarray of int32, shape (n,)
         Cells, ordered by column and row.
     offsets : ndarray of int64, shape (n + 1,)
-        Where each cell's entries begin.
+        First entry of each cell.
     codes : ndarray of uint8, shape (m,)
-        Class code of each object seen.
+        Class code of each visible object.
     bearing_units : ndarray of uint16, shape (m,)
         Bearing in 1/20 degree, rounded down.
     distance_units : ndarray of uint8, shape (m,)
         Distance in 1/255 of `reach`, rounded.
     grid : GridSpec
-        The cells.
+        The grid of the cells.
     spec : SignatureSpec
-        How the signatures were made.
+        Visibility range and angle levels.
     taxonomy : Taxonomy
         Classes of the codes.
     crs : pyproj.CRS
@@ -89,12 +104,12 @@ class SignatureDatabase(Displayed):
     version : str
         Version of the package that built it.
     viewpoints : ViewpointSpec
-        Which cells were looked from.
+        Which cells are viewpoints.
     occlusion : float or None
         Tolerance in metres with which buildings hide objects (see `database.occlusion`); None
-        where no building did.
+        if it was built without buildings.
     notes : tuple of str
-        Warnings about what it was built from.
+        Warnings about the data that it was built from.
 
     Examples
     --------
@@ -114,7 +129,7 @@ class SignatureDatabase(Displayed):
     crs: CRS
     licenses: tuple[str, ...] = ()
     version: str = __version__
-    viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009 - it is frozen
+    viewpoints: ViewpointSpec = ViewpointSpec()  # noqa: RUF009 - it is immutable
     occlusion: float | None = None
     notes: tuple[str, ...] = ()
 
@@ -139,17 +154,22 @@ class SignatureDatabase(Displayed):
     @cached_property
     def cell_ids(self) -> NDArray[np.int64]:
         """Number of every cell, ``column * 10**8 + row``, shape (n,)."""
-        return frozen(cell_ids(self.columns, self.rows))
+        return read_only(cell_ids(self.columns, self.rows))
 
     @cached_property
     def xy(self) -> NDArray[np.float64]:
         """Viewpoint of every cell in metres, shape (n, 2)."""
-        return frozen(self.grid.viewpoints(self.columns, self.rows))
+        return read_only(self.grid.viewpoints(self.columns, self.rows))
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints in metres: west, south, east, north; ValueError without cells."""
+        return np.concatenate([self.xy.min(axis=0), self.xy.max(axis=0)])
 
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
-        """Number of objects that every cell sees, shape (n,)."""
-        return frozen(np.diff(self.offsets))
+        """Number of visible objects of every cell, shape (n,)."""
+        return read_only(np.diff(self.offsets))
 
     @property
     def bearings(self) -> NDArray[np.float64]:
@@ -172,44 +192,44 @@ class SignatureDatabase(Displayed):
         """Angle level of every entry, shape (m,)."""
         if BEARING_UNITS % self.spec.levels == 0:
             levels = self.bearing_units // (BEARING_UNITS // self.spec.levels)
-            return frozen(levels.astype(np.uint8))
-        return frozen(quantize(self.bearings, self.spec.levels))
+            return read_only(levels.astype(np.uint8))
+        return read_only(quantize(self.bearings, self.spec.levels))
 
     @cached_property
     def occurrences(self) -> NDArray[np.int64]:
-        """How often each class code occurs over all signatures, shape (256,)."""
-        starts = range(0, len(self.codes), CODES_A_BLOCK)
-        blocks = (self.codes[start : start + CODES_A_BLOCK] for start in starts)
+        """Number of entries of each class code in all signatures, shape (256,)."""
+        starts = range(0, len(self.codes), CODES_PER_BLOCK)
+        blocks = (self.codes[start : start + CODES_PER_BLOCK] for start in starts)
         counts = (np.bincount(block, minlength=256) for block in blocks)
-        return frozen(np.asarray(sum(counts, np.zeros(256, np.int64))))
+        return read_only(np.asarray(sum(counts, np.zeros(256, np.int64))))
 
     @cached_property
     def present_codes(self) -> NDArray[np.uint8]:
         """Class codes that occur, ascending."""
-        return frozen(np.flatnonzero(self.occurrences).astype(np.uint8))
+        return read_only(np.flatnonzero(self.occurrences).astype(np.uint8))
 
     @cached_property
     def type_sequences(self) -> SequenceTable:
-        """The distinct type sequences, and which of them every cell has."""
+        """The distinct type sequences, and the number of that of every cell."""
         return SequenceTable.from_csr(self.codes, self.offsets)
 
     @cached_property
     def angle_sequences(self) -> SequenceTable:
-        """The distinct angle-level sequences, and which of them every cell has."""
+        """The distinct angle-level sequences, and the number of that of every cell."""
         return SequenceTable.from_csr(self.levels, self.offsets)
 
     @cached_property
     def type_group_sizes(self) -> NDArray[np.int64]:
-        """For every cell, how many cells have its type sequence, shape (n,)."""
-        return frozen(self.type_sequences.counts[self.type_sequences.inverse])
+        """Number of cells with the type sequence of each cell, shape (n,)."""
+        return read_only(self.type_sequences.counts[self.type_sequences.inverse])
 
     @cached_property
     def angle_group_sizes(self) -> NDArray[np.int64]:
-        """For every cell, how many cells have its angle-level sequence, shape (n,)."""
-        return frozen(self.angle_sequences.counts[self.angle_sequences.inverse])
+        """Number of cells with the angle-level sequence of each cell, shape (n,)."""
+        return read_only(self.angle_sequences.counts[self.angle_sequences.inverse])
 
     def cells_at(self, xy: ArrayLike) -> NDArray[np.int64]:
-        """Return the rows of the cells in which places lie, -1 where there is none, shape (p,).
+        """Return the rows of the cells that contain places, -1 for places in no cell, shape (p,).
 
         Places, shape (p, 2), are in metres.
         """
@@ -218,38 +238,36 @@ class SignatureDatabase(Displayed):
         return np.where(self.cell_ids[rows] == ids, rows, -1)
 
     def signature(self, cell: int) -> Signature:
-        """Return the signature of the cell in a row: its class codes and bearings."""
+        """Return the signature of a cell, by its row: class codes and bearings."""
         part = slice(self.offsets[cell], self.offsets[cell + 1])
         bearings = self.bearing_units[part] * np.float64(360.0 / BEARING_UNITS)
         return Signature(self.codes[part], bearings)
 
     def select(self, cells: slice | NDArray[np.int64] | NDArray[np.bool_]) -> SignatureDatabase:
-        """Return a database of some of the cells, by rows in their order or by True for each."""
-        rows = isinstance(cells, np.ndarray) and cells.dtype.kind == "i"
-        kept = cells if rows else np.arange(len(self))[cells]
-        lengths = self.lengths[kept]
-        entries = consecutive(self.offsets[kept], lengths)
+        """Return a database of some cells: a slice or mask of the rows, or rows in their order."""
+        by_row = isinstance(cells, np.ndarray) and cells.dtype.kind == "i"
+        rows = cells if by_row else np.arange(len(self))[cells]
+        lengths = self.lengths[rows]
+        entries = consecutive(self.offsets[rows], lengths)
         return replace(
             self,
             offsets=np.append(0, np.cumsum(lengths)),
-            **{name: getattr(self, name)[kept] for name in CELL_ARRAYS},
+            **{name: getattr(self, name)[rows] for name in CELL_ARRAYS},
             **{name: getattr(self, name)[entries] for name in ENTRY_ARRAYS},
         )
 
     def types(self, cell: int) -> str:
-        """Return the type sequence of the cell in a row, one symbol an object."""
+        """Return the type sequence of a cell, by its row: one symbol per object."""
         return self.taxonomy.decode(self.codes[self.offsets[cell] : self.offsets[cell + 1]])
 
     def to_geodataframe(self, *, geometry: CellGeometry = "polygon") -> gpd.GeoDataFrame:
         """Return the cells as a table in the CRS of the database, squares or points.
 
-        ``cell_id``, ``x`` and ``y`` (viewpoint), ``length`` (objects), ``types`` (symbols),
-        ``bearings``, ``levels`` and ``distances`` (as text, a number an object), and
-        ``type_group_size`` and ``angle_group_size`` (cells that look the same), as
-        `export_database` writes them.
+        The columns are those that `export_database` writes: ``cell_id``, ``x`` and ``y``
+        (viewpoint), ``length`` (objects), ``types`` (symbols), ``bearings``, ``levels`` and
+        ``distances`` (text, one number per object), and ``type_group_size`` and
+        ``angle_group_size`` (number of cells with the same sequence).
         """
-        from semsig_gis.database.table import CellTable  # noqa: PLC0415 - it loads slowly
-
         return CellTable(self, geometry=geometry).frame()
 
     def plot(
@@ -257,21 +275,20 @@ class SignatureDatabase(Displayed):
         column: str | ArrayLike | None = None,
         *,
         ax: Axes | None = None,
-        **look: Any,  # noqa: ANN401 - whatever matplotlib takes
+        **look: Any,  # noqa: ANN401 - options of matplotlib
     ) -> Axes:
-        """Draw the objects that every cell sees, or another number (see `plot_database`)."""
-        return semsig_gis.plot_database(self, column, ax=ax, **look)
+        """Draw the number of visible objects of every cell, or another (see `plot_database`)."""
+        return plot_with("plot_database", self, column, ax=ax, **look)
 
     def explore(self) -> MapFrame:
-        """Show the cells on a map in a notebook, by how many look the same."""
-        return semsig_gis.show_map(semsig_gis.ambiguity_map(self))
+        """Show the cells on a map in a notebook, by the number of cells with equal signatures."""
+        return map_with("ambiguity_map", self)
 
 
 def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
-    """Join databases of different cells that were made in the same way; DatabaseError otherwise.
+    """Join databases of different cells, built in the same way; DatabaseError otherwise.
 
-    The cells are ordered by column and row, and licences and notes that stand in several parts
-    appear once.
+    The cells are ordered by column and row. Licences and notes of several parts appear once.
     """
     if not parts:
         raise DatabaseError("there is no database to join; give at least one.")
@@ -301,11 +318,11 @@ def join_databases(parts: Sequence[SignatureDatabase]) -> SignatureDatabase:
 def require_same(
     first: SignatureDatabase, other: SignatureDatabase, *, classes: bool = True
 ) -> None:
-    """Raise DatabaseError where two databases were not made in the same way.
+    """Raise DatabaseError if two databases were built with different settings.
 
-    Without `classes`, these may differ.
+    Their classes may differ if `classes` is False.
     """
-    for name, title in MADE.items():
+    for name, title in SETTINGS.items():
         ours, theirs = getattr(first, name), getattr(other, name)
         if ours != theirs and (classes or name != "taxonomy"):
             raise DatabaseError(
@@ -315,10 +332,10 @@ def require_same(
 
 
 def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], what: str) -> None:
-    """Raise InputError if all places, in the CRS of the database, lie elsewhere than the cells.
+    """Raise InputError if all places, in the CRS of the database, are far from its cells.
 
-    Elsewhere is outside of the box of the cells widened by the longest visibility range; an empty
-    array of places is accepted. `what` names the places in the message.
+    Far means outside the box of the cells, widened by the longest visibility range. An empty array
+    of places is accepted. `what` is the name of the places in the message.
     """
     low = database.xy.min(axis=0) - database.reach
     high = database.xy.max(axis=0) + database.reach
@@ -331,9 +348,10 @@ def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], wha
 def rows_of_result(
     database: SignatureDatabase, ids: ArrayLike, types: Iterable[str], *, what: str
 ) -> NDArray[np.int64]:
-    """Return the rows of the cells that a result names, and refuse one of another database.
+    """Return the rows of the cells of a result; InputError if it is from another database.
 
-    It has other cell ids or types seen from a cell. `what` names the kind of result.
+    Such a result has other cell ids, or other types for a cell. `what` is the kind of result in the
+    message.
     """
     cells = np.asarray(ids, np.int64)
     rows = np.searchsorted(database.cell_ids, cells)
@@ -352,167 +370,92 @@ def rows_of_result(
 
 def _brief(value: object) -> str:
     text = value.to_string() if isinstance(value, CRS) else str(value)
-    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
+    return text if len(text) <= LONGEST_SETTING else f"{text[: LONGEST_SETTING - 3]}..."
 
 
-@dataclass(frozen=True, eq=False)
-class SequenceTable:
-    """The distinct sequences of a list of n sequences, short ones first; made by `from_csr`.
+def visible_objects_in(database: SignatureDatabase, cells: NDArray[np.int64]) -> VisibleObjects:
+    """Return the visible objects of some cells, by row; a cell may be repeated.
 
-    Sequences of one length stand in order of first appearance. Of the d distinct sequences, number
-    ``i`` is ``values[offsets[i]:offsets[i + 1]]``, which may be empty. `inverse`, shape (n,), tells
-    which one each row of the list holds; `counts`, shape (d,), how many rows hold each one (the
-    sizes of the signature groups). All arrays are read-only.
-    """
-
-    values: NDArray[np.uint8]
-    offsets: NDArray[np.int64]
-    inverse: NDArray[np.int64]
-    counts: NDArray[np.int64]
-
-    @classmethod
-    def from_csr(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> SequenceTable:
-        """Find the distinct sequences of a list given as flat values and offsets.
-
-        Row ``i`` is ``values[offsets[i]:offsets[i + 1]]``; the arrays are copied. Raise InputError
-        if the values are not bytes, or the offsets do not divide them.
-        """
-        flat = np.ascontiguousarray(checked_sequence(values))
-        ends = np.ascontiguousarray(offsets, dtype=np.int64)
-        whole = ends.ndim == 1 and len(ends) > 0 and ends[0] == 0 and ends[-1] == len(flat)
-        # Arrow trusts the offsets: decreasing ones would read outside the values.
-        if not whole or bool((np.diff(ends) < 0).any()):
-            raise InputError(
-                f"the offsets of the sequences do not divide their {len(flat)} values; give one "
-                "offset more than there are sequences, from 0 up to the number of values, none "
-                "smaller than the one before."
-            )
-        rows = pa.LargeBinaryArray.from_buffers(
-            pa.large_binary(), len(ends) - 1, [None, pa.py_buffer(ends), pa.py_buffer(flat)]
-        )
-        encoded = rows.dictionary_encode()
-        distinct = len(encoded.dictionary)
-        import pyarrow.compute as pc  # noqa: PLC0415 - it loads slowly
-
-        lengths = whole_numbers(pc.binary_length(encoded.dictionary))
-        order = np.argsort(lengths, kind="stable")
-        rank = np.empty(distinct, np.int64)
-        rank[order] = np.arange(distinct)
-        distinct_offsets = np.append(0, np.cumsum(lengths[order]))
-        # An Arrow array without values may come without buffers.
-        # As `pa.array` loads pandas.
-        taken = pa.Array.from_buffers(pa.int64(), distinct, [None, pa.py_buffer(order)])
-        buffer = encoded.dictionary.take(taken).buffers()[2] or b""
-        distinct_values = np.frombuffer(buffer, np.uint8)[: distinct_offsets[-1]].copy()
-        # int64: NumPy gathers with a native index without converting it at every query.
-        inverse = rank[whole_numbers(encoded.indices)]
-        counts = np.bincount(inverse, minlength=distinct).astype(np.int64, copy=False)
-        return cls(*map(frozen, (distinct_values, distinct_offsets, inverse, counts)))
-
-    def __len__(self) -> int:
-        """Return the number of distinct sequences."""
-        return len(self.counts)
-
-    def __getitem__(self, index: int) -> NDArray[np.uint8]:
-        """Return one distinct sequence."""
-        return self.values[self.offsets[index] : self.offsets[index + 1]]
-
-    @cached_property
-    def lengths(self) -> NDArray[np.int64]:
-        """Length of each distinct sequence, shape (d,)."""
-        return frozen(np.diff(self.offsets))
-
-    @cached_property
-    def strings(self) -> list[str]:
-        """Each distinct sequence as text, one character of that code point a value."""
-        text = self.values.tobytes().decode("latin-1")
-        bounds = self.offsets.tolist()
-        return [text[low:high] for low, high in pairwise(bounds)]
-
-    @cached_property
-    def histogram(self) -> NDArray[np.uint16 | np.uint32]:
-        """How often each value occurs in each distinct sequence, shape (d, largest value + 1).
-
-        A column is contiguous in memory, because the measures read it value by value.
-        """
-        size = int(self.values.max()) + 1 if len(self.values) else 0
-        longest = int(self.lengths.max()) if len(self) else 0
-        kind = np.uint16 if longest <= np.iinfo(np.uint16).max else np.uint32
-        counts: NDArray[np.uint16 | np.uint32] = np.zeros((len(self), size), kind, order="F")
-        step = max(1, HISTOGRAM_BLOCK // max(1, size))
-        for low in range(0, len(self), step):
-            high = min(low + step, len(self))
-            rows = np.repeat(np.arange(high - low), self.lengths[low:high])
-            values = self.values[self.offsets[low] : self.offsets[high]]
-            bins = np.bincount(rows * size + values, minlength=(high - low) * size)
-            counts[low:high] = bins.reshape(high - low, size)
-        return frozen(counts)
-
-    @cached_property
-    def value_sets(self) -> NDArray[np.uint64]:
-        """The set of values of each distinct sequence as bits, shape (d, ceil(k / 64))."""
-        present = self.histogram > 0
-        words = -(-present.shape[1] // WORD_BITS)
-        sets = np.zeros((len(self), words), np.uint64)
-        for value in range(present.shape[1]):
-            word, bit = divmod(value, WORD_BITS)
-            sets[:, word] |= present[:, value].astype(np.uint64) << np.uint64(bit)
-        return frozen(sets)
-
-    @cached_property
-    def value_set_sizes(self) -> NDArray[np.int16]:
-        """How many different values each distinct sequence has, shape (d,)."""
-        return frozen(np.bitwise_count(self.value_sets).sum(axis=1, dtype=np.int16))
-
-    def overlap(
-        self, query: NDArray[np.uint8], *, only: NDArray[np.int64] | None = None
-    ) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Count the different values that a query and each distinct sequence share, in any order.
-
-        Return how many are in both and how many in at least one of them, for the distinct sequences
-        `only`, or for all.
-        """
-        sets = self.value_sets if only is None else self.value_sets[only]
-        values = np.unique(query)
-        words = [0] * sets.shape[1]
-        for value in values.tolist():
-            word, bit = divmod(value, WORD_BITS)
-            if word < len(words):  # a value past the last word is in no sequence of the table
-                words[word] |= 1 << bit
-        both = np.zeros(len(sets), np.int16)
-        for word, bits in enumerate(words):
-            both += np.bitwise_count(sets[:, word] & np.uint64(bits))
-        sizes = self.value_set_sizes if only is None else self.value_set_sizes[only]
-        return both, sizes + np.int16(len(values)) - both
-
-
-def checked_sequence(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a sequence as it is, or raise InputError if it is not a flat uint8 array."""
-    array = np.asarray(values)
-    if array.dtype != np.uint8 or array.ndim != 1:
-        raise InputError(
-            f"a sequence contains {array.dtype} values in {array.ndim} dimensions; give its "
-            "class codes or angle levels (0 to 255) as a one-dimensional uint8 array."
-        )
-    return array
-
-
-def frozen(array: _Array) -> _Array:
-    """Return the array, made read-only."""
-    array.setflags(write=False)
-    return array
-
-
-def views_in(database: SignatureDatabase, cells: NDArray[np.int64]) -> Views:
-    """Return what a database says is seen from some of its cells; one may stand there twice.
-
-    Bearings are in the middle of their units, and the rows of the objects are not known.
+    Bearings are in the middle of their units. The rows of the objects are unknown.
     """
     part = database.select(cells)
-    return Views(
+    return VisibleObjects(
         offsets=part.offsets,
         objects=np.full(len(part.codes), -1),
         codes=part.codes,
         bearings=part.bearings + 180.0 / BEARING_UNITS,
         distances=part.distances,
     )
+
+
+class CellTable:
+    """The cells of a database as a table for people, made block by block."""
+
+    def __init__(self, database: SignatureDatabase, *, geometry: CellGeometry = "polygon") -> None:
+        if geometry not in get_args(CellGeometry):
+            names = " or ".join(repr(name) for name in get_args(CellGeometry))
+            hint = nearest_name(str(geometry), get_args(CellGeometry))
+            raise UnknownNameError(f"{geometry!r} is not a way to draw a cell; give {names}{hint}.")
+        self._database, self._geometry = database, geometry
+        self._symbols = pa.array([chr(symbol) for symbol in database.taxonomy.symbol_bytes])
+        degrees = (unit * 360 / BEARING_UNITS for unit in range(BEARING_UNITS))
+        self._degrees = pa.array([f"{bearing:.2f}" for bearing in degrees])
+        self._levels = pa.array([str(level) for level in range(1 << 8)])
+        distances = database.reach * np.arange(DISTANCE_UNITS + 1) / DISTANCE_UNITS
+        decimals = max(2, math.ceil(-math.log10(distances[1])))  # so that they differ
+        self._metres = pa.array([f"{distance:.{decimals}f}" for distance in distances.tolist()])
+        self._groups = {
+            "type_group_size": database.type_group_sizes,
+            "angle_group_size": database.angle_group_sizes,
+        }
+
+    def columns(self, rows: slice) -> dict[str, Any]:
+        """Return the columns of some rows by name, as NumPy or Arrow arrays."""
+        database = self._database
+        places = database.xy[rows]
+        offsets = database.offsets[rows.start : rows.stop + 1]
+        return {
+            "cell_id": database.cell_ids[rows],
+            "x": np.ascontiguousarray(places[:, 0]),
+            "y": np.ascontiguousarray(places[:, 1]),
+            "length": database.lengths[rows].astype(np.int32),
+            "types": _joined(database.codes, offsets, texts=self._symbols, separator=""),
+            "bearings": _joined(database.bearing_units, offsets, texts=self._degrees),
+            "levels": _joined(database.levels, offsets, texts=self._levels),
+            "distances": _joined(database.distance_units, offsets, texts=self._metres),
+            **{name: sizes[rows] for name, sizes in self._groups.items()},
+        }
+
+    def shapes(self, rows: slice) -> NDArray[np.object_]:
+        """Return the viewpoints or the squares of some rows; neighbours have identical corners."""
+        database = self._database
+        if self._geometry == "point":
+            return np.asarray(shapely.points(database.xy[rows]))
+        step, (west, south) = database.grid.step, database.grid.origin
+        columns, lines = database.columns[rows], database.rows[rows]
+        left, right = west + columns * step, west + (columns + 1) * step
+        bottom, top = south + lines * step, south + (lines + 1) * step
+        return np.asarray(shapely.box(left, bottom, right, top))
+
+    def frame(self) -> gpd.GeoDataFrame:
+        """Return all cells as a GeoDataFrame, with the licences in ``attrs``."""
+        database, size = self._database, len(self._database)
+        starts = range(0, max(size, 1), CELLS_PER_TABLE)
+        blocks = [slice(start, min(start + CELLS_PER_TABLE, size)) for start in starts]
+        table = pa.concat_tables([pa.table(self.columns(rows)) for rows in blocks])
+        shapes = np.concatenate([self.shapes(rows) for rows in blocks])
+        frame = gpd.GeoDataFrame(table.to_pandas(), geometry=shapes, crs=database.crs)
+        frame.attrs[LICENSES] = list(database.licenses)
+        return frame
+
+
+def _joined(
+    values: NDArray[Any], offsets: NDArray[np.int64], *, texts: pa.Array, separator: str = " "
+) -> pa.Array:
+    """Return the values of each cell as one text; `texts` has the text of every possible value."""
+    import pyarrow.compute as pc  # noqa: PLC0415 - it takes 120 ms to load
+
+    entries = pa.array(values[offsets[0] : offsets[-1]])
+    starts = pa.array((offsets - offsets[0]).astype(np.int32))
+    lists = pa.ListArray.from_arrays(starts, texts.take(entries))
+    return pc.binary_join(lists, separator)

@@ -13,23 +13,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, SemsigError
-from semsig_gis.core.geometry import NOTES, GridSpec, split_ids
-from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.core.temporary import remove_abandoned
+from semsig_gis.core import (
+    BEARING_UNITS,
+    NOTES,
+    DatabaseError,
+    Displayed,
+    GridSpec,
+    SemsigError,
+    SignatureSpec,
+    Taxonomy,
+    remove_abandoned,
+    split_ids,
+)
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
-from semsig_gis.database.sightings import ViewpointSpec
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.storage import (
     geo_metadata,
+    parse_json,
     points_to_wkb,
     read_geoparquet,
+    read_whole,
     whole_numbers,
     write_geoparquet,
+    write_whole,
 )
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -451,6 +458,12 @@ class PartitionedDatabase(Displayed):
     def crs(self) -> CRS:
         """The metric coordinate reference system of the parts."""
         return next(self.parts()).crs
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Box of the viewpoints of all parts in metres: west, south, east and north."""
+        boxes = np.stack([part.bounds for part in self.parts() if len(part)])
+        return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
     def row_numbers(self, cell_ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows that cells have in the database that `open_database` returns."""

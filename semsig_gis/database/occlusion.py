@@ -1,4 +1,4 @@
-"""What buildings hide: sight lines against footprints."""
+"""Occlusion: objects that buildings hide, by sight lines against footprints."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ import functools
 import math
 from typing import TYPE_CHECKING
 
+import lazy_loader
 import numpy as np
-import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import Displayed, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import shapely
     from numpy.typing import ArrayLike, NDArray
+else:
+    shapely = lazy_loader.load("shapely")
 
 TOLERANCE_M = 0.5
-# Houses nearer to each other than twice this share a wall.
-GAP_M = 0.05
-# More than the tolerance, and than what counts as a gap between buildings.
-TOUCHING_M = 1.0
-PAIRS_A_BLOCK = 1 << 17
-POLYGONAL = 2  # dimensions
+GAP_M = 0.05  # buildings nearer to each other than twice this are joined
+TOUCHING_M = 1.0  # more than the tolerance, and than a gap between joined buildings
+PAIRS_PER_BLOCK = 1 << 17
+POLYGON_DIMENSIONS = 2
 
 
 class Footprints(Displayed):
-    """The footprints of the buildings of a city, ready to be looked at many times.
+    """The footprints of the buildings of a city, prepared for many sight lines.
 
     Parameters
     ----------
     polygons : array_like of shapely.Polygon or shapely.MultiPolygon
-        Footprints in a metric CRS; the parts of a multipolygon count as several. Missing and
-        empty ones are left out, invalid ones repaired.
+        Footprints in a metric CRS; each part of a multipolygon counts. Missing and empty ones
+        are left out, invalid ones repaired.
     tolerance : float, default 0.5
-        How deep inside the buildings, in metres, a sight line may run without being blocked.
+        Depth in metres to which a sight line may enter buildings without being blocked.
 
     Attributes
     ----------
     repaired : int
-        How many footprints were invalid and have been repaired.
+        Number of invalid footprints that were repaired.
 
     Raises
     ------
@@ -81,28 +81,28 @@ class Footprints(Displayed):
 
     @functools.cached_property
     def interiors(self) -> NDArray[np.object_]:
-        """What is deeper inside the buildings than the tolerance, block by block of houses.
+        """Parts of the buildings that are deeper inside than the tolerance, one row per polygon.
 
-        The depth is from their common outline, so that there is no gap to look through where two of
-        them share a wall, or are less than ten centimetres apart.
+        The depth is measured from the common outline of joined buildings, so that there is no gap
+        to look through where two share a wall, or are less than ten centimetres apart.
         """
         first, second = self._tree.query(self._widened, predicate="intersects")
-        block = _joined(first, second, len(self._widened))
+        block = _component_labels(first, second, len(self._widened))
         order = np.argsort(block, kind="stable")
         _, number = np.unique(block[order], return_inverse=True)
-        # Houses of one block at a time, which takes a sixth of the time of all at once.
+        # The union of each block of houses takes a sixth of the time of one union of all.
         blocks = np.asarray(shapely.multipolygons(self._widened[order], indices=number))
         outlines = shapely.union_all(blocks[:, None], axis=1)
         return _polygons_of(np.asarray(shapely.buffer(outlines, -GAP_M - self.tolerance)))
 
     @functools.cached_property
     def _widened(self) -> NDArray[np.object_]:
-        # Neighbours that were drawn hair's breadths apart would be two walls, or confuse GEOS.
+        # Neighbours with a tiny gap would have two walls, or cause errors in GEOS.
         widened: NDArray[np.object_] = shapely.buffer(self._polygons, GAP_M, join_style="mitre")
         return widened
 
     def cores(self, interior: int) -> NDArray[np.object_]:
-        """Return what each footprint has of the interior with a number in `interiors`, in parts."""
+        """Return the parts of a row of `interiors` that belong to single footprints."""
         if interior not in self._cores:
             whole = self.interiors[interior]
             own = self._tree.query(whole, predicate="intersects")
@@ -114,12 +114,12 @@ class Footprints(Displayed):
         return shapely.STRtree(self._widened)
 
     def cover(self, xy: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which places, shape (n, 2) in metres, are in a footprint or on its outline."""
+        """Return a mask of the places, shape (n, 2) in metres, in a footprint or on its outline."""
         places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
         covered = np.zeros(len(places), bool)
         shapely.prepare(self._polygons)
-        for start in range(0, len(places), PAIRS_A_BLOCK):
-            points = np.asarray(shapely.points(places[start : start + PAIRS_A_BLOCK]))
+        for start in range(0, len(places), PAIRS_PER_BLOCK):
+            points = np.asarray(shapely.points(places[start : start + PAIRS_PER_BLOCK]))
             inside = shapely.STRtree(points).query(self._polygons, predicate="intersects")[1]
             covered[start + inside] = True
         return covered
@@ -128,34 +128,35 @@ class Footprints(Displayed):
 def hidden(
     viewpoints: NDArray[np.float64], objects: NDArray[np.float64], *, footprints: Footprints
 ) -> NDArray[np.bool_]:
-    """Tell which objects a building hides from the viewpoint they are looked at from.
+    """Return a mask of the objects that a building hides from their viewpoint.
 
-    Row by row, `viewpoints` and `objects` are the two ends of a sight line, shape (p, 2) in metres
-    in the CRS of the footprints. An object is hidden when the line comes deeper into the buildings
-    than the tolerance; a footprint that has the viewpoint in it deeper than that (an arcade, a
-    passage, a roof on posts) does not hide.
+    Each row of `viewpoints` and `objects` is the two ends of a sight line, shape (p, 2) in metres
+    in the CRS of the footprints. An object is hidden if the line enters the buildings deeper than
+    the tolerance. A footprint that contains the viewpoint deeper than that (an arcade, a passage, a
+    roof on posts) hides nothing.
     """
     starts = np.asarray(viewpoints, dtype=np.float64).reshape(-1, 2)
     ends = np.asarray(objects, dtype=np.float64).reshape(-1, 2)
     blocked = np.zeros(len(starts), bool)
     west, south, east, north = shapely.bounds(footprints.interiors).reshape(-1, 4).T
-    for first in range(0, len(starts), PAIRS_A_BLOCK):  # so that memory stays flat
-        part = slice(first, first + PAIRS_A_BLOCK)
+    for first in range(0, len(starts), PAIRS_PER_BLOCK):  # to bound the memory
+        part = slice(first, first + PAIRS_PER_BLOCK)
         low = np.minimum(starts[part], ends[part]).min(axis=0)
         high = np.maximum(starts[part], ends[part]).max(axis=0)
-        # Only the part of a large city that these pairs are in.
+        # Interiors in the box of these sight lines.
         here = np.flatnonzero(
             (east >= low[0]) & (west <= high[0]) & (north >= low[1]) & (south <= high[1])
         )
         interiors = footprints.interiors[here]
-        pair = first + _near(starts[part], ends[part], interiors)
+        pair = first + _pairs_near(starts[part], ends[part], interiors)
         lines = np.asarray(shapely.linestrings(np.stack([starts[pair], ends[pair]], axis=1)))
-        # The lines make the tree, so that it is the interiors that are prepared.
+        # Interiors that a line meets hide its object, unless they contain the viewpoint. The lines
+        # are in the tree, so that shapely prepares the interiors.
         hit, line = shapely.STRtree(lines).query(interiors, predicate="intersects")
         x, y = starts[pair[line]].T
         within = shapely.intersects_xy(interiors[hit], x, y)
         blocked[pair[line[~within]]] = True
-        # From within a block of houses, the house around does not hide, and the others do.
+        # From inside a block of houses, the house around the viewpoint does not hide; others do.
         inside = np.unique(line[within])
         if len(inside):
             cores = np.concatenate([footprints.cores(row) for row in here[np.unique(hit[within])]])
@@ -166,11 +167,13 @@ def hidden(
     return blocked
 
 
-def _near(
+def _pairs_near(
     starts: NDArray[np.float64], ends: NDArray[np.float64], interiors: NDArray[np.object_]
 ) -> NDArray[np.int64]:
-    """Return the pairs whose viewpoint may have an interior within reach; only they get lines."""
-    # The pairs of one viewpoint follow each other.
+    """Return the pairs with an interior within the longest distance of their viewpoint.
+
+    Only these need a line. The pairs of one viewpoint follow each other, and it is tested once.
+    """
     first = np.ones(len(starts), bool)
     first[1:] = (starts[1:] != starts[:-1]).any(axis=1)
     reach = np.hypot(*(ends - starts).T).max()
@@ -181,9 +184,9 @@ def _near(
     return np.flatnonzero(near[np.cumsum(first) - 1])
 
 
-def _usable(given: NDArray[np.object_]) -> tuple[NDArray[np.object_], int]:
-    """Return the polygons of a city in valid form, and how many had to be repaired."""
-    polygons = given[~(shapely.is_missing(given) | shapely.is_empty(given))]
+def _usable(shapes: NDArray[np.object_]) -> tuple[NDArray[np.object_], int]:
+    """Return valid polygons with an area, and the number of repaired ones."""
+    polygons = shapes[~(shapely.is_missing(shapes) | shapely.is_empty(shapes))]
     wrong = np.flatnonzero(
         ~np.isin(
             shapely.get_type_id(polygons),
@@ -204,26 +207,28 @@ def _usable(given: NDArray[np.object_]) -> tuple[NDArray[np.object_], int]:
         )
     invalid = ~shapely.is_valid(polygons)
     polygons[invalid] = shapely.make_valid(polygons[invalid])
-    # A repaired polygon may be a collection of polygons and lines, even one within another.
+    # A repaired polygon may be a collection of polygons and lines, even a nested one.
     parts = shapely.get_parts(shapely.get_parts(polygons))
     return parts[shapely.area(parts) > 0], int(invalid.sum())
 
 
 def _polygons_of(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Return the polygons that shapes consist of; what has no area is left out."""
+    """Return the polygons in shapes, prepared; points and lines are left out."""
     parts = shapely.get_parts(shapely.get_parts(shapes))
-    found: NDArray[np.object_] = parts[shapely.get_dimensions(parts) == POLYGONAL]
-    shapely.prepare(found)
-    return found
+    polygons: NDArray[np.object_] = parts[shapely.get_dimensions(parts) == POLYGON_DIMENSIONS]
+    shapely.prepare(polygons)
+    return polygons
 
 
-def _joined(first: NDArray[np.int64], second: NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    """Return a label for each of so many things, the same for those that pairs join in a chain."""
+def _component_labels(
+    first: NDArray[np.int64], second: NDArray[np.int64], size: int
+) -> NDArray[np.int64]:
+    """Return a label for each node of a graph, equal in each connected component (union-find)."""
     label = np.arange(size)
     while True:
         before = label.copy()
         least = np.minimum(label[first], label[second])
-        # Both ends, and what they are joined to so far, take the lower label.
+        # Both ends of an edge, and the roots of their labels, take the lower label.
         np.minimum.at(label, before[first], least)
         np.minimum.at(label, before[second], least)
         label = label[label]
@@ -234,15 +239,15 @@ def _joined(first: NDArray[np.int64], second: NDArray[np.int64], size: int) -> N
 def buildings_near(
     polygons: NDArray[np.object_], places: NDArray[np.float64], *, distance: float
 ) -> NDArray[np.int64]:
-    """Return the rows of the buildings around some places, ascending; `distance` is in metres.
+    """Return the rows of the buildings within `distance` metres of some places, ascending.
 
-    All that they are joined to are among them: occlusion treats a block of houses as one shape.
+    Buildings joined to them are included: occlusion treats a block of houses as one shape.
     """
     tree = shapely.STRtree(polygons)
-    chosen = np.zeros(len(polygons), bool)
-    found = tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
-    while len(found):
-        chosen[found] = True
-        touching = tree.query(polygons[found], predicate="dwithin", distance=TOUCHING_M)[1]
-        found = np.unique(touching[~chosen[touching]])
-    return np.flatnonzero(chosen)
+    mask = np.zeros(len(polygons), bool)
+    rows = tree.query(shapely.points(places), predicate="dwithin", distance=distance)[1]
+    while len(rows):
+        mask[rows] = True
+        touching = tree.query(polygons[rows], predicate="dwithin", distance=TOUCHING_M)[1]
+        rows = np.unique(touching[~mask[touching]])
+    return np.flatnonzero(mask)

@@ -1,33 +1,30 @@
-"""Where views may be taken from, and what is seen there: objects in range that nothing hides."""
+"""Sightings: the objects in range of a viewpoint that no building hides."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core import FULL_TURN
+from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
-    import shapely
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 BEARING_DECIMALS = 9
-# Of a bearing in a number that is sorted: finer than its nine decimals.
-TURN_BITS = 40
+BEARING_BITS = 40  # of a bearing in a sort key: finer than its nine decimals
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Sightings:
-    """Pairs of a viewpoint and an object that is seen from it, both as row numbers.
+class SightingPairs:
+    """Pairs of a viewpoint and a visible object, both as row numbers.
 
     `bearing` is in degrees clockwise from grid north, [0, 360), to nine decimals, `distance` in
     metres.
@@ -38,25 +35,25 @@ class Sightings:
     bearing: NDArray[np.float64]
     distance: NDArray[np.float64]
 
-    def only(self, kept: NDArray[np.bool_] | NDArray[np.int64]) -> Sightings:
-        """Return some of the pairs, by mask or number, or all of them in another order."""
-        return Sightings(
-            self.viewpoint[kept], self.object[kept], self.bearing[kept], self.distance[kept]
+    def take(self, pairs: NDArray[np.bool_] | NDArray[np.int64]) -> SightingPairs:
+        """Return some of the pairs, by mask or by number in any order."""
+        return SightingPairs(
+            self.viewpoint[pairs], self.object[pairs], self.bearing[pairs], self.distance[pairs]
         )
 
 
 def bearings(dx: ArrayLike, dy: ArrayLike) -> NDArray[np.float64]:
-    """Return degrees clockwise from grid north, in [0, 360), of displacements to east and north.
+    """Return the bearings of displacements to east and north, in degrees in [0, 360).
 
     A displacement of zero has bearing 0.
     """
-    turned = np.degrees(np.arctan2(np.asarray(dx), np.asarray(dy)))
-    # What `wrap_degrees` gives for half a turn to each side, without its costly remainder.
-    wrapped = np.where(turned < 0.0, turned + FULL_TURN, np.abs(turned))
+    degrees = np.degrees(np.arctan2(np.asarray(dx), np.asarray(dy)))
+    # Equal to `wrap_degrees` in [-180, 180], but without its slow remainder.
+    wrapped = np.where(degrees < 0.0, degrees + FULL_TURN, np.abs(degrees))
     return np.where(wrapped >= FULL_TURN, 0.0, wrapped)
 
 
-def sightings(
+def measure_sightings(
     viewpoint: NDArray[np.int64],
     item: NDArray[np.int64],
     viewpoints: NDArray[np.float64],
@@ -64,64 +61,63 @@ def sightings(
     *,
     ranges: NDArray[np.float64],
     footprints: Footprints | None = None,
-) -> Sightings:
-    """Measure pairs, and keep those within range that no building hides.
+) -> SightingPairs:
+    """Return the pairs that are within range and not hidden by a building, with measures.
 
-    A pair is a row of `viewpoints` and a row of `objects`, positions in metres; `ranges` holds from
-    how far each object is seen.
+    A pair is a row of `viewpoints` and a row of `objects`, positions in metres; `ranges` is the
+    visibility range of each object in metres.
     """
     dx = objects[:, 0][item] - viewpoints[:, 0][viewpoint]
     dy = objects[:, 1][item] - viewpoints[:, 1][viewpoint]
     distance = np.hypot(dx, dy)
     near = distance <= ranges[item]
-    # Processors differ in the last digits of an arctangent: they must not decide about ties.
+    # Processors differ in the last digits of an arctangent, which must not decide ties.
     bearing = np.round(bearings(dx[near], dy[near]), BEARING_DECIMALS)
     bearing[bearing >= FULL_TURN] = 0.0
-    seen = Sightings(viewpoint[near], item[near], bearing, distance[near])
+    pairs = SightingPairs(viewpoint[near], item[near], bearing, distance[near])
     if footprints is None:
-        return seen
-    from semsig_gis.database.occlusion import hidden  # noqa: PLC0415 - it loads slowly
-
-    seen = seen.only(np.argsort(seen.viewpoint, kind="stable"))  # as `hidden` is fastest
-    return seen.only(
-        ~hidden(viewpoints[seen.viewpoint], objects[seen.object], footprints=footprints)
+        return pairs
+    # `hidden` is fastest if the pairs of a viewpoint follow each other.
+    pairs = pairs.take(np.argsort(pairs.viewpoint, kind="stable"))
+    return pairs.take(
+        ~hidden(viewpoints[pairs.viewpoint], objects[pairs.object], footprints=footprints)
     )
 
 
-def clockwise_order(seen: Sightings, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
+def clockwise_order(pairs: SightingPairs, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Return the order of sightings by viewpoint, then bearing, distance and class code.
 
-    `codes` holds the class of every object, not sighting.
+    `codes` is the class of every object (not of every sighting).
     """
-    viewpoint, bearing = seen.viewpoint, seen.bearing
-    # One number for each pair, the viewpoint in front and the pair itself behind; plain numbers
-    # are sorted many times faster than pairs by two keys.
+    viewpoint, bearing = pairs.viewpoint, pairs.bearing
+    # One integer key per pair: viewpoint, bearing, number of the pair. Integers are sorted many
+    # times faster than pairs by two keys.
     viewpoint_bits = int(viewpoint.max(initial=0)).bit_length()
     pair_bits = len(viewpoint).bit_length()
-    turn_bits = min(64 - viewpoint_bits - pair_bits, TURN_BITS)
-    numbers = viewpoint.astype(np.uint64) << np.uint64(turn_bits)
-    numbers |= (bearing * (2.0**turn_bits / FULL_TURN)).astype(np.uint64)
-    numbers <<= np.uint64(pair_bits)
-    numbers |= np.arange(len(numbers), dtype=np.uint64)
-    numbers.sort()
-    order = (numbers & np.uint64((1 << pair_bits) - 1)).astype(np.int64)
-    # Objects in nearly one direction are rare, so that all keys are looked at for them alone.
-    numbers >>= np.uint64(pair_bits)
-    same = np.flatnonzero(numbers[1:] == numbers[:-1])
-    level = np.zeros(len(order), np.bool_)
-    level[same] = level[same + 1] = True
-    tied = order[level]
-    keys = (codes[seen.object[tied]], seen.distance[tied], bearing[tied], viewpoint[tied])
-    order[level] = tied[np.lexsort(keys)]
+    bearing_bits = min(64 - viewpoint_bits - pair_bits, BEARING_BITS)
+    keys = viewpoint.astype(np.uint64) << np.uint64(bearing_bits)
+    keys |= (bearing * (2.0**bearing_bits / FULL_TURN)).astype(np.uint64)
+    keys <<= np.uint64(pair_bits)
+    keys |= np.arange(len(keys), dtype=np.uint64)
+    keys.sort()
+    order = (keys & np.uint64((1 << pair_bits) - 1)).astype(np.int64)
+    # Objects in nearly the same direction are rare; only they are sorted by all criteria.
+    keys >>= np.uint64(pair_bits)
+    same = np.flatnonzero(keys[1:] == keys[:-1])
+    tie = np.zeros(len(order), np.bool_)
+    tie[same] = tie[same + 1] = True
+    tied = order[tie]
+    criteria = (codes[pairs.object[tied]], pairs.distance[tied], bearing[tied], viewpoint[tied])
+    order[tie] = tied[np.lexsort(criteria)]
     return order
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Views:
-    """What is seen from v places, each clockwise from north.
+class VisibleObjects:
+    """Objects visible from v places, clockwise from north for each place.
 
     The entries of place ``i`` are ``offsets[i]`` to ``offsets[i + 1]``. `objects` are rows in the
-    table of objects, -1 where not known; `codes` their classes; `bearings` are in degrees clockwise
+    table of objects, -1 if unknown; `codes` are their classes; `bearings` are in degrees clockwise
     from grid north, `distances` in metres.
     """
 
@@ -136,99 +132,35 @@ class Views:
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """How many objects are seen from each place, shape (v,)."""
+        """Number of objects visible from each place, shape (v,)."""
         return np.diff(self.offsets)
 
 
-def views_at(
+def visible_objects_at(
     objects: StreetObjects,
     places: NDArray[np.float64],
     *,
     index: ObjectIndex,
     radius: float,
     footprints: Footprints | None = None,
-) -> Views:
-    """Return what is seen from places anywhere, in metres in the CRS of the objects, not rounded.
+) -> VisibleObjects:
+    """Return the objects visible from any places, in metres in the CRS of the objects, unrounded.
 
     `index` is an R-tree over ``objects.xy``; `radius` is the visibility range in metres of classes
-    that have none of their own; what `footprints` hide is not seen.
+    without a range of their own. Objects that `footprints` hide are left out.
     """
     codes, xy = objects.codes, objects.xy
     ranges = objects.taxonomy.ranges(radius)[codes]
     places = np.ascontiguousarray(places, dtype=np.float64)
-    pairs = index.pairs_within(places, radius=float(ranges.max()))
-    seen = sightings(*pairs, places, xy, ranges=ranges, footprints=footprints)
-    order = clockwise_order(seen, codes)
-    lengths = np.bincount(seen.viewpoint, minlength=len(places))
-    rows = seen.object[order]
-    return Views(
+    candidates = index.pairs_within(places, radius=float(ranges.max()))
+    pairs = measure_sightings(*candidates, places, xy, ranges=ranges, footprints=footprints)
+    order = clockwise_order(pairs, codes)
+    lengths = np.bincount(pairs.viewpoint, minlength=len(places))
+    rows = pairs.object[order]
+    return VisibleObjects(
         offsets=np.append(0, np.cumsum(lengths)),
         objects=rows,
         codes=codes[rows],
-        bearings=seen.bearing[order],
-        distances=seen.distance[order],
+        bearings=pairs.bearing[order],
+        distances=pairs.distance[order],
     )
-
-
-Mode = Literal["all", "outdoor", "streets"]
-STREET_HALF_WIDTH_M = 8.0
-LEAST_WIDTH_M, MOST_WIDTH_M = 0.05, 200
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ViewpointSpec:
-    """Which cells are viewpoints.
-
-    Parameters
-    ----------
-    mode : {"all", "outdoor", "streets"}
-        Every cell, those whose centre is outside the building footprints, or those whose centre
-        is near the centre line of a street and, where footprints are given, outside them.
-    width : float, default 8
-        How far from a centre line is near, in metres: half the width of a street; from 0.05 to
-        200.
-    area : shapely.Polygon or shapely.MultiPolygon, optional
-        In the CRS of the objects; only cells whose centre is in it count, in every mode.
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range, or the area encloses nothing.
-
-    Examples
-    --------
-    >>> ViewpointSpec(mode="streets").width
-    8.0
-    """
-
-    mode: Mode = "all"
-    width: float = STREET_HALF_WIDTH_M
-    area: shapely.Polygon | shapely.MultiPolygon | None = None
-
-    def __post_init__(self) -> None:  # noqa: D105
-        if self.mode not in get_args(Mode):
-            known = ", ".join(get_args(Mode))
-            near = nearest_name(str(self.mode), get_args(Mode))
-            raise InputError(f"viewpoints {self.mode!r} are unknown{near}; give one of {known}.")
-        require_number(
-            "street half-width", self.width, least=LEAST_WIDTH_M, most=MOST_WIDTH_M, unit="metres"
-        )
-        if self.area is not None:
-            from semsig_gis.database.viewpoints import checked_area  # noqa: PLC0415 - it loads slowly
-
-            object.__setattr__(self, "area", checked_area(self.area))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the choice as values for JSON: ``mode``, ``width`` and ``area`` (WKT or None)."""
-        area = None if self.area is None else self.area.wkt
-        return {"mode": self.mode, "width": self.width, "area": area}
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> ViewpointSpec:
-        """Return the choice that `to_dict` wrote; InputError if a value cannot be used."""
-        area: Any = None
-        if values["area"] is not None:
-            from semsig_gis.database.viewpoints import read_area  # noqa: PLC0415 - it loads slowly
-
-            area = read_area(values["area"])
-        return cls(mode=values["mode"], width=values["width"], area=area)

@@ -1,9 +1,8 @@
-"""Object stores: which objects the cells of a database see, and where these stand exactly.
+"""Object stores: the objects, buildings and streets that a database was built from.
 
-A database does not say which objects its cells see, where these stand exactly, or what they are
-called in their source. The object store does: ``city.objects`` beside ``city.parquet``, and in a
-folder of parts the copies of what it was built from. An update needs it, and so does whatever looks
-at objects from a place off the grid.
+A database has no object identifiers, exact positions or names. The object store has them: the
+folder ``city.objects`` next to ``city.parquet``, or the copies of the inputs in a folder of parts.
+It is needed for updates, and to compute visible objects at places off the grid.
 """
 
 from __future__ import annotations
@@ -16,10 +15,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import lazy_loader
+
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, NAME, crs_label
+from semsig_gis.core import (
+    HALF_WIDTH,
+    LICENSES,
+    NAME,
+    DatabaseError,
+    Displayed,
+    InputError,
+    crs_label,
+)
 from semsig_gis.database.file import (
     INPUTS,
     damaged_files,
@@ -30,46 +37,54 @@ from semsig_gis.database.file import (
     require_file,
     save_database,
 )
-from semsig_gis.objects.table import licenses_of, open_objects, save_objects
-from semsig_gis.storage.geoparquet import UNREADABLE
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_folder
+from semsig_gis.database.occlusion import Footprints, buildings_near
+from semsig_gis.database.viewpoints import reproject, select_elements
+from semsig_gis.objects import licenses_of, open_objects, save_objects
+from semsig_gis.storage import (
+    UNREADABLE,
+    folder_locked,
+    move_folder,
+    parse_json,
+    read_whole,
+    whole_file,
+    whole_folder,
+)
 
 if TYPE_CHECKING:
     import geopandas as gpd
     import numpy as np
+    import shapely
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.objects.table import StreetObjects
-
+    from semsig_gis.objects import StreetObjects
+else:
+    gpd = lazy_loader.load("geopandas")
+    shapely = lazy_loader.load("shapely")
 
 STORE_KIND = "object store"
-# Raised whenever a store of before would be read wrongly.
-FORMAT = 1
+FORMAT = 1  # increased when older stores would be read incorrectly
 STORE_SUFFIX = ".objects"
 MANIFEST = "manifest.json"
 OBJECTS = "objects.parquet"
 FOOTPRINTS = "footprints.parquet"
 STREETS = "streets.parquet"
 BUILT_DIGEST = "built_digest"
-# What a new store is called until its database is in place.
-NEXT = ".next"
+NEXT = ".next"  # suffix of a new store until its database is in place
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ObjectStore(Displayed):
-    """What a signature database was built from.
+    """The data that a signature database was built from.
 
     Parameters
     ----------
     objects : StreetObjects
         The objects.
     footprints, streets : GeoDataFrame, optional
-        Buildings and centre lines in the CRS of the objects, where it was built with them.
+        Buildings and centre lines in the CRS of the objects, if it was built with them.
 
     Examples
     --------
@@ -99,14 +114,12 @@ class ObjectStore(Displayed):
         footprints: gpd.GeoDataFrame | None = None,
         streets: gpd.GeoDataFrame | None = None,
     ) -> ObjectStore:
-        """Make the store of a database that was built from these.
+        """Make the store of a database from the arguments of `build_database`.
 
-        `footprints` and `streets` are those that `build_database` got; CrsError if they have no
-        CRS.
+        CrsError if `footprints` or `streets` have no CRS.
         """
-        from semsig_gis.database.build import elements_of  # noqa: PLC0415 - it loads slowly
-
-        houses, lines = elements_of(footprints, "buildings"), elements_of(streets, "streets")
+        houses = select_elements(footprints, "buildings")
+        lines = select_elements(streets, "streets")
         return cls(
             objects=objects,
             footprints=None if houses is None else _stored(houses, objects.crs),
@@ -115,37 +128,31 @@ class ObjectStore(Displayed):
 
     @cached_property
     def index(self) -> ObjectIndex:
-        """R-tree over the objects, in their order; made when it is first asked for."""
-        from semsig_gis.core.rtree import ObjectIndex  # noqa: PLC0415 - it loads slowly
+        """R-tree over the objects, in their order, built at the first access."""
+        from semsig_gis.core import ObjectIndex  # noqa: PLC0415 - it takes 110 ms to load
 
         return ObjectIndex(self.objects.xy)
 
     def buildings_around(
         self, places: NDArray[np.float64], *, distance: float
     ) -> Footprints | None:
-        """Return the buildings at most so many metres from some places, None where there are none.
+        """Return the buildings within `distance` metres of some places, None without any.
 
-        All that they are joined to are among them. Places, shape (p, 2), are in metres.
+        Buildings joined to them are included. Places, shape (p, 2), are in metres.
         """
         if self.footprints is None:
             return None
-        from semsig_gis.database.occlusion import Footprints, buildings_near  # noqa: PLC0415 - it loads slowly
-
         polygons = self.footprints.geometry.to_numpy()
         near = buildings_near(polygons, places, distance=distance)
         return Footprints(polygons[near]) if len(near) else None
 
 
 def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
-    """Return the shapes of a table and the columns of these names, in a CRS."""
-    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
-
-    from semsig_gis.database.build import moved  # noqa: PLC0415 - it loads slowly
-
+    """Return the geometries and the named columns of a table, in a CRS."""
     geometry = table.geometry
-    kept = moved(table[~(geometry.isna() | geometry.is_empty)], crs)
-    columns = {name: kept[name].to_numpy() for name in names if name in kept}
-    stored = gpd.GeoDataFrame(columns, geometry=kept.geometry.to_numpy(), crs=kept.crs)
+    rows = reproject(table[~(geometry.isna() | geometry.is_empty)], crs)
+    columns = {name: rows[name].to_numpy() for name in names if name in rows}
+    stored = gpd.GeoDataFrame(columns, geometry=rows.geometry.to_numpy(), crs=rows.crs)
     stored.attrs[LICENSES] = list(licenses_of(table))
     return stored
 
@@ -194,7 +201,7 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
                 raise InputError(str(error).replace(str(partial), str(path))) from error
             new = partial.with_name(final.name)
             _write(store, new, fingerprint=digest(partial))
-            stack.enter_context(alone_in(final.parent))
+            stack.enter_context(folder_locked(final.parent))
             _settle(Path(path))  # what waits there may be needed until the new database is in place
             move_folder(new, _waiting(final))
         move_folder(_waiting(final), final)
@@ -342,7 +349,7 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    from semsig_gis.objects.surroundings import read_surroundings  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it loads slowly
 
     files = stored_inputs(folder)
     objects = open_objects(files["objects"])
@@ -355,9 +362,6 @@ def _read_inputs(folder: Path) -> ObjectStore:
 
 
 def _table(path: Path) -> gpd.GeoDataFrame:
-    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
-    import shapely  # noqa: PLC0415 - it loads slowly
-
     try:
         return gpd.read_parquet(path)
     except (*UNREADABLE, shapely.errors.ShapelyError) as error:
@@ -387,7 +391,7 @@ def current_store(database: Path) -> Path:
     final = store_path(database)
     if not _awaited(database):
         return final
-    with contextlib.suppress(InputError), alone_in(final.parent) as alone:
+    with contextlib.suppress(InputError), folder_locked(final.parent) as alone:
         if alone:
             _settle(database)
     return _waiting(final) if _awaited(database) else final

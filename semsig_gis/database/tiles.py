@@ -19,20 +19,24 @@ import pyarrow.parquet as pq
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.effort import announce
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
+    MOST_METRES,
+    TEMPORARY_PREFIX,
+    DatabaseError,
+    EmptyResultError,
     GridSpec,
+    InputError,
+    SignatureSpec,
+    announce,
     cell_ids,
     cells_near,
+    check_workers,
     consecutive,
+    finish_tasks,
+    require_number,
     require_step,
     split_ids,
 )
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.temporary import HALF_DONE
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -52,15 +56,14 @@ from semsig_gis.database.file import (
     save_database,
 )
 from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.sightings import ViewpointSpec
 from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
-from semsig_gis.database.viewpoints import require_surroundings
-from semsig_gis.objects.surroundings import read_surroundings
-from semsig_gis.objects.table import open_objects
-from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
-from semsig_gis.storage.runs import (
+from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
+from semsig_gis.objects import open_objects, read_surroundings
+from semsig_gis.storage import (
+    EMPTY_BOX,
     PARTIAL,
     RunKind,
+    bounds_by_group,
     finish,
     partial_folder,
     read_json,
@@ -266,7 +269,7 @@ def build_parts(
         failed = finish_tasks(
             work,
             left,
-            done=note_part,
+            on_success=note_part,
             workers=workers,
             scheduler=scheduler,
             files=[*filter(None, (plan.folder, plan.objects, plan.buildings, plan.streets))],
@@ -365,7 +368,7 @@ def plan_tiles(
     places: dict[Input, str | Path | None]
     places = {"objects": objects, "buildings": buildings, "streets": along}
     paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
-    nothing = open_objects(paths["objects"], box=NOWHERE)
+    nothing = open_objects(paths["objects"], box=EMPTY_BOX)
     reach = float(nothing.taxonomy.ranges(spec.radius).max())
     require_step(grid, reach)
     require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
@@ -414,7 +417,7 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
             f"at least {reach / MOST_REACHED:g} m."
         )
     objects: Counter[int] = Counter()
-    for bounds in each_bounds(path):
+    for bounds in bounds_by_group(path):
         widened = bounds + np.array([-reach, -reach, reach, reach])
         places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
         boxes, count = np.unique(places, axis=0, return_counts=True)
@@ -522,7 +525,7 @@ def _require_replaceable(target: Path) -> None:
         if target.exists() and not target.is_file():
             raise InputError(f"{target} is a device or a pipe; give the name of a folder to write.")
         return
-    others = {path.name for path in target.iterdir() if not path.name.startswith(HALF_DONE)}
+    others = {path.name for path in target.iterdir() if not path.name.startswith(TEMPORARY_PREFIX)}
     if MANIFEST in others:
         others -= {MANIFEST, RECIPE, INPUTS, *(part.file for part in read_manifest(target).parts)}
     if others:

@@ -12,13 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis import __version__
-from semsig_gis.core.checks import MOST_METRES
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import ROW_SPAN, SOURCE, cell_ids, cells_near, split_ids
-from semsig_gis.core.parallel import check_workers
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.text import percent
+from semsig_gis.core import (
+    MOST_METRES,
+    ROW_SPAN,
+    SOURCE,
+    DatabaseError,
+    Displayed,
+    EmptyResultError,
+    InputError,
+    PackedIndex,
+    cell_ids,
+    cells_near,
+    check_workers,
+    percent,
+    split_ids,
+)
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
@@ -31,7 +39,7 @@ from semsig_gis.database.file import (
     read_manifest,
 )
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
-from semsig_gis.database.sightings import sightings
+from semsig_gis.database.sightings import measure_sightings
 from semsig_gis.database.store import save_with_store, stored_inputs
 from semsig_gis.database.tile_inputs import folder_beside
 from semsig_gis.database.tiles import (
@@ -42,9 +50,14 @@ from semsig_gis.database.tiles import (
     save_tile,
     tile_cells,
 )
-from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import licenses_of, open_objects, save_objects
-from semsig_gis.storage.runs import read_json, write_json
+from semsig_gis.objects import (
+    compare_objects,
+    licenses_of,
+    open_objects,
+    replace_layers,
+    save_objects,
+)
+from semsig_gis.storage import read_json, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,8 +68,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.file import Part
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.database.tiles import Tile, TilePlan
-    from semsig_gis.objects.changes import ClassChange, ObjectChanges
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import ClassChange, ObjectChanges, StreetObjects
 
     _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
 
@@ -511,8 +523,8 @@ def _changed_places(
     old: StreetObjects, new: StreetObjects, changes: ObjectChanges
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
     """Return where an object is gone or has come, shape (c, 2) in metres, and its class codes."""
-    places = np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
-    return places, np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
+    places = np.concatenate([old.xy[changes.obsolete_rows], new.xy[changes.new_rows]])
+    return places, np.concatenate([old.codes[changes.obsolete_rows], new.codes[changes.new_rows]])
 
 
 def _cells_in_range(
@@ -526,7 +538,7 @@ def _cells_in_range(
     columns, rows = cells_near(places, grid=database.grid, radius=reach)
     viewpoints = database.grid.viewpoints(columns, rows)
     pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
-    near = np.unique(sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
+    near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
     return columns[near], rows[near]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree as ET
 
-from semsig_gis.core.symbology import (
+from semsig_gis.core import (
     ANSWERS,
     FOUND_RAMP,
     GROUP_COLOURS,
@@ -20,8 +20,7 @@ from semsig_gis.core.symbology import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from semsig_gis.core.symbology import ClassSign, Mark
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import ClassSign, Mark, Taxonomy
 
 
 # What is said of the numbers between two, and their colour.

@@ -1,38 +1,65 @@
-"""Methods of either kind: named by text, with what they need to answer, and their answers."""
+"""Make the locator of a method, and locate a view with it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, Unpack, overload
 
 import numpy as np
 
-from semsig_gis.core.defaults import DEFAULT_METHOD, LIKELIHOOD
-from semsig_gis.database.city import City
-from semsig_gis.database.database import join_databases
-from semsig_gis.database.file import PartitionedDatabase
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.search import DistanceLocator
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.likelihood.priors import weight_prior
+from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD
+from semsig_gis.database import City, PartitionedDatabase, join_databases
+from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import NOISES, cell_noise
-from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
-    from semsig_gis.localization.answers import Answer, Locator, Requirement
-    from semsig_gis.localization.distance.search import Localization
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization.answers import Ranking
+    from semsig_gis.localization.distance.memo import DistanceMemo
+    from semsig_gis.localization.distance.method import Method
+    from semsig_gis.localization.distance.search import DistanceLocator, Localization
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization.likelihood.locate import (
+        LikelihoodLocator,
+        LocateOptions,
+        Location,
+    )
+    from semsig_gis.localization.likelihood.method import LikelihoodMethod
     from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.observation.north import North
+    from semsig_gis.localization.requirement import Requirement
+    from semsig_gis.observation import North
 
-AnyMethod = Method | LikelihoodMethod
+    Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
+
+AnyMethod: TypeAlias = "Method | LikelihoodMethod"
+
+# Imports of one kind of method are in functions: they take 0.1 s for each kind, and a process
+# answers by one of them.
+
+_Answer_co = TypeVar("_Answer_co", bound=Answer, covariant=True)
+
+
+class Locator(Protocol[_Answer_co]):
+    """A method with the cells that it searches, ready to answer queries."""
+
+    def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
+        """Return the answer to a query; `top` replaces the number of candidates of the locator.
+
+        Objects of a class that no cell sees count as false detections, with a note in the answer.
+        Raises InputError if the query lacks a part that the method needs.
+        """
+
+    def rankings(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[Ranking]:
+        """Yield the ranking of all cells for each query; each query has at least one object.
+
+        `memo` shares the distances of these queries between methods; the time to compute them
+        counts for each method.
+        """
 
 
 def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMethod:
@@ -41,7 +68,7 @@ def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMetho
     Parameters
     ----------
     text : str
-        What `Method.parse` or `LikelihoodMethod.parse` reads.
+        Text for `Method.parse` or `LikelihoodMethod.parse`.
     noises : mapping of str to Noise, optional
         The noise models by name.
 
@@ -61,30 +88,102 @@ def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMetho
     ('edit+edit:5%', 'likelihood:generic')
     """
     if text.strip().partition(":")[0] == LIKELIHOOD:
+        from semsig_gis.localization.likelihood.method import LikelihoodMethod  # noqa: PLC0415 - above
+
         return LikelihoodMethod.parse(text, noises=noises)
+    from semsig_gis.localization.distance.method import Method  # noqa: PLC0415 - above
+
     return Method.parse(text)
 
 
+@overload
 def make_locator(
-    database: SignatureDatabase,
+    database: Cells,
+    method: LikelihoodMethod,
+    *,
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> LikelihoodLocator: ...
+@overload
+def make_locator(
+    database: Cells,
+    method: Method,
+    *,
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> DistanceLocator: ...
+@overload
+def make_locator(
+    database: Cells,
     method: AnyMethod,
     *,
-    store: Callable[[], ObjectStore] | None = None,
-) -> Locator[Answer]:
-    """Return a method with all that it needs; `store` is called if places are to be refined."""
-    if isinstance(method, Method):
-        return DistanceLocator(database=database, method=method)
-    return LikelihoodLocator(
-        index=_index(database, method),
-        north_sigma=method.north_sigma,
-        store=store() if method.refined and store else None,
-        refined=method.refined,
-    )
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> DistanceLocator | LikelihoodLocator: ...
+def make_locator(
+    database: Cells,
+    method: AnyMethod,
+    *,
+    requirement: Requirement | None = None,
+    index: LikelihoodIndex | None = None,
+    **options: Unpack[LocateOptions],
+) -> DistanceLocator | LikelihoodLocator:
+    """Return the locator of a method.
+
+    `requirement` limits the candidate cells. `index` is the result of `method_index`, if it exists
+    already. `options` are those of `locate`. A distance uses only ``top`` and ``north``. For the
+    likelihood method, the default ``store`` is that of the city, and ``refined`` depends by default
+    on the method and the store.
+    """
+    if method.noise is None:
+        from semsig_gis.localization.distance.search import DistanceLocator  # noqa: PLC0415 - above
+
+        cells = database.dataset if isinstance(database, City) else database
+        return DistanceLocator(
+            database=cells,
+            method=method,
+            requirement=requirement,
+            top=options.get("top", DistanceLocator.top),
+            north=options.get("north", GRID_NORTH),
+        )
+    from semsig_gis.localization.likelihood.locate import LikelihoodLocator  # noqa: PLC0415 - above
+
+    if isinstance(database, City):
+        if "store" not in options and database.has_store and not method.on_grid:
+            options["store"] = database.store
+        database = database.database
+    elif isinstance(database, PartitionedDatabase):
+        database = join_databases(list(database.parts()))
+    if requirement is not None:
+        # The module imports GeoPandas, which takes 0.3 s.
+        from semsig_gis.localization.likelihood.priors import weight_prior  # noqa: PLC0415
+
+        mask = requirement.met(database.type_sequences)
+        prior = weight_prior(database, mask.astype(np.float64))
+        other = options.get("log_prior")
+        options["log_prior"] = prior if other is None else other + prior
+    if "refined" not in options:
+        # None: refined if the query has bearings.
+        between = options.get("store") is not None and not method.on_grid
+        options["refined"] = method.refined or (None if between else False)
+    options.setdefault("north_sigma", method.north_sigma)
+    return LikelihoodLocator(index=index or method_index(database, method), **options)
+
+
+def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
+    """Return the index of a database for a method: from cell centres or from anywhere in a cell."""
+    from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
+
+    noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
+    return build_index(database, noise)
 
 
 @overload
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: LikelihoodMethod | Literal["likelihood"] = DEFAULT_METHOD,
@@ -94,7 +193,7 @@ def localize(
 ) -> Location: ...
 @overload
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: Method,
@@ -104,7 +203,7 @@ def localize(
 ) -> Localization: ...
 @overload
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: str,
@@ -113,7 +212,7 @@ def localize(
     north: North = GRID_NORTH,
 ) -> Location | Localization: ...
 def localize(
-    database: SignatureDatabase | PartitionedDatabase | City,
+    database: Cells,
     query: Signature,
     *,
     method: str | AnyMethod = DEFAULT_METHOD,
@@ -121,42 +220,42 @@ def localize(
     top: int = 10,
     north: North = GRID_NORTH,
 ) -> Location | Localization:
-    """Find where a query was seen from, as `semsig localize` does.
+    """Return the places from which a query may have been seen, as `semsig localize` does.
 
     Parameters
     ----------
     database : SignatureDatabase, PartitionedDatabase or City
-        The cells. By a distance, only one part of a database in parts is in memory at a time. By
-        likelihood, a city with a store of street objects is also searched between the centres of
-        its cells.
+        The cells. A distance reads a partitioned database one part at a time. The likelihood
+        method also searches between the centres of cells if a city has a store of street objects.
     query : Signature
-        What a person or a detector saw, perhaps nothing; types or bearings may be unknown. Objects
-        of a class that no cell sees are false detections, and the answer says so.
+        The objects that a person or a detector saw, possibly none; types or bearings may be
+        unknown. Objects of a class that no cell sees are false detections, with a note in the
+        answer.
     method : str, Method or LikelihoodMethod, default "likelihood"
         How the cells are ranked, or its text (see `parse_method`), such as ``"edit+edit:5%"``. A
-        fusion uses the part that the query has.
+        fusion uses one part if the query has only this one.
     requirement : Requirement, optional
-        What a cell must see to be a candidate; nothing by default.
+        The objects that a candidate cell must see; none by default.
     top : int, default 10
-        How many cells to list, at least 1.
+        Number of cells to list, at least 1.
     north : North, optional
-        What the bearings of the query count from; grid north by default.
+        The north from which the bearings of the query are measured; grid north by default.
 
     Returns
     -------
     Location or Localization
-        The answer of the likelihood, with chances (see `locate` for what else it may know), or
-        that of a distance, with its ties.
+        The answer by likelihood, with probabilities (`locate` has more options), or by distance,
+        with ties.
 
     Raises
     ------
     InputError
-        If the query has no part that the method compares, the method needs street objects that are
-        not there, no cell meets the requirement, or `top` is below 1.
+        If the query has no part that the method compares, the method needs street objects but the
+        city has none, no cell meets the requirement, or `top` is below 1.
     UnknownNameError
-        If the text of the method has a name that is not known.
+        If the text of the method has an unknown name.
     EmptyResultError
-        The same, if no cell meets the requirement of a query by distance.
+        If no cell meets the requirement and the method is a distance.
 
     Examples
     --------
@@ -169,33 +268,7 @@ def localize(
     >>> answer.used, answer.candidates["distance"][0]
     ('types+angles', np.float64(0.0))
     """
-    used = parse_method(method) if isinstance(method, str) else method
-    if isinstance(used, Method):
-        cells = database.dataset if isinstance(database, City) else database
-        return DistanceLocator(
-            database=cells, method=used, requirement=requirement, top=top, north=north
-        ).locate(query)
-    store = None
-    if isinstance(database, City):
-        store = database.store if database.has_store and not used.on_grid else None
-        database = database.database
-    elif isinstance(database, PartitionedDatabase):
-        database = join_databases(list(database.parts()))
-    prior = None
-    if requirement is not None:
-        met = requirement.met(database.type_sequences)
-        prior = weight_prior(database, met.astype(np.float64))
-    return LikelihoodLocator(
-        index=_index(database, used),
-        north_sigma=used.north_sigma,
-        log_prior=prior,
-        top=top,
-        store=store,
-        refined=used.refined or (None if store else False),
-        north=north,
-    ).locate(query)
-
-
-def _index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
-    noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
-    return build_index(database, noise)
+    if isinstance(method, str):
+        method = parse_method(method)
+    locator = make_locator(database, method, requirement=requirement, top=top, north=north)
+    return locator.locate(query)

@@ -1,34 +1,40 @@
-"""The north that the bearings of a query count from: grid, true or magnetic."""
+"""The north from which the bearings of a query are measured: grid, true or magnetic."""
 
 from __future__ import annotations
 
 import datetime as dt
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import grid_convergence, signed_degrees, to_degrees
+from semsig_gis.core import (
+    InputError,
+    UnknownNameError,
+    grid_convergence,
+    nearest_name,
+    signed_degrees,
+    to_degrees,
+)
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
+    from pyproj import CRS
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import PartitionedDatabase
+    from semsig_gis.core import Signature
 
 NorthName = Literal["grid", "true", "magnetic"]
 NORTHS: tuple[NorthName, ...] = get_args(NorthName)
 
 MODELLED = dt.date(1900, 1, 1), dt.date(2029, 12, 31)
-"""First and last day that the magnetic field is known or foretold for (IGRF-14)."""
-WIDE = 0.5  # degrees by which north may differ within a city before an answer tells of it
+"""First and last day of the magnetic field model (IGRF-14)."""
+WIDE = 0.5  # degrees; an answer has a note if north varies by more within the city
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class North:
-    """What the bearings of a query count from.
+    """The north from which the bearings of a query are measured.
 
     Parameters
     ----------
@@ -37,14 +43,15 @@ class North:
     turn : float, default 0
         Its bearing from grid north in the middle of the city, in degrees clockwise.
     spread : float, default 0
-        By how many degrees it differs from that elsewhere in the city, at most.
+        Maximum deviation from `turn` in the city, in degrees.
     date : datetime.date, optional
-        The day for which the magnetic north was worked out.
+        The day for which the magnetic north was computed.
 
     Examples
     --------
     >>> import datetime as dt
-    >>> north = North.of("magnetic", demo_database, date=dt.date(2024, 5, 1))
+    >>> crs, bounds = demo_database.crs, demo_database.bounds
+    >>> north = North.of("magnetic", crs, bounds, date=dt.date(2024, 5, 1))
     >>> round(north.turn, 1), round(north.spread, 3)
     (1.9, 0.001)
     """
@@ -58,14 +65,16 @@ class North:
     def of(
         cls,
         name: NorthName,
-        database: SignatureDatabase | PartitionedDatabase,
+        crs: CRS,
+        bounds: ArrayLike | None = None,
         *,
         date: dt.date | None = None,
     ) -> Self:
-        """Return the north of a city: the convergence of the grid and the declination there.
+        """Return the north of a city, from the grid convergence and the declination there.
 
-        The magnetic north is that of a `date`, by default of today. UnknownNameError if there is
-        no such north; InputError if a date is given for another, or lies outside `MODELLED`.
+        `crs` and `bounds` (west, south, east, north in metres) are those of its database. Magnetic
+        north is that of `date`, by default of today. Raises UnknownNameError for an unknown name;
+        InputError if a date is given for another north, or lies outside `MODELLED`.
         """
         if name not in NORTHS:
             raise UnknownNameError(
@@ -78,23 +87,28 @@ class North:
             )
         if name == "grid":
             return cls()
-        places = _places(database)
-        turns = -grid_convergence(database.crs, places)
+        if bounds is None:
+            crs, bounds = _from_database(crs)
+        # The middle of the city, then its corners.
+        west, south, east, north = np.asarray(bounds, dtype=np.float64)
+        middle = (west + east) / 2.0, (south + north) / 2.0
+        places = np.array([middle, (west, south), (east, south), (east, north), (west, north)])
+        turns = -grid_convergence(crs, places)
         if name == "magnetic":
             date = dt.datetime.now().astimezone().date() if date is None else date
-            degrees = to_degrees(database.crs).transform(*places.T)
-            turns = turns + declination(*degrees, date)
-        middle = float(signed_degrees(turns[0]))
-        spread = float(np.abs(signed_degrees(turns - middle)).max())
-        return cls(name=name, turn=middle, spread=spread, date=date)
+            lon, lat = to_degrees(crs).transform(places[:, 0], places[:, 1])
+            turns = turns + declination(lon, lat, date)
+        turn = float(signed_degrees(turns[0]))
+        spread = float(np.abs(signed_degrees(turns - turn)).max())
+        return cls(name=name, turn=turn, spread=spread, date=date)
 
     def __str__(self) -> str:
-        """Return its name in words, with the date where it matters."""
+        """Return its name, with the date of a magnetic north."""
         return f"{self.name} north" + (f" of {self.date}" if self.date else "")
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to say where one north does not do for all the city."""
+        """A note if north varies within the city."""
         if self.spread <= WIDE:
             return ()
         note = (
@@ -104,32 +118,32 @@ class North:
         return (note,)
 
     def to_grid(self, query: Signature) -> Signature:
-        """Return a query with its bearings from grid north."""
+        """Return a query with its bearings measured from grid north."""
         return query.turned(self.turn) if self.turn else query
 
     def from_grid(self, bearing: float) -> float:
-        """Return a bearing from grid north as one from this north, in [0, 360)."""
+        """Convert a bearing from grid north to one from this north, in [0, 360)."""
         return (bearing - self.turn) % 360.0 if self.turn else bearing
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, ready for JSON."""
+        """Return plain values for JSON."""
         date = None if self.date is None else self.date.isoformat()
         return {"name": self.name, "turn": self.turn, "spread": self.spread, "date": date}
 
 
 GRID_NORTH: North = North()
-"""The north that bearings are kept from."""
+"""The north of stored bearings."""
 
 
 def declination(
     lon: NDArray[np.float64], lat: NDArray[np.float64], date: dt.date
 ) -> NDArray[np.float64]:
-    """Return the bearing of magnetic from true north at places, in degrees clockwise.
+    """Return the bearing of magnetic north from true north at places, in degrees clockwise.
 
-    It is that of the International Geomagnetic Reference Field. InputError if the date lies
+    The model is the International Geomagnetic Reference Field. Raises InputError if the date is
     outside `MODELLED`.
     """
-    import ppigrf  # noqa: PLC0415 - only where it is used
+    import ppigrf  # noqa: PLC0415 - it imports pandas, 0.25 s
 
     first, last = MODELLED
     if not first <= date <= last:
@@ -141,12 +155,12 @@ def declination(
     return np.asarray(np.degrees(np.arctan2(east, north))).reshape(-1)
 
 
-def _places(database: SignatureDatabase | PartitionedDatabase) -> NDArray[np.float64]:
-    """Return the middle and the corners of the box of the cells, shape (5, 2)."""
-    from semsig_gis.database.file import PartitionedDatabase  # noqa: PLC0415 - it loads slowly
-
-    parts = database.parts() if isinstance(database, PartitionedDatabase) else [database]
-    boxes = [(part.xy.min(axis=0), part.xy.max(axis=0)) for part in parts if len(part)]
-    low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
-    corners = [low, (high[0], low[1]), high, (low[0], high[1])]
-    return np.array([(low + high) / 2.0, *corners])
+def _from_database(database: Any) -> tuple[CRS, ArrayLike]:  # noqa: ANN401 - of a package above
+    """Return the CRS and the bounds of a database, which `North.of` took up to version 0.1."""
+    warnings.warn(
+        "North.of(name, database) is North.of(name, database.crs, database.bounds) now; "
+        "version 0.3.0 removes the old form.",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return database.crs, database.bounds

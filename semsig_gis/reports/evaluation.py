@@ -7,22 +7,15 @@ from itertools import product
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
-import pandas as pd
 
-from semsig_gis.core.symbology import ERROR_BREAKS
-from semsig_gis.evaluation.figures import percentile
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.evaluation.queries.distortions import DISTORTIONS, FalseClass
-from semsig_gis.evaluation.result import Evaluation
-from semsig_gis.localization.distance.ties import NEAR_METRES, NEAR_PLACES
-from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
-from semsig_gis.reports.tables import Table, figure, interval, short_percent
+from semsig_gis.core import ERROR_BREAKS, Table, figure, interval
+from semsig_gis.evaluation import DISTORTIONS, Evaluation, FalseClass, chain_text, percentile
+from semsig_gis.evaluation import published as paris
+from semsig_gis.localization import DEFAULT_RULE, NEAR_METRES, NEAR_PLACES
+from semsig_gis.reports.tables import short_percent
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from semsig_gis.evaluation.spec import ExperimentSpec
+    import pandas as pd
 
 
 FIGURES = {
@@ -220,85 +213,6 @@ def _paper_level(evaluation: Evaluation) -> str | None:
     return None
 
 
-PERCENTILES = {"error_median": 50, "error_p90": 90}
-SHOWN = {
-    **{f"p{metres}": f"P(≤ {metres} m)" for metres in ERROR_BREAKS},
-    "near5": "recall@5 at 25 m",
-    "recall10": "recall@10 %",
-    "coverage": "Answered",
-    "precision": "Right",
-    "in_region": "In region",
-}
-
-
-def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
-    """Return all figures of the evaluations, given by the names of their cases.
-
-    One row a case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %) and
-    ``n`` (queries). Figures are shares, errors in metres, or ``heading_error_median`` in degrees.
-    """
-    parts = []
-    for name, evaluation in results.items():
-        errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
-        turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
-        values = {label: (errors, percent) for label, percent in PERCENTILES.items()}
-        if not np.isnan(turns).all():
-            values["heading_error_median"] = (turns, 50)
-        rows = [
-            (label, *percentile(some, percent), int((~np.isnan(some)).sum()))
-            for label, (some, percent) in values.items()
-        ]
-        percentiles = pd.DataFrame(rows, columns=["figure", "value", "low", "high", "n"])
-        figures = pd.concat([evaluation.means().reset_index(), percentiles], ignore_index=True)
-        figures.insert(0, "case", name)
-        parts.append(figures)
-    return pd.concat(parts, ignore_index=True)
-
-
-def experiment_tables(
-    spec: ExperimentSpec, results: Mapping[str, Evaluation], *, times: bool = True
-) -> tuple[Table, ...]:
-    """Return the settings of an experiment, then for each distortion a table of its main figures.
-
-    `times` tells whether to show the seconds of a query, which differ from run to run.
-    """
-    database = next(iter(results.values())).database
-    megabytes = database["mb_per_km2"]
-    settings = {
-        "Database": f"{spec.database}, {database['cells']:,} cells",
-        **({} if megabytes is None else {"Size": f"{megabytes:.3f} MB per km²"}),
-        "Queries": f"{spec.queries:,} of each seed ({', '.join(map(str, spec.seeds))})",
-        "Seen from": spec.seen_from + ("" if spec.city is None else f" of {spec.city}"),
-        **{f"Method {name}": str(method) for name, method in spec.methods.items()},
-    }
-    tables = [Table("Experiment", ("Setting", "Value"), tuple(settings.items()))]
-    for distortion, chain in spec.distortions.items():
-        cases = {
-            f"{case.method}, t = {case.top}": results[case.name]
-            for case in spec.cases
-            if case.distortion == distortion
-        }
-        means = [case.means() for case in cases.values()]
-        columns: dict[str, list[str]] = {"Method": list(cases)}
-        for name, label in SHOWN.items():
-            if any(name in one.index for one in means):
-                columns[label] = [_mean(one, name) for one in means]
-        for label, percent in (("Median m", 50), ("90th percentile m", 90)):
-            errors = [case.queries["error_m"].to_numpy(dtype=np.float64) for case in cases.values()]
-            columns[label] = [figure(percentile(one, percent)[0], ",.1f") for one in errors]
-        if times:
-            columns["s a query"] = [f"{case.seconds_per_query:.4f}" for case in cases.values()]
-        title = f"{distortion}: {chain_text(chain) or 'no distortion'}"
-        tables.append(Table.of_columns(title, columns))
-    return tuple(tables)
-
-
-def experiment_markdown(spec: ExperimentSpec, results: Mapping[str, Evaluation]) -> str:
-    """Return the tables of an experiment as Markdown, the same whenever it is repeated."""
-    sections = [table.markdown() for table in experiment_tables(spec, results, times=False)]
-    return "\n".join(["## Experiment\n", *sections])
-
-
 def comparison_sentence(
     comparison: pd.DataFrame, changed: tuple[int, int], *, names: tuple[str, str]
 ) -> str:
@@ -340,11 +254,3 @@ def comparison_table(comparison: pd.DataFrame, title: str) -> Table:
         },
         "Intervals are bootstrapped over pairs; one that contains 0 shows no difference.",
     )
-
-
-def _mean(means: pd.DataFrame, name: str) -> str:
-    """Return a figure, P(error <= 50 m) with its interval."""
-    value = float(means["value"][name]) if name in means.index else np.nan
-    if name != "p50" or np.isnan(value):
-        return figure(value)
-    return f"{value:.4f} ({interval(means['low'][name], means['high'][name])})"

@@ -5,84 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from semsig_gis.core.symbology import escaped, one_line
+from semsig_gis.core import Table, one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.reports.report_model import Number
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A table for people.
-
-    Parameters
-    ----------
-    title : str
-        What it shows.
-    columns : tuple of str
-        Headings, with units.
-    rows : tuple of tuple of str
-        Cells as text, one for each column; empty where there is nothing to say.
-    note : str, default ""
-        What a reader must know to read it rightly.
-    labels : int, default 1
-        How many columns from the left are text; the others are numbers.
-    groups : tuple of (str, tuple of str), optional
-        The headings after the labels in two rows: each group with its columns.
-    bold : frozenset of (int, int), optional
-        Row and column of the cells in bold.
-    intervals : mapping of (int, int) to str, optional
-        Intervals of the numbers in cells, by row and column.
-
-    Examples
-    --------
-    >>> print(Table("Sizes", ("What", "m"), (("step", "10"),)).markdown(), end="")
-    ### Sizes
-    <BLANKLINE>
-    | What | m |
-    | --- | ---: |
-    | step | 10 |
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
-    labels: int = 1
-    groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    bold: frozenset[tuple[int, int]] = frozenset()
-    intervals: Mapping[tuple[int, int], str] = field(default_factory=dict)
-
-    @classmethod
-    def of_columns(cls, title: str, columns: Mapping[str, Iterable[str]], note: str = "") -> Table:
-        """Return a table of columns, which are given by their headings."""
-        return cls(title, tuple(columns), tuple(zip(*columns.values(), strict=True)), note)
-
-    @property
-    def group_starts(self) -> frozenset[int]:
-        """At which columns a group begins."""
-        widths = [len(columns) for _, columns in self.groups[:-1]]
-        return frozenset(itertools.accumulate(widths, initial=self.labels) if self.groups else ())
-
-    @property
-    def spans(self) -> tuple[int, ...]:
-        """How many rows from here on share the first label; 0 where the row above has it."""
-        runs = (len(list(rows)) for _, rows in itertools.groupby(row[0] for row in self.rows))
-        return tuple(span for run in runs for span in (run, *[0] * (run - 1)))
-
-    def _repr_markdown_(self) -> str:
-        """Show the table in a notebook."""
-        return self.markdown()
-
-    def markdown(self) -> str:
-        """Return the table as a Markdown section: its heading, rows and note."""
-        note = f"\n{escaped(self.note)}\n" if self.note else ""
-        return f"### {escaped(self.title)}\n\n{markdown_rows(self, escaped)}\n{note}"
 
 
 def distortion_rows(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -122,24 +53,6 @@ def brief_notes(notes: Iterable[str]) -> Iterator[str]:
             yield f"{first}; and {len(others)} more (--json)" if others else first
 
 
-def markdown_rows(table: Table, escape: Callable[[str], str]) -> str:
-    """Return the headings and rows of a table as Markdown, with its texts escaped."""
-
-    def cell(row: int, column: int) -> str:
-        text = escape(table.rows[row][column])
-        bold = f"**{text}**" if (row, column) in table.bold else text
-        ends = table.intervals.get((row, column))
-        return f"{bold} ({escape(ends)})" if ends else bold
-
-    columns = range(len(table.columns))
-    lines = [
-        [escape(heading) for heading in table.columns],
-        ["---" if column < table.labels else "---:" for column in columns],
-        *([cell(row, column) for column in columns] for row in range(len(table.rows))),
-    ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 KILOMETRE = 1000.0
 
 
@@ -148,23 +61,11 @@ def short_percent(share: float, *, unit: str = " %") -> str:
     return f"{round(100 * share, 0 if 0.0995 <= share <= 0.99 else 1):g}{unit}"  # noqa: PLR2004
 
 
-def figure(value: float | None, form: str = ".4f") -> str:
-    """Return a number as text, empty where it is None or NaN."""
-    if value is None or math.isnan(value):
-        return ""
-    return "infinite" if math.isinf(value) else format(value, form)
-
-
 def length(metres: float) -> str:
     """Return a length as text: ``2.5 m``, ``340 m``, ``11.2 km``."""
     if metres < 10.0:  # noqa: PLR2004
         return f"{metres:.2g} m"
     return f"{metres:,.0f} m" if metres < KILOMETRE else f"{metres / KILOMETRE:,.3g} km"
-
-
-def interval(low: float, high: float, form: str = ".4f") -> str:
-    """Return the ends of an interval as text, empty where they are NaN."""
-    return "" if math.isnan(low) else f"{figure(low, form)} to {figure(high, form)}"
 
 
 OURS, INTERVAL, PAPER, DIFFERENCE = "ours", "95 %", "paper", "difference"

@@ -1,40 +1,23 @@
-"""The area that a user wants: a bounding box, or the polygons of a file."""
+"""Areas of the Earth, and the tiles in which they are requested."""
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
-import re
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-import geopandas as gpd
-import numpy as np
 import shapely
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
-from semsig_gis.sources import FILE_SUFFIXES
-from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.layers import LayerSpec
-from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
+from semsig_gis.core import HALF_TURN, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
+    import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.sources import RawLayer
-
-NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
-T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
-# How a user asks for the box that a file says it covers.
-BOX = "box"
-METRES_A_DEGREE = 111_195.0  # of latitude
 MOST_TILES = 10_000
-POLYGONAL = {"Polygon", "MultiPolygon"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +35,7 @@ class Area:
 
     @property
     def boxes(self) -> tuple[tuple[float, float, float, float], ...]:
-        """The bounds; those of either side of 180 degrees, where the area lies on both."""
+        """The bounds, or two boxes for an area that crosses 180 degrees of longitude."""
         west, _, east, _ = self.bounds
         parts = shapely.get_parts(self.polygon)
         eastern = shapely.get_x(shapely.centroid(parts)) > 0
@@ -64,7 +47,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """A box of an area that is asked for in parts, and how often it was split."""
+    """A box of an area that is requested in parts, and how often it was split."""
 
     bounds: tuple[float, float, float, float]
     splits: int = 0
@@ -74,17 +57,20 @@ class Tile:
         west, south, east, north = self.bounds
         xs = [west + (east - west) * i / columns for i in range(columns + 1)]
         ys = [south + (north - south) * i / rows for i in range(rows + 1)]
-        for bottom, top in itertools.pairwise(ys):
-            for left, right in itertools.pairwise(xs):
-                yield Tile((left, bottom, right, top), splits)
+        for y_min, y_max in itertools.pairwise(ys):
+            for x_min, x_max in itertools.pairwise(xs):
+                yield Tile((x_min, y_min, x_max, y_max), splits)
 
     def quarters(self, area: Area) -> list[Tile]:
-        """Return those of its four parts that touch an area."""
+        """Return the quarters of the tile that touch an area."""
         return _touching(area, self.parts(2, 2, splits=self.splits + 1))
 
 
 def tiles_of(area: Area, tile_deg: float, *, remedy: str) -> list[Tile]:
-    """Return tiles of at most so many degrees that touch an area; InputError for too many."""
+    """Return the tiles of at most `tile_deg` degrees that touch an area.
+
+    InputError if there are too many; `remedy` is the advice in its message.
+    """
     if not tile_deg > 0:
         raise InputError(f"tile_deg is {tile_deg}; give degrees above 0.")
     shapely.prepare(area.polygon)
@@ -105,165 +91,8 @@ def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:
     return [tile for tile in tiles if area.polygon.intersects(shapely.box(*tile.bounds))]
 
 
-def parse_area(text: str | gpd.GeoDataFrame) -> Area:
-    """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or a file of them."""
-    if isinstance(text, gpd.GeoDataFrame):
-        return _joined(text.geometry, "the table", name="table", kind="table")
-    if NUMBERS.fullmatch(text):
-        return _box(text)
-    if names_place(text):
-        raise InputError(
-            f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
-            "degrees, or the path of a file with polygons."
-        )
-    return _outline(Path(text))
-
-
-def names_place(text: str) -> bool:
-    """Tell whether a text names a place: it is neither numbers nor a file, even a missing one."""
-    path = Path(text)
-    is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
-    return not is_file and not NUMBERS.fullmatch(text)
-
-
-def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tuple[RawLayer, ...]:
-    """Leave out what is outside an area.
-
-    Parameters
-    ----------
-    layers : sequence of RawLayer
-        The layers.
-    text : str or GeoDataFrame
-        ``west,south,east,north`` in degrees, the path of a file with polygons, a table of them, or
-        ``"box"`` for the boxes that OpenStreetMap files say they cover.
-
-    Returns
-    -------
-    tuple of RawLayer
-        The layers; rows outside count as such. InputError if the area is none, or no file says
-        its box.
-
-    Examples
-    --------
-    >>> from semsig_gis import CitySpec, clip_layers, synthetic_city
-    >>> layers = synthetic_city(CitySpec(size=300.0))
-    >>> [layer.counts.kept for layer in clip_layers(layers[:2], "2.3,48.8,2.4,48.9")]
-    [0, 0]
-    """
-    if not isinstance(text, str) or text != BOX:
-        area = parse_area(text)
-    else:
-        boxes = [layer.extent.polygon for layer in layers if layer.extent is not None]
-        polygon = join_areas(np.array(boxes, dtype=object))
-        if polygon is None:
-            raise InputError(
-                f"none of the files states the area that it covers, so there is no {BOX!r} to clip "
-                "to; write west,south,east,north in degrees, or the path of a file with polygons."
-            )
-        area = Area(polygon, BOX)
-    return tuple(clip_layer(layer, area) for layer in layers)
-
-
-def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
-    """Leave out the rows of a layer that are outside an area.
-
-    Objects stay where their centroid is in the area, buildings and streets where they touch it. A
-    row without a position stays.
-    """
-    outside, _ = _outside(layer, area)
-    kept = layer.table[~outside].reset_index(drop=True)
-    counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
-    return dataclasses.replace(layer, table=kept, counts=counts)
-
-
-def note_outside(layer: RawLayer) -> RawLayer:
-    """Tell of rows outside the box that the source says it covers, which may be mistakes."""
-    if layer.extent is None:
-        return layer
-    outside, places = _outside(layer, layer.extent)
-    if not outside.any():
-        return layer
-    metres = shapely.distance(places, _narrowed(layer.extent.polygon, layer.extent))
-    note = (
-        f"{outside.sum():,} of {len(outside):,} rows are outside the box that the file says it "
-        f"covers, by up to {metres.max() * METRES_A_DEGREE:,.0f} m; --clip {BOX} leaves them out"
-    )
-    return dataclasses.replace(layer, notes=(*layer.notes, note))
-
-
-def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np.object_]]:
-    """Tell which rows of a layer are outside an area, and where these are, narrowed."""
-    geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
-    shapely.prepare(area.polygon)
-    outside = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
-    outside &= ~shapely.covers(area.polygon, geometry)
-    places = _narrowed(geometry[outside], area)
-    if layer.spec.role == "objects":
-        places = shapely.centroid(places)
-    narrowed = _narrowed(area.polygon, area)
-    shapely.prepare(narrowed)
-    apart = ~shapely.intersects(narrowed, places)
-    outside[outside] = apart
-    return outside, places[apart]
-
-
-def _narrowed(geometry: T, area: Area) -> T:
-    """Return geometries in degrees as wide as these are around an area, as lengths are there."""
-    _, south, _, north = area.bounds
-    width = np.array([math.cos(math.radians((south + north) / 2)), 1.0])
-    narrowed: T = shapely.transform(geometry, lambda xy: xy * width)
-    return narrowed
-
-
-def _box(text: str) -> Area:
-    try:
-        west, south, east, north = (float(number) for number in text.split(","))
-    except ValueError as error:
-        raise InputError(
-            f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
-        ) from error
-    # What seems to go round more than half of the Earth is a slip.
-    across = east < west and east + FULL_TURN - west < HALF_TURN
-    on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
-    if not (on_earth and (west < east or across)) or not (
-        -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
-    ):
-        raise InputError(
-            f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
-            "west below east within -180 to 180, or above it across 180 degrees, and south below "
-            "north within -90 to 90."
-        )
-    spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
-    boxes = [shapely.box(left, south, right, north) for left, right in spans if left < right]
-    return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
-
-
-def _outline(path: Path) -> Area:
-    polygons = LayerSpec(name="area", class_name="", geometry="polygon")
-    layer = vector_file.read_layer(path, polygons)
-    if layer.errors:
-        raise InputError(
-            f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
-        )
-    return _joined(layer.table.geometry, str(path), name=path.stem, kind="file")
-
-
-def _joined(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
-    """Return the area of polygons, which are all that there may be."""
-    if shapes.crs is None:
-        raise CrsError(f"{where} has no coordinate reference system; state it with set_crs.")
-    geometry = shapes.dropna()
-    others = sorted(set(geometry.geom_type) - POLYGONAL)
-    polygon = None if others else join_areas(geometry.to_crs(WGS84).to_numpy())
-    if polygon is None:
-        kinds = ", ".join(others) or "nothing"
-        what = "encloses no area" if len(geometry) and not others else f"contains {kinds}"
-        raise InputError(f"{where} {what}; give a {kind} of polygons.")
-    return Area(polygon, name)
-
-
 def join_areas(geometry: NDArray[np.object_]) -> shapely.Polygon | shapely.MultiPolygon | None:
-    """Return the union of what geometries enclose, in valid form; None where that is nothing."""
+    """Return the valid union of the areas of geometries, or None if they have no area."""
     parts = shapely.get_parts(shapely.make_valid(geometry))
     polygons = shapely.get_parts(parts[shapely.get_dimensions(parts) == 2])  # noqa: PLR2004
     joined = shapely.union_all(polygons)

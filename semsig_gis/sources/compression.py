@@ -1,4 +1,4 @@
-"""Packed files, and how much may come out of them."""
+"""Compressed files: refuse files that would fill a disk or the memory."""
 
 from __future__ import annotations
 
@@ -8,51 +8,54 @@ import gzip
 import zlib
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Text about a city shrinks to a tenth or a thirtieth, fields that are all blank to less; a file
-# that is made to fill a disk shrinks to a thousandth.
-MOST_RATIO = 250
-# What is no longer than this does no harm, however well it is packed.
+# Text about a city is compressed 10 to 30 times, columns of blanks more; a file that is made to
+# fill a disk about 1,000 times.
+MAX_RATIO = 250
+# A result up to this size is harmless, whatever the ratio.
 HARMLESS_BYTES = 2**27
-# As much of a file shows how well it is packed.
+# The ratio of this many bytes represents the ratio of the file.
 SAMPLE_BYTES = 2**23
-BLOCK = 2**20
+READ_BYTES = 2**20
 
 
-def swells(packed: int, unpacked: int) -> bool:
-    """Tell whether so many bytes are too many to come out of so few."""
-    return unpacked > max(HARMLESS_BYTES, MOST_RATIO * packed)
+def ratio_too_high(compressed: int, uncompressed: int) -> bool:
+    """Whether the compression ratio is suspicious; sizes are in bytes."""
+    return uncompressed > max(HARMLESS_BYTES, MAX_RATIO * compressed)
 
 
-def bomb(what: object, remedy: str = "if you trust it, give what is inside") -> SourceError:
-    """Return the plain sentence for a packed file out of which too much comes."""
+def decompression_bomb_error(
+    what: object, remedy: str = "if you trust it, give what is inside"
+) -> SourceError:
+    """Return the error for a file with a compression ratio that is too high."""
     return SourceError(
-        f"{what} unpacks to more than {MOST_RATIO} times its size, as archives made to fill a disk "
+        f"{what} unpacks to more than {MAX_RATIO} times its size, as archives made to fill a disk "
         f"do; {remedy}."
     )
 
 
-def require_modest(path: Path) -> None:
-    """Refuse a ``.gz`` or ``.bz2`` file whose beginning swells; other files pass.
+def check_compression_ratio(path: Path) -> None:
+    """Raise SourceError if the start of a ``.gz`` or ``.bz2`` file is compressed too highly.
 
-    Damage is for the reader to tell.
+    Other files pass. Damaged files are reported by the reader.
     """
     suffix = path.suffix.lower()
     if suffix not in {".gz", ".bz2"}:
         return
-    unpacked = 0
+    uncompressed = 0
     with (
-        path.open("rb") as packed,
-        gzip.GzipFile(fileobj=packed) if suffix == ".gz" else bz2.BZ2File(packed) as stream,
+        path.open("rb") as compressed,
+        gzip.GzipFile(fileobj=compressed) if suffix == ".gz" else bz2.BZ2File(compressed) as stream,
         contextlib.suppress(EOFError, OSError, zlib.error),
     ):
-        while block := stream.read(BLOCK):
-            unpacked += len(block)
-            if swells(packed.tell(), unpacked):
-                raise bomb(path)
-            if unpacked > SAMPLE_BYTES and unpacked <= MOST_RATIO * packed.tell():
+        while block := stream.read(READ_BYTES):
+            uncompressed += len(block)
+            if ratio_too_high(compressed.tell(), uncompressed):
+                raise decompression_bomb_error(path)
+            # Enough was read, and its ratio is low: accept the file.
+            if SAMPLE_BYTES < uncompressed <= MAX_RATIO * compressed.tell():
                 return

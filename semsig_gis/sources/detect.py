@@ -1,21 +1,22 @@
-"""What files say of themselves: which catalogue theirs is."""
+"""Detect the catalogue of a file from its contents."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.sources import file_reader, files_in, require_file
-from semsig_gis.sources.parquet import SUFFIXES, column_names
+from semsig_gis.core import InputError
+from semsig_gis.sources.files import file_reader
+from semsig_gis.sources.paths import files_in, require_file
+from semsig_gis.sources.probe import probe_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-# Of every table of Overture Maps.
-OVERTURE = frozenset({"id", "version", "sources", "bbox"})
-# The catalogue of a file by its reader, and what a user is told that it was taken for.
-TOLD = {
+# Columns that every table of Overture Maps has.
+OVERTURE_COLUMNS = frozenset({"id", "version", "sources", "bbox"})
+# Catalogue of a file by its reader, and a description of the file for the user.
+CATALOG_OF_READER = {
     "osm_features": ("openstreetmap", "elements of OpenStreetMap, by its columns"),
     "osm_file": ("openstreetmap", "an extract of OpenStreetMap"),
     "overpass": ("openstreetmap", "an answer of an Overpass server"),
@@ -23,10 +24,10 @@ TOLD = {
 }
 
 
-def told_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the catalogues of files that tell them, and a line on each file.
+def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Detect the catalogue of each file; return the catalogues' names and a line on each file.
 
-    InputError if one of the files, or of those in a folder, does not tell what it holds.
+    Of a folder, every data file in it is examined. InputError if a file cannot be assigned.
     """
     names: list[str] = []
     lines: list[str] = []
@@ -34,22 +35,22 @@ def told_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple[s
         if not path.is_dir():
             require_file(path, "a file or a folder of files")
         files = files_in(path) if path.is_dir() else [path]
-        silent = next((file for file in files if _reader(file) is None), None if files else path)
-        if silent is not None:
-            raise InputError(
-                f"{silent} does not say what it contains; name its catalogue with --catalog "
-                "(`semsig sources` lists them), or draft one with `semsig draft`."
-            )
-        for file in files:
-            name, what = TOLD[str(_reader(file))]
+        for file in files or [path]:
+            reader = _reader(file) if files else None
+            if reader is None:
+                raise InputError(
+                    f"{file} does not say what it contains; name its catalogue with --catalog "
+                    "(`semsig sources` lists them), or draft one with `semsig draft`."
+                )
+            name, description = CATALOG_OF_READER[reader]
             names.append(name)
-            lines.append(f"{file} is read as {what}, with the catalogue {name}")
+            lines.append(f"{file} is read as {description}, with the catalogue {name}")
     return tuple(dict.fromkeys(names)), tuple(lines)
 
 
 def _reader(path: Path) -> str | None:
-    """Return the reader that a file tells by its name or by what is in it."""
+    """Return the reader of a file that its name or its columns identify, or None."""
     reader = file_reader(path, sure=True)
-    if reader is None and path.suffix.lower() in SUFFIXES:
-        return "overture" if OVERTURE.issubset(column_names(path)) else None
+    if reader is None and any(map(OVERTURE_COLUMNS.issubset, probe_file(path).columns)):
+        return "overture"
     return reader

@@ -17,13 +17,10 @@ from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, World, random_town
 
-from semsig_gis.database.file import save_database
-from semsig_gis.database.sightings import views_at
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.evaluation.file import open_evaluation
-from semsig_gis.localization.likelihood.answer_rule import open_rule
-from semsig_gis.localization.noise.model import open_noise
-from semsig_gis.objects.table import save_objects
+from semsig_gis.database import ObjectStore, save_database, save_with_store, visible_objects_at
+from semsig_gis.evaluation import open_evaluation
+from semsig_gis.localization import open_noise, open_rule
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -44,7 +41,7 @@ def city(tmp_path: Path) -> Path:
 
 def seen_from(xy: np.ndarray) -> dict[str, Any]:
     """Return what a faultless detector tells from a place."""
-    view = views_at(STORE.objects, xy[None], index=STORE.index, radius=30.0)
+    view = visible_objects_at(STORE.objects, xy[None], index=STORE.index, radius=30.0)
     return {"types": CITY.taxonomy.decode(view.codes), "bearings": view.bearings.tolist()}
 
 
@@ -283,7 +280,7 @@ def samples(count: int, *, seed: int = 0) -> list[dict[str, Any]]:
     rng = np.random.default_rng(seed)
     rows = []
     for place in CORNER + rng.uniform(20, 180, (count, 2)):
-        view = views_at(STORE.objects, place[None], index=STORE.index, radius=30.0)
+        view = visible_objects_at(STORE.objects, place[None], index=STORE.index, radius=30.0)
         kept = rng.random(len(view.codes)) < 0.8
         angles = (view.bearings[kept] + rng.normal(0, 4.0, int(kept.sum()))) % 360.0
         seen = {"types": CITY.taxonomy.decode(view.codes[kept]), "bearings": angles.tolist()}
@@ -317,7 +314,7 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
 def test_ranges_and_fading_are_learnt_and_told(city: Path, run: Run) -> None:
     rng, rows = np.random.default_rng(1), []
     for place in CORNER + rng.uniform(20, 180, (250, 2)):
-        view = views_at(STORE.objects, place[None], index=STORE.index, radius=30.0)
+        view = visible_objects_at(STORE.objects, place[None], index=STORE.index, radius=30.0)
         chances = np.interp(view.distances, [6.0, 30.0], [0.95, 0.1])
         kept = rng.random(len(view.codes)) < chances
         ranges = view.distances[kept] * np.exp(rng.normal(0, 0.2, int(kept.sum())))

@@ -15,10 +15,9 @@ from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.evaluation.identifiability import identify as identifying
-from semsig_gis.objects.surroundings import save_surroundings
+from semsig_gis.database import ObjectStore, build_database, save_with_store
+from semsig_gis.evaluation.identifiability import analysis
+from semsig_gis.objects import save_surroundings
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -87,8 +86,8 @@ def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, done: Done) ->
 
 
 def test_everything_on_one_map(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick = functools.partial(identifying.identify, trials=60, class_trials=5)
-    monkeypatch.setattr(identifying, "identify", quick)
+    quick = functools.partial(analysis.identify, trials=60, class_trials=5)
+    monkeypatch.setattr(analysis, "identify", quick)
     done("evaluate city.parquet --queries 5 --out evaluation")
     done("identify city.parquet")
     done("localize city.parquet --types DD --method likelihood --out answer.tif")

@@ -16,7 +16,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from semsig_gis.core.symbology import (
+from semsig_gis.core import (
     ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
@@ -36,8 +36,8 @@ from semsig_gis.core.symbology import (
     ClassSign,
     group_labels,
 )
-from semsig_gis.exports.styles import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
-from semsig_gis.maps.page_elements import OUTLINES, mark_svg
+from semsig_gis.exports import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
+from semsig_gis.maps import OUTLINES, mark_svg
 from semsig_gis.reports import axes, plots, scenes
 
 SIGHTS = {
@@ -88,7 +88,7 @@ def script(name: str) -> str:
     return resources.files("semsig_gis.maps").joinpath("js", name).read_text(encoding="utf-8")
 
 
-(POINTED,) = re.findall(r'pointed: "(#\w{6})"', script("layers.js"))
+(POINTED,) = re.findall(r'highlight: "(#\w{6})"', script("layers.js"))
 LIGHT_PAPER, DARK_PAPER = re.findall(r"--paper: (#\w{6})", script("page.css"))
 GROUND = re.findall(r'dark \? "(#\w{6})" : "(#\w{6})"', script("ground.js"))
 FLIPPED, LIFTED = (

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core import effort
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError, effort
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 from machine import PATIENCE_S
 from numba.core.caching import CompileResultCacheImpl
 
-from semsig_gis.core.jit import compiled
+from semsig_gis.core import compiled
 
 if TYPE_CHECKING:
     import pytest
 
 
-def test_without_a_folder_for_the_code_it_is_compiled_for_this_process(
+def test_without_a_cache_folder_code_is_compiled_in_each_process(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(CompileResultCacheImpl, "_locator_classes", [])
     assert compiled(lambda number: number + 1)(1) == 2
 
 
-def test_code_is_kept_for_later_processes_which_load_no_compiler(tmp_path: Path) -> None:
+def test_later_processes_load_stored_code_without_the_compiler(tmp_path: Path) -> None:
     package = Path(__file__).parents[2]
     program = (
         "import sys\n"
@@ -33,7 +33,7 @@ def test_code_is_kept_for_later_processes_which_load_no_compiler(tmp_path: Path)
         "print(sum(scan.stats.cache_hits.values()), sum(scan.stats.cache_misses.values()))\n"
         "print('numba.core.inline_closurecall' in sys.modules)\n"
     )
-    seen = [
+    outputs = [
         subprocess.run(
             [sys.executable, "-W", "error", "-c", program],
             check=True,
@@ -45,4 +45,4 @@ def test_code_is_kept_for_later_processes_which_load_no_compiler(tmp_path: Path)
         ).stdout.split()
         for _ in range(2)
     ]
-    assert seen == [["[[0.]]", "0", "1", "True"], ["[[0.]]", "1", "0", "False"]]
+    assert outputs == [["[[0.]]", "0", "1", "True"], ["[[0.]]", "1", "0", "False"]]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pytest
 
-from semsig_gis.core.memory import raise_if_short, require_address_space
-from semsig_gis.database.file import save_database
+from semsig_gis.core import raise_if_short, require_address_space
+from semsig_gis.database import save_database
 
 if TYPE_CHECKING:
     from pathlib import Path

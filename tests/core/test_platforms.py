@@ -1,4 +1,4 @@
-"""What systems other than Linux lack, taken away here (see the table in docs/reliability.md)."""
+"""Features that other systems than Linux lack are disabled (see docs/reliability.md)."""
 
 from __future__ import annotations
 
@@ -11,47 +11,47 @@ import filelock
 import pytest
 
 from semsig_gis import open_cache
-from semsig_gis.core.memory import address_space_left
-from semsig_gis.core.temporary import own_folder
-from semsig_gis.core.threads import cores
-from semsig_gis.storage.whole import alone_in, exchanged, whole_folder
+from semsig_gis.core import cores, free_address_space, temporary_folder
+from semsig_gis.storage import exchange, folder_locked, whole_folder
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-def test_without_affinity_all_processors_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_cpu_affinity_all_processors_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     assert cores() == os.cpu_count()
 
 
-def test_without_limits_of_memory_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_resource_limits_there_is_no_address_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
-    assert address_space_left() is None
+    assert free_address_space() is None
 
 
-def test_without_locks_folders_are_made_and_go(
+def test_without_locks_temporary_folders_are_created_and_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_locks(*_: object, **__: object) -> NoReturn:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(filelock, "lock_descriptor", no_locks)
-    with own_folder(tmp_path) as one, own_folder(tmp_path) as two:
-        assert {*tmp_path.iterdir()} == {one, two}
+    with temporary_folder(tmp_path) as first, temporary_folder(tmp_path) as second:
+        assert {*tmp_path.iterdir()} == {first, second}
     assert list(tmp_path.iterdir()) == []
-    with alone_in(tmp_path) as alone:
+    with folder_locked(tmp_path) as alone:
         assert not alone
 
 
-def test_where_folders_cannot_be_opened_nobody_is_alone(
+def test_folder_that_cannot_be_opened_is_not_locked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> NoReturn:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(os, "open", refuse)
-    with alone_in(tmp_path) as alone:
+    with folder_locked(tmp_path) as alone:
         assert not alone
 
 
@@ -59,7 +59,7 @@ def test_without_exchange_a_folder_is_replaced_in_two_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert not exchanged(tmp_path, tmp_path)
+    assert not exchange(tmp_path, tmp_path)
     for text in ("old", "new"):
         with whole_folder(tmp_path / "city") as folder:
             (folder / "a.txt").write_text(text)
@@ -69,7 +69,7 @@ def test_without_exchange_a_folder_is_replaced_in_two_steps(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="its cache folder is elsewhere")
 @pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "HOME"])
-def test_downloads_are_kept_where_the_system_keeps_them(
+def test_downloads_are_in_the_cache_folder_of_the_system(
     variable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)

@@ -15,9 +15,15 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.core.plugins import CATALOGS, READERS, installed_catalogs, installed_readers
-from semsig_gis.objects.table import open_objects
+from semsig_gis.core import (
+    CATALOGS,
+    READERS,
+    CatalogError,
+    SourceError,
+    installed_catalogs,
+    installed_readers,
+)
+from semsig_gis.objects import open_objects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -160,4 +166,4 @@ def test_a_name_that_is_taken_is_an_error(install: Callable[..., None]) -> None:
     with refused(CatalogError, "'city'", "by north and by south", "uninstall"):
         installed_catalogs()
     with refused(SourceError, "'osm_file'", "semsig_gis itself", "by east"):
-        installed_readers(taken=["osm_file"])
+        installed_readers(reserved=["osm_file"])

@@ -10,10 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.signature import BEARING_UNITS, Signature, SignatureSpec, quantize
-from semsig_gis.database.sightings import Sightings, clockwise_order
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import (
+    BEARING_UNITS,
+    InputError,
+    Signature,
+    SignatureSpec,
+    UnknownNameError,
+    quantize,
+)
+from semsig_gis.database import SightingPairs, clockwise_order
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +95,7 @@ def order_of(rows: list[tuple[int, float, float, int]]) -> list[tuple[int, float
     viewpoint, bearing, distance, code = (np.array(part) for part in zip(*rows, strict=True))
     # Objects numbered backwards, so that their numbers cannot be what orders them.
     item = np.arange(len(rows))[::-1]
-    seen = Sightings(viewpoint, item, bearing.astype(float), distance.astype(float))
+    seen = SightingPairs(viewpoint, item, bearing.astype(float), distance.astype(float))
     order = clockwise_order(seen, code[::-1].astype(np.uint8))
     assert sorted(order.tolist()) == list(range(len(rows)))
     return [rows[row] for row in order]

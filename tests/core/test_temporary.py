@@ -1,4 +1,4 @@
-"""Hidden folders: they go with their process, and stay as long as it lives."""
+"""Temporary folders exist as long as their process."""
 
 from __future__ import annotations
 
@@ -6,24 +6,31 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from semsig_gis.core import temporary as scratch
-from semsig_gis.core.temporary import ASIDE, HALF_DONE, MACHINE, OWNER, own_folder, remove_abandoned
+from semsig_gis.core import (
+    BACKUP_FOLDER,
+    LOCK_FILE,
+    MACHINE_PREFIX,
+    TEMPORARY_PREFIX,
+    remove_abandoned,
+    temporary,
+    temporary_folder,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-def killed(parent: Path, name: str = MACHINE) -> Path:
-    """Return the folder of a process that was killed while it worked there."""
+def killed(parent: Path, name: str = MACHINE_PREFIX) -> Path:
+    """Create the folder of a killed process."""
     folder = parent / f"{name}killed"
     (folder / "deep").mkdir(parents=True)
     (folder / "deep" / "half.txt").write_text("half")
-    (folder / OWNER).touch()
+    (folder / LOCK_FILE).touch()
     return folder
 
 
-def test_a_folder_is_there_for_a_block(tmp_path: Path) -> None:
-    with own_folder(tmp_path) as folder:
+def test_folder_exists_in_the_block(tmp_path: Path) -> None:
+    with temporary_folder(tmp_path) as folder:
         assert folder.parent == tmp_path
         (folder / "deep").mkdir()
         (folder / "deep" / "a.txt").touch()
@@ -31,41 +38,41 @@ def test_a_folder_is_there_for_a_block(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interrupt_while_a_folder_is_made_leaves_nothing(
+def test_interrupt_during_creation_leaves_no_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(_: int, **_options: bool) -> bool:
+    def interrupt(_: int, **_options: bool) -> bool:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(scratch, "locked", interrupted)
-    with pytest.raises(KeyboardInterrupt), own_folder(tmp_path):
+    monkeypatch.setattr(temporary, "locked", interrupt)
+    with pytest.raises(KeyboardInterrupt), temporary_folder(tmp_path):
         pytest.fail("there is no folder to work in")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_next_one_removes_those_of_killed_processes_alone(tmp_path: Path) -> None:
-    elsewhere = killed(tmp_path, f"{HALF_DONE}0a1b2c3d-")  # another machine may hold it
-    unknown = tmp_path / f"{MACHINE}unknown"
+def test_only_folders_of_killed_processes_are_removed(tmp_path: Path) -> None:
+    other_machine = killed(tmp_path, f"{TEMPORARY_PREFIX}0a1b2c3d-")  # may be locked there
+    unknown = tmp_path / f"{MACHINE_PREFIX}unknown"
     (unknown / "deep").mkdir(parents=True)
     killed(tmp_path)
-    (tmp_path / f"{MACHINE}empty").mkdir()  # killed at once
-    with own_folder(tmp_path) as one, own_folder(tmp_path) as two:
-        assert {*tmp_path.iterdir()} == {one, two, elsewhere, unknown}
-    assert {*tmp_path.iterdir()} == {elsewhere, unknown}
+    (tmp_path / f"{MACHINE_PREFIX}empty").mkdir()  # killed at once
+    with temporary_folder(tmp_path) as first, temporary_folder(tmp_path) as second:
+        assert {*tmp_path.iterdir()} == {first, second, other_machine, unknown}
+    assert {*tmp_path.iterdir()} == {other_machine, unknown}
 
 
-def test_what_was_put_aside_is_put_back_where_its_place_is_empty(tmp_path: Path) -> None:
+def test_backup_is_restored_if_nothing_replaced_it(tmp_path: Path) -> None:
     for number, expected in enumerate(["old", "old"]):
-        aside = killed(tmp_path) / ASIDE
-        aside.mkdir()
-        (aside / "city").write_text("old" if number == 0 else "older")
+        backup = killed(tmp_path) / BACKUP_FOLDER
+        backup.mkdir()
+        (backup / "city").write_text("old" if number == 0 else "older")
         remove_abandoned(tmp_path)
         assert (tmp_path / "city").read_text() == expected
         assert [path.name for path in tmp_path.iterdir()] == ["city"]
 
 
 @pytest.mark.parametrize("name", ["nowhere", "n" * 5000])
-def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path, name: str) -> None:
+def test_folder_that_cannot_be_created_raises(tmp_path: Path, name: str) -> None:
     remove_abandoned(tmp_path / name)
-    with pytest.raises(OSError, match=name), own_folder(tmp_path / name):
+    with pytest.raises(OSError, match=name), temporary_folder(tmp_path / name):
         pytest.fail("the block must not run")

@@ -1,4 +1,4 @@
-"""Rows that the cores of a machine share."""
+"""Threads for rows and for tasks."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.threads import NotWantedError, each_in_order, share_rows, while_wanted
+from semsig_gis.core import InputError, WorkCancelledError, cancellable, each_in_order, share_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
 @pytest.mark.parametrize("cores", [1, 2, 5])
-def test_each_row_is_worked_on_once_also_within_a_part(
+def test_each_row_is_processed_once_also_in_nested_calls(
     cores: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("semsig_gis.core.threads.cores", lambda: cores)
@@ -27,11 +26,11 @@ def test_each_row_is_worked_on_once_also_within_a_part(
         outer[first:last] += 1
         own = threading.current_thread()
 
-        def within(some: np.ndarray) -> None:
+        def nested_work(rows: np.ndarray) -> None:
             assert cores == 1 or threading.current_thread() is own
-            inner[first + some[0] : first + some[1]] += 1
+            inner[first + rows[0] : first + rows[1]] += 1
 
-        share_rows(within, last - first, least=1)
+        share_rows(nested_work, last - first, least=1)
 
     for _ in range(3):  # more parts than there are threads
         share_rows(work, 1000, least=10)
@@ -39,48 +38,48 @@ def test_each_row_is_worked_on_once_also_within_a_part(
     assert (inner == 3).all()
 
 
-def test_what_is_not_wanted_any_more_goes_on_to_the_next_loop_alone() -> None:
-    done: list[int] = []
+def test_cancelled_work_stops_at_the_next_loop() -> None:
+    sizes: list[int] = []
 
     def work(part: np.ndarray) -> None:
-        done.append(len(part))
+        sizes.append(len(part))
 
-    with while_wanted(lambda: not done):
+    with cancellable(lambda: not sizes):
         share_rows(work, 1)
-        with pytest.raises(NotWantedError):
+        with pytest.raises(WorkCancelledError):
             share_rows(work, 1)
     share_rows(work, 1)
-    with pytest.raises(NotWantedError), while_wanted(lambda: False):
+    with pytest.raises(WorkCancelledError), cancellable(lambda: False):
         share_rows(work, 1)
-    assert len(done) == 2
+    assert len(sizes) == 2
 
 
 @pytest.mark.parametrize("cores", [1, 3])
-def test_items_are_worked_on_side_by_side_and_come_in_their_order(
+def test_items_are_processed_in_parallel_and_returned_in_order(
     cores: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("semsig_gis.core.threads.cores", lambda: cores)
-    meeting = threading.Barrier(cores)  # which nobody leaves before all are there
-    taken: list[int] = []
+    barrier = threading.Barrier(cores)
+    requested: list[int] = []
 
     def items() -> Iterator[int]:
         for number in range(1 + 4 * cores):
-            taken.append(number)
+            requested.append(number)
             yield number
 
     def square(number: int) -> int:
         if number:
-            meeting.wait(60.0)
+            barrier.wait(60.0)
         return number**2
 
     squares = []
     for number, result in enumerate(each_in_order(square, items())):
-        assert len(taken) <= number + 2 * cores + 1
+        assert len(requested) <= number + 2 * cores + 1
         squares.append(result)
     assert squares == [number**2 for number in range(1 + 4 * cores)]
 
 
-def test_an_error_of_the_items_comes_after_what_was_before_it() -> None:
+def test_error_of_the_items_is_raised_after_the_results_before_it() -> None:
     def items() -> Iterator[int]:
         yield from range(3)
         raise InputError("no more")
@@ -91,7 +90,7 @@ def test_an_error_of_the_items_comes_after_what_was_before_it() -> None:
     assert results == [0, 1, 2]
 
 
-def test_an_error_of_the_work_ends_it() -> None:
+def test_error_of_the_work_is_raised() -> None:
     def work(number: int) -> float:
         return 1 / number
 

@@ -21,14 +21,25 @@ from worlds import (
     worlds,
 )
 
-from semsig_gis.core import effort
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database import build
-from semsig_gis.database.build import build_database, visible_objects
-from semsig_gis.database.sightings import Sightings, ViewpointSpec, bearings
+from semsig_gis.core import (
+    CrsError,
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    PackedIndex,
+    SignatureSpec,
+    cells_near,
+    resources,
+    wrap_degrees,
+)
+from semsig_gis.database import (
+    SightingPairs,
+    ViewpointSpec,
+    bearings,
+    build,
+    build_database,
+    sightings_by_block,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,26 +54,26 @@ def look(
     places: object,
     ranges: float | NDArray[np.float64] = 30.0,
     grid: GridSpec = GRID,
-) -> Sightings:
+) -> SightingPairs:
     """Return all that is seen, ordered by cell and object."""
     objects = np.asarray(places, dtype=float)
     columns, rows = np.asarray(cells).reshape(-1, 2).T
     index, reach = PackedIndex(objects), np.broadcast_to(np.float64(ranges), len(objects))
-    end, parts = 0, [Sightings(*(np.empty(0, kind) for kind in (int, int, float, float)))]
-    for block, seen in visible_objects(
+    end, parts = 0, [SightingPairs(*(np.empty(0, kind) for kind in (int, int, float, float)))]
+    for block, seen in sightings_by_block(
         columns, rows, objects, grid=grid, index=index, ranges=reach
     ):
         assert block.start == end
         end = block.stop
         size = block.stop - block.start
         assert ((seen.viewpoint >= 0) & (seen.viewpoint < size)).all()
-        assert len(seen.object) <= build.PAIRS_A_BLOCK or size == 1
+        assert len(seen.object) <= build.PAIRS_PER_BLOCK or size == 1
         moved = seen.viewpoint + block.start
-        parts.append(Sightings(moved, seen.object, seen.bearing, seen.distance))
+        parts.append(SightingPairs(moved, seen.object, seen.bearing, seen.distance))
     assert end == len(columns)
     names = ("viewpoint", "object", "bearing", "distance")
-    whole = Sightings(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
-    return whole.only(np.lexsort((whole.object, whole.viewpoint)))
+    whole = SightingPairs(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+    return whole.take(np.lexsort((whole.object, whole.viewpoint)))
 
 
 def slow_look(
@@ -70,16 +81,16 @@ def slow_look(
     objects: NDArray[np.float64],
     ranges: NDArray[np.float64],
     grid: GridSpec,
-) -> Sightings:
+) -> SightingPairs:
     """Measure every pair there is."""
     delta = objects[None] - grid.viewpoints(*cells.T)[:, None]
     distance = np.hypot(delta[..., 0], delta[..., 1])
     bearing = wrap_degrees(np.round(bearings(delta[..., 0], delta[..., 1]), 9))
     viewpoint, item = np.nonzero(distance <= ranges)
-    return Sightings(viewpoint, item, bearing[viewpoint, item], distance[viewpoint, item])
+    return SightingPairs(viewpoint, item, bearing[viewpoint, item], distance[viewpoint, item])
 
 
-def assert_equal(one: Sightings, other: Sightings) -> None:
+def assert_equal(one: SightingPairs, other: SightingPairs) -> None:
     for name in ("viewpoint", "object", "bearing", "distance"):
         assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
 
@@ -129,8 +140,8 @@ def test_what_is_seen_is_what_measuring_every_pair_finds(
     near = np.stack(cells_near(objects, grid=grid, radius=radius), axis=-1)
     chosen = np.flatnonzero(rng.random(len(near)) < max(kept, 5 / len(near)))[:3000]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build, "CELLS_A_BLOCK", blocks[0])
-        patch.setattr(build, "PAIRS_A_BLOCK", blocks[1])
+        patch.setattr(build, "CELLS_PER_BLOCK", blocks[0])
+        patch.setattr(build, "PAIRS_PER_BLOCK", blocks[1])
         found = look(near[chosen], objects, ranges, grid)
     assert_equal(found, slow_look(near[chosen], objects, ranges, grid))
 
@@ -163,7 +174,7 @@ def test_objects_on_the_edge_of_a_level_belong_to_the_next(levels: int) -> None:
 def test_blocks_leave_no_seam(town: World, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = town.database
     calls: list[tuple[int, int]] = []
-    monkeypatch.setattr(build, "CELLS_A_BLOCK", size)
+    monkeypatch.setattr(build, "CELLS_PER_BLOCK", size)
     parts = build_database(
         town.street_objects, progress=lambda done, total: calls.append((done, total))
     )
@@ -241,7 +252,7 @@ def test_as_many_pairs_are_expected_as_there_are(town: World, radius: float, ste
 def test_what_the_memory_does_not_hold_is_not_begun(
     town: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(effort, "free_memory", lambda: 120_000_000)
+    monkeypatch.setattr(resources, "free_memory", lambda: 120_000_000)
     build_database(town.street_objects)
     with refused(InputError, "sightings", "0.1 GB are free", "smaller tiles"):
         build_database(town.street_objects, spec=SignatureSpec(3000.0))

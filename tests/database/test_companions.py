@@ -8,11 +8,15 @@ import pytest
 from sentences import refused
 from small_city import small_city
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.temporary import MACHINE, OWNER, own_folder
-from semsig_gis.database.companions import companions, remove_companions
-from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store
+from semsig_gis.core import LOCK_FILE, MACHINE_PREFIX, DatabaseError, InputError, temporary_folder
+from semsig_gis.database import (
+    ObjectStore,
+    companions,
+    open_database,
+    open_store,
+    remove_companions,
+    save_with_store,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,9 +31,9 @@ def city(tmp_path: Path) -> Path:
     save_with_store(DATABASE, ObjectStore.of(OBJECTS), path)
     (tmp_path / "city.parquet.generic-8d47.likelihood").write_bytes(b"1234")
     (tmp_path / "other.parquet.generic-8d47.likelihood").write_bytes(b"1234")
-    killed = tmp_path / f"{MACHINE}killed"
+    killed = tmp_path / f"{MACHINE_PREFIX}killed"
     killed.mkdir()
-    (killed / OWNER).touch()
+    (killed / LOCK_FILE).touch()
     (killed / "half").write_bytes(b"12")
     (tmp_path / "city.objects.next").mkdir()
     (tmp_path / "city.objects.next" / "manifest.json").write_bytes(b"123")
@@ -50,7 +54,7 @@ def test_all_that_lies_beside_a_database_is_listed(city: Path) -> None:
         "city.objects": (store, True),
         "city.objects.next": (3, False),
         "city.parquet.generic-8d47.likelihood": (4, False),
-        f"{MACHINE}killed": (2, False),
+        f"{MACHINE_PREFIX}killed": (2, False),
     }
 
 
@@ -73,7 +77,7 @@ def test_street_objects_are_removed_where_that_is_asked_for(city: Path) -> None:
 
 
 def test_a_run_at_work_is_left_alone(city: Path) -> None:
-    with own_folder(city.parent) as folder:
+    with temporary_folder(city.parent) as folder:
         assert found(city)[folder.name] == (0, True)
         remove_companions(city)
         assert folder.is_dir()

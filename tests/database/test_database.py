@@ -13,19 +13,21 @@ from sentences import refused
 from worlds import ARRAYS, TAXONOMY, assert_same
 
 import semsig_gis
-from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import SequenceTable, checked_sequence, join_databases
-from semsig_gis.database.file import open_database
-from semsig_gis.database.sightings import ViewpointSpec
+from semsig_gis.core import DatabaseError, GridSpec, InputError, SignatureSpec, UnknownNameError
+from semsig_gis.database import (
+    SequenceTable,
+    ViewpointSpec,
+    checked_sequence,
+    join_databases,
+    open_database,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 def test_cells_are_ordered_and_numbered(database: SignatureDatabase) -> None:
@@ -140,7 +142,7 @@ def test_distinct_sequences_by_length_then_first_appearance(rows: list[list[int]
 def test_histogram_counts_every_value_block_by_block(rows: list[list[int]], block: int) -> None:
     table = table_of(rows)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("semsig_gis.database.database.HISTOGRAM_BLOCK", block)
+        patch.setattr("semsig_gis.database.sequences.HISTOGRAM_BLOCK", block)
         histogram = table.histogram
     assert histogram.dtype == np.uint16
     width = max((value + 1 for row in rows for value in row), default=0)

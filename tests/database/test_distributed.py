@@ -18,17 +18,15 @@ from machine import PATIENCE_S, largest_file
 from sentences import refused
 from worlds import CODES, CORNER, World, assert_same, random_town
 
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core import DatabaseError, InputError
+from semsig_gis.database import TileSpec, build_tile, build_tiles, open_database, save_database
 from semsig_gis.database import tiles as distributed
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles
-from semsig_gis.objects.table import save_objects
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-    from semsig_gis.database.file import Part
-    from semsig_gis.database.tiles import TilePlan
+    from semsig_gis.database import Part, TilePlan
 
 SIDE = 200.0
 CHECKOUT = Path(distributed.__file__).parents[2]

@@ -11,25 +11,29 @@ import shapely
 from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_same, objects_of, surroundings
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.merge import merge_databases
-from semsig_gis.database.sightings import ViewpointSpec
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
-from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.objects.table import Licence, save_objects
+from semsig_gis.core import DatabaseError, GridSpec, SignatureSpec, Taxonomy
+from semsig_gis.database import (
+    ObjectStore,
+    TileSpec,
+    ViewpointSpec,
+    build_database,
+    build_tiles,
+    merge_databases,
+    open_database,
+    open_store,
+    save_database,
+    save_with_store,
+    store_path,
+)
+from semsig_gis.objects import Licence, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import geopandas as gpd
 
-    from semsig_gis.database.sightings import Mode
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import ViewpointMode
+    from semsig_gis.objects import StreetObjects
 
 EAST = float(CORNER[0])
 CLASSES = Taxonomy(
@@ -60,7 +64,7 @@ STREETS = surroundings(
 def city(
     objects: StreetObjects,
     path: Path,
-    mode: Mode,
+    mode: ViewpointMode,
     west: float,
     east: float,
     **specs: Any,  # noqa: ANN401
@@ -96,7 +100,7 @@ def objects() -> StreetObjects:
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
 @pytest.mark.parametrize(("end", "start"), [(200, 200), (230, 170), (120, 300), (400, 0)])
 def test_a_merger_is_built_from_both(
-    objects: StreetObjects, tmp_path: Path, mode: Mode, end: float, start: float
+    objects: StreetObjects, tmp_path: Path, mode: ViewpointMode, end: float, start: float
 ) -> None:
     west = city(objects, tmp_path / "west.parquet", mode, 0, end)
     east = city(objects, tmp_path / "east.parquet", mode, start, 400)
@@ -140,7 +144,7 @@ def test_tiles_are_merged_into_a_file(objects: StreetObjects, tmp_path: Path) ->
     assert_same(open_database(region), open_database(expected))
 
 
-def _whole(objects: StreetObjects, mode: Mode) -> tuple[Any, ObjectStore]:
+def _whole(objects: StreetObjects, mode: ViewpointMode) -> tuple[Any, ObjectStore]:
     around: dict[str, Any] = {
         "footprints": None if mode == "all" else HOUSES,
         "streets": STREETS if mode == "streets" else None,

@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database import occlusion
-from semsig_gis.database.occlusion import Footprints, buildings_near, hidden
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.core import InputError
+from semsig_gis.database import Footprints, buildings_near, hidden, occlusion
+from semsig_gis.sources import load_catalog
 from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:
@@ -148,7 +147,7 @@ def test_blocks_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     starts = starts[np.repeat(np.arange(100), 5)]
     footprints = Footprints(polygons)
     whole, inside = hidden(starts, ends, footprints=footprints), footprints.cover(starts)
-    monkeypatch.setattr(occlusion, "PAIRS_A_BLOCK", 7)
+    monkeypatch.setattr(occlusion, "PAIRS_PER_BLOCK", 7)
     assert np.array_equal(hidden(starts, ends, footprints=footprints), whole)
     assert np.array_equal(footprints.cover(starts), inside)
     assert 0 < whole.mean() < 1
@@ -160,7 +159,7 @@ EDGES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=40)
 @given(EDGES)
 def test_what_a_chain_of_pairs_joins_has_one_label(edges: list[tuple[int, int]]) -> None:
     first, second = np.array(edges, np.int64).reshape(-1, 2).T
-    labels = occlusion._joined(first, second, 31)
+    labels = occlusion._component_labels(first, second, 31)
     groups = [{thing} for thing in range(31)]
     for a, b in edges:
         joined = groups[a] | groups[b]

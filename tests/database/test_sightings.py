@@ -12,18 +12,27 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, TOWN, World, worlds
 
-from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cell_ids, wrap_degrees
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.database import viewpoints
-from semsig_gis.database.database import views_in
-from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.sightings import ViewpointSpec, bearings, views_at
-from semsig_gis.database.viewpoints import choose_viewpoints
-from semsig_gis.localization.likelihood.off_centre import views_off_centre
+from semsig_gis.core import (
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    ObjectIndex,
+    cell_ids,
+    wrap_degrees,
+)
+from semsig_gis.database import (
+    Footprints,
+    ViewpointSpec,
+    bearings,
+    choose_viewpoints,
+    viewpoints,
+    visible_objects_at,
+    visible_objects_in,
+)
+from semsig_gis.localization import visible_objects_off_centre
 
 if TYPE_CHECKING:
-    from semsig_gis.database.sightings import Mode
+    from semsig_gis.database import ViewpointMode
 
 
 # --- Viewpoints -------------------------------------------------------------------------------
@@ -69,7 +78,7 @@ def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
     reaches = np.where(np.isnan(widths), 8.0, widths)
     spec = ViewpointSpec(mode="streets")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(viewpoints, "CELLS_A_BLOCK", block)
+        patch.setattr(viewpoints, "PLACES_PER_BLOCK", block)
         one = choose(spec, streets=[*lines, None, shapely.LineString()])
         own = choose(spec, streets=lines, widths=widths)
     assert one == [min(line.distance(centre) for line in lines) <= 8 for centre in CENTRES]
@@ -90,7 +99,7 @@ def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
     ],
 )
 def test_what_does_not_serve_a_mode_is_refused(
-    mode: Mode, surroundings: dict[str, Any], words: list[str]
+    mode: ViewpointMode, surroundings: dict[str, Any], words: list[str]
 ) -> None:
     with refused(InputError, *words):
         choose(ViewpointSpec(mode=mode), **surroundings)
@@ -151,8 +160,8 @@ def test_the_viewpoints_of_a_database_see_what_it_says(world: World) -> None:
     except EmptyResultError:
         return
     cells = np.arange(len(database))[::-1]
-    stored = views_in(database, cells)
-    exact = views_at(
+    stored = visible_objects_in(database, cells)
+    exact = visible_objects_at(
         objects, database.xy[cells], index=ObjectIndex(objects.xy), radius=world.radius
     )
     assert stored.offsets.tolist() == exact.offsets.tolist()
@@ -167,7 +176,7 @@ def test_buildings_hide() -> None:
     world = World(((10.0, 0.0, CODES[0]), (-10.0, 0.0, CODES[0])))
     objects = world.street_objects
     wall = Footprints([shapely.box(4.0, -2.0, 6.0, 2.0)])
-    seen = views_at(
+    seen = visible_objects_at(
         objects, np.array([[0.0, 0.0]]), index=ObjectIndex(objects.xy), radius=30.0, footprints=wall
     )
     assert seen.objects.tolist() == [1]
@@ -182,11 +191,11 @@ def test_cells_tell_what_is_seen_between_their_middles() -> None:
     assert len(cells) > 20
     index = ObjectIndex(objects.xy)
     places = np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 2.0], [0.0, -4.0]])
-    seen = views_off_centre(database, cells, places)
+    seen = visible_objects_off_centre(database, cells, places)
     assert len(seen) == len(places) * len(cells)
     for number, place in enumerate(places):
         views = np.arange(number, len(seen), len(places))
-        true = views_at(objects, database.xy[cells] + place, index=index, radius=30.0)
+        true = visible_objects_at(objects, database.xy[cells] + place, index=index, radius=30.0)
         # Places are good to some decimetres, by which an object may be in range or not.
         same = seen.lengths[views] == true.lengths
         assert same.mean() > 0.9

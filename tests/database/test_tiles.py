@@ -17,40 +17,40 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, CORNER, World, assert_same, worlds
 
-from semsig_gis.core import effort
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
     CrsError,
     DatabaseError,
     EmptyResultError,
+    GridSpec,
     InputError,
+    SignatureSpec,
     SourceError,
+    resources,
 )
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database import tiles
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import MANIFEST, open_database, part_name, save_database
-from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
-from semsig_gis.database.sightings import ViewpointSpec
-from semsig_gis.database.tiles import (
+from semsig_gis.database import (
+    MANIFEST,
+    TOLERANCE_M,
+    Footprints,
     TileSpec,
+    ViewpointSpec,
     begin,
+    build_database,
     build_tiles,
     describe,
     finished_tiles,
+    open_database,
+    part_name,
     plan_tiles,
     publish,
+    save_database,
+    tiles,
     touched_tiles,
 )
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
 
 if TYPE_CHECKING:
-    from semsig_gis.core.errors import SemsigError
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import Part
-    from semsig_gis.database.sightings import Mode
-    from semsig_gis.database.tiles import TilePlan
+    from semsig_gis.core import SemsigError
+    from semsig_gis.database import Part, SignatureDatabase, TilePlan, ViewpointMode
 
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:
@@ -140,7 +140,7 @@ def houses_and_streets() -> dict[str, gpd.GeoDataFrame]:
     [("all", ".parquet"), ("outdoor", ".parquet"), ("streets", ".parquet"), ("streets", ".gpkg")],
 )
 def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
-    town: World, tmp_path: Path, mode: Mode, suffix: str
+    town: World, tmp_path: Path, mode: ViewpointMode, suffix: str
 ) -> None:
     # A lamp where there is no building and no street near.
     town = World((*town.objects, (CORNER[0] + 900, CORNER[1] + 900, CODES[0])))
@@ -363,7 +363,7 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
 def test_tiles_that_the_memory_does_not_hold_are_not_begun(
     objects_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(effort, "free_memory", lambda: 150_000_000)
+    monkeypatch.setattr(resources, "free_memory", lambda: 150_000_000)
     build_tiles(objects_file, tmp_path / "city", tile=TileSpec(80.0))
     with refused(InputError, "by each of 2 processes", "0.2 GB", "smaller tiles"):
         build_tiles(objects_file, tmp_path / "other", tile=TileSpec(80.0), workers=2)
@@ -390,7 +390,7 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
         return rename(self, to)
 
     with monkeypatch.context() as patch:
-        patch.setattr("semsig_gis.storage.whole.exchanged", lambda *_: False)
+        patch.setattr("semsig_gis.storage.whole.exchange", lambda *_: False)
         patch.setattr(Path, "rename", refuse)
         with refused(InputError, str(target), "Permission denied", "run the same command again"):
             publish(folder, [part])

@@ -18,34 +18,41 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_index_fits, assert_same, surroundings
 
-from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.database.build import build_cells, build_database
-from semsig_gis.database.file import open_database
-from semsig_gis.database.sightings import ViewpointSpec
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
-from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.database.update import (
+from semsig_gis.core import (
+    CrsError,
+    DatabaseError,
+    EmptyResultError,
+    InputError,
+    ObjectClass,
+    Taxonomy,
+)
+from semsig_gis.database import (
+    ObjectStore,
+    TileSpec,
+    ViewpointSpec,
+    build_cells,
+    build_database,
+    build_tiles,
     compare_cells,
+    open_database,
+    open_store,
+    save_with_store,
+    store_path,
     update_database,
     update_file,
     update_tile,
     update_tiles,
 )
-from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.objects.table import Licence, save_objects
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.objects import Licence, assemble, choose_layers, read_files, save_objects
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from worlds import World
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sightings import Mode
-    from semsig_gis.database.update import UpdateReport
-    from semsig_gis.objects.load import Loaded
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase, UpdateReport, ViewpointMode
+    from semsig_gis.objects import Loaded, StreetObjects
 
 # Two classes that are seen from further than the others, and one from nearer.
 RANGES = {CODES[0]: 45.0, CODES[1]: 12.5}
@@ -157,7 +164,7 @@ def check_report(report: UpdateReport, before: SignatureDatabase, after: Signatu
 @example(seed=2, size=120, edits=[30], houses=True, mode="streets", area=True)
 @example(seed=11, size=250, edits=[20] * 10, houses=True, mode="streets", area=False)
 def test_an_update_is_a_rebuild(
-    *, seed: int, size: int, edits: list[int], houses: bool, mode: Mode, area: bool
+    *, seed: int, size: int, edits: list[int], houses: bool, mode: ViewpointMode, area: bool
 ) -> None:
     rng = np.random.default_rng(seed)
     table = random_table(rng, size)
@@ -193,7 +200,7 @@ def test_an_update_is_a_rebuild(
 
 
 @pytest.mark.parametrize("mode", ["outdoor", "streets"])
-def test_far_from_buildings_and_streets(mode: Mode) -> None:
+def test_far_from_buildings_and_streets(mode: ViewpointMode) -> None:
     rng = np.random.default_rng(3)
     town, hamlet = random_table(rng, 80), random_table(rng, 30)
     hamlet[["x", "y"]] += 2000.0
@@ -325,7 +332,9 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
 @example(seed=1, side=130.0, edits=3, mode="streets")
 @example(seed=2, side=130.0, edits=0, mode="all")
 @settings(max_examples=3)
-def test_an_update_of_tiles_is_a_rebuild(*, seed: int, side: float, edits: int, mode: Mode) -> None:
+def test_an_update_of_tiles_is_a_rebuild(
+    *, seed: int, side: float, edits: int, mode: ViewpointMode
+) -> None:
     rng = np.random.default_rng(seed)
     table = random_table(rng, 60)
     options: dict[str, Any] = {
@@ -467,7 +476,7 @@ def monaco(geodata: Path, year: int) -> Loaded:
 
 
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
-def test_a_year_in_monaco(geodata: Path, tmp_path: Path, mode: Mode) -> None:
+def test_a_year_in_monaco(geodata: Path, tmp_path: Path, mode: ViewpointMode) -> None:
     before, after = monaco(geodata, 2021), monaco(geodata, 2022)
     given: dict[str, Any] = {"footprints": before.buildings, "streets": before.streets}
     given = {} if mode == "all" else given

@@ -13,24 +13,22 @@ from noisy_cells import noise_specs, random_database
 from pandas.testing import assert_frame_equal
 from sentences import refused
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.evaluation.evaluate import evaluate
-from semsig_gis.evaluation.file import (
+from semsig_gis.core import DatabaseError, InputError
+from semsig_gis.evaluation import (
+    NAMED_DISTORTIONS,
+    QuerySpec,
+    SimulatedDetector,
+    evaluate,
+    machine,
     open_evaluation,
+    parse_chain,
     save_evaluation,
     settings_from_dict,
     settings_to_dict,
     used_noises,
 )
-from semsig_gis.evaluation.queries.distortion_text import NAMED_DISTORTIONS, parse_chain
-from semsig_gis.evaluation.queries.distortions import Detector
-from semsig_gis.evaluation.queries.draw import QuerySpec
-from semsig_gis.evaluation.result import machine
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.metrics.edit import EditWeights
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.noise.model import NoiseSpec
-from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
+from semsig_gis.localization import EditWeights, LikelihoodMethod, Method, NoiseSpec
+from semsig_gis.storage import read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,9 +47,11 @@ EVALUATION = evaluate(
     number=st.integers(1, 99),
 )
 def test_settings_survive_json(
-    noise: NoiseSpec, kind: str, others: list[Detector], number: int
+    noise: NoiseSpec, kind: str, others: list[SimulatedDetector], number: int
 ) -> None:
-    asked = QuerySpec(number=number, seeds=(3, 0), distortions=(*others, Detector(noise=noise)))
+    asked = QuerySpec(
+        number=number, seeds=(3, 0), distortions=(*others, SimulatedDetector(noise=noise))
+    )
     by_chance = LikelihoodMethod(noise=noise, refined=True)
     method = by_chance if kind == "likelihood" else Method(keep=5, weights=EditWeights(insert=2))
     values = json.loads(json.dumps(settings_to_dict(method, asked), allow_nan=False))

@@ -11,18 +11,15 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, TAXONOMY, objects_of
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import Licence, open_objects, save_objects
+from semsig_gis.core import CrsError, InputError, ObjectClass, Taxonomy
+from semsig_gis.objects import Licence, compare_objects, open_objects, replace_layers, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from worlds import Thing
 
-    from semsig_gis.objects.changes import ObjectChanges
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import ObjectChanges, StreetObjects
 
 TREE, _, LAMP = CODES[:3]
 KINDS = ("same", "moved", "changed", "removed", "added")
@@ -57,8 +54,8 @@ def test_added_removed_moved_and_of_another_class() -> None:
     )
     changes = compare_objects(OLD, new)
     assert rows_of(changes) == ([[0, 0]], [[1, 1]], [[2, 2]], [3], [3, 4])
-    assert sorted(changes.gone.tolist()) == [1, 2, 3]
-    assert sorted(changes.come.tolist()) == [1, 2, 3, 4]
+    assert sorted(changes.obsolete_rows.tolist()) == [1, 2, 3]
+    assert sorted(changes.new_rows.tolist()) == [1, 2, 3, 4]
     assert [dataclasses.asdict(change) for change in changes.classes] == [
         {
             "class_name": "alignment_tree", "before": 2, "after": 3, "added": 0, "removed": 0,
@@ -93,12 +90,12 @@ THINGS = st.lists(
 def test_every_row_is_told_of_once(before: list[Thing], now: list[Thing]) -> None:
     old, new = table(*before), table(*now)
     changes = compare_objects(old, new)
-    assert sorted([*changes.same[:, 0], *changes.gone]) == list(range(len(old)))
-    assert sorted([*changes.same[:, 1], *changes.come]) == list(range(len(new)))
+    assert sorted([*changes.same[:, 0], *changes.obsolete_rows]) == list(range(len(old)))
+    assert sorted([*changes.same[:, 1], *changes.new_rows]) == list(range(len(new)))
     # What is gone and has come is what differs in class and place, and no more.
     looks = [Counter(thing[:3] for thing in things) for things in (before, now)]
-    assert Counter(before[row][:3] for row in changes.gone) == looks[0] - looks[1]
-    assert Counter(now[row][:3] for row in changes.come) == looks[1] - looks[0]
+    assert Counter(before[row][:3] for row in changes.obsolete_rows) == looks[0] - looks[1]
+    assert Counter(now[row][:3] for row in changes.new_rows) == looks[1] - looks[0]
     names = [Counter(thing[3:] for thing in things) for things in (before, now)]
     for kind, alike in ((changes.moved, True), (changes.changed, False)):
         for row, other in kind:

@@ -13,17 +13,10 @@ from pyproj import CRS
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.geometry import GridSpec, grid_convergence
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.file import PartitionedDatabase, save_database
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.observation.north import GRID_NORTH, North, declination
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.core import GridSpec, InputError, Signature, UnknownNameError, grid_convergence
+from semsig_gis.database import PartitionedDatabase, save_database
+from semsig_gis.localization import Method, build_index, localize, locate, named_noise
+from semsig_gis.observation import GRID_NORTH, North, Photo, View, declination
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,22 +50,26 @@ def test_north_is_that_of_the_middle_of_the_city(tmp_path: Path) -> None:
     # West of the middle of its zone, grid north lies west of true north.
     helsinki = moved("EPSG:32635", 386_000.0, 6_672_000.0)
     convergence = grid_convergence(helsinki.crs, helsinki.xy).mean()
-    true = North.of("true", helsinki)
+    true = North.of("true", helsinki.crs, helsinki.bounds)
     assert true.turn == pytest.approx(-convergence, abs=0.01)
     assert 1.7 < true.turn < 1.9
-    magnetic = North.of("magnetic", helsinki, date=DAY)
+    magnetic = North.of("magnetic", helsinki.crs, helsinki.bounds, date=DAY)
     assert magnetic.turn - true.turn == pytest.approx(10.10, abs=0.02)
     assert magnetic.to_dict()["date"] == "2024-05-31"
-    assert North.of("magnetic", helsinki).date is not None
-    assert North.of("grid", helsinki) == GRID_NORTH
+    assert North.of("magnetic", helsinki.crs, helsinki.bounds).date is not None
+    assert North.of("grid", helsinki.crs, helsinki.bounds) == GRID_NORTH
     save_database(helsinki, tmp_path / "part.parquet")
     parted = PartitionedDatabase((tmp_path / "part.parquet",), len(helsinki))
-    assert North.of("true", parted) == true
+    assert North.of("true", parted.crs, parted.bounds) == true
+    with pytest.warns(DeprecationWarning, match=r"database\.bounds"):
+        assert North.of("true", helsinki) == true
 
 
 def test_a_city_where_north_differs_is_told_of() -> None:
-    assert not North.of("true", moved("EPSG:32635", 386_000.0, 6_672_000.0)).notes
-    wide = North.of("true", moved("EPSG:32635", 386_000.0, 6_672_000.0, step=5000.0))
+    narrow = moved("EPSG:32635", 386_000.0, 6_672_000.0)
+    assert not North.of("true", narrow.crs, narrow.bounds).notes
+    city = moved("EPSG:32635", 386_000.0, 6_672_000.0, step=5000.0)
+    wide = North.of("true", city.crs, city.bounds)
     (note,) = wide.notes
     assert f"true north differs by up to {wide.spread:.1f}" in note
     assert localize(CITY, CITY.signature(CELL), north=wide, method=Method()).notes == (note,)
@@ -117,8 +114,8 @@ def test_bearings_are_turned_and_told_in_their_north() -> None:
 
 def test_what_is_no_north_is_refused() -> None:
     with refused(UnknownNameError, "'tru'", "nearest is 'true'"):
-        North.of("tru", CITY)  # type: ignore[arg-type]
+        North.of("tru", CITY.crs, CITY.bounds)  # type: ignore[arg-type]
     with refused(InputError, "true north"):
-        North.of("true", CITY, date=DAY)
+        North.of("true", CITY.crs, CITY.bounds, date=DAY)
     with refused(InputError, "2030-01-01", "1900-01-01 to 2029-12-31"):
-        North.of("magnetic", CITY, date=dt.date(2030, 1, 1))
+        North.of("magnetic", CITY.crs, CITY.bounds, date=dt.date(2030, 1, 1))

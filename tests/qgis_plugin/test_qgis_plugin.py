@@ -25,9 +25,8 @@ from machine import PATIENCE_S, qgis_variables, unavailable
 from small_city import small_city
 
 import semsig_gis
-from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.database import ObjectStore, open_database, save_with_store
+from semsig_gis.objects import open_objects, save_objects
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "qgis_plugin" / "semsig"
@@ -37,9 +36,9 @@ DATA = Path(__file__).with_name("data")  # three lamps, and their catalogue
 # The command with few simulated queries.
 QUICK = """
 import functools
-from semsig_gis.evaluation.identifiability import identify as identifying
+from semsig_gis.evaluation.identifiability import analysis
 from semsig_gis.cli import main
-identifying.identify = functools.partial(identifying.identify, trials=60, class_trials=5)
+analysis.identify = functools.partial(analysis.identify, trials=60, class_trials=5)
 main()
 """
 

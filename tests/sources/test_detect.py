@@ -1,4 +1,4 @@
-"""Files that say themselves which catalogue theirs is."""
+"""Catalogues of files, detected from their names and contents."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import json
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
+import pyogrio
 import pytest
 import shapely
 from osm_xml import street_town, write_osm
 from sentences import refused, sentence
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.detect import told_catalogs
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import detect_catalogs, probe_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from conftest import Run
 
 
-def write(folder: Path, name: str) -> Path:
-    """Write a file that tells what it is by its name, or by what is in it."""
+def write(folder: Path, name: str, *, rows: int = 1) -> Path:
+    """Write a file of the kind that its name says."""
     path = folder / name
     folder.mkdir(exist_ok=True)
     columns: dict[str, list[object]] = {"feature_id": ["node/1"], "tags": ['"amenity"=>"bench"']}
@@ -34,7 +35,8 @@ def write(folder: Path, name: str) -> Path:
     if name.endswith(".json"):
         path.write_text(json.dumps({"elements": []}))
         return path
-    frame = gpd.GeoDataFrame(columns, geometry=[shapely.Point(2, 48)], crs="EPSG:4326")
+    columns = {key: values * rows for key, values in columns.items()}
+    frame = gpd.GeoDataFrame(columns, geometry=[shapely.Point(2, 48)] * rows, crs="EPSG:4326")
     frame.to_parquet(path) if name.endswith("parquet") else frame.to_file(path)
     return path
 
@@ -49,30 +51,64 @@ def write(folder: Path, name: str) -> Path:
         ("overture.parquet", "overture", "Overture"),
     ],
 )
-def test_files_tell_their_catalogue(tmp_path: Path, name: str, catalog: str, what: str) -> None:
+def test_catalogue_is_detected(tmp_path: Path, name: str, catalog: str, what: str) -> None:
     path = write(tmp_path / "city", name)
-    for given in (path, path.parent):
-        names, (line,) = told_catalogs([given])
+    for item in (path, path.parent):
+        names, (line,) = detect_catalogs([item])
         assert names == (catalog,)
         assert all(words in line for words in (str(path), what, catalog))
 
 
-def test_a_file_that_does_not_tell_is_refused(tmp_path: Path) -> None:
+def test_file_of_an_unknown_catalogue_is_refused(tmp_path: Path) -> None:
     trees, osm = write(tmp_path, "trees.gpkg"), write(tmp_path, "town.osm")
-    for given in (trees, tmp_path):
+    for item in (trees, tmp_path):
         with refused(InputError, "trees.gpkg", "--catalog", "semsig draft"):
-            told_catalogs([osm, given])
+            detect_catalogs([osm, item])
     (tmp_path / "empty").mkdir()
     with refused(InputError, "empty", "--catalog"):
-        told_catalogs([tmp_path / "empty"])
+        detect_catalogs([tmp_path / "empty"])
     with refused(SourceError, "nowhere.gpkg does not exist"):
-        told_catalogs([tmp_path / "nowhere.gpkg"])
+        detect_catalogs([tmp_path / "nowhere.gpkg"])
 
 
-def test_no_catalogue_need_be_named_of_a_file_that_tells_it(run: Run, tmp_path: Path) -> None:
+def test_load_without_catalog_detects_it(run: Run, tmp_path: Path) -> None:
     out = tmp_path / "objects.parquet"
     osm, trees = write(tmp_path, "town.osm"), write(tmp_path, "trees.gpkg")
     code, _, err = run("load", osm, "--out", out)
     assert (code, out.exists()) == (0, True)
     assert f"{osm} is read as an extract of OpenStreetMap, with the catalogue openstreetmap" in err
     sentence(run("load", trees, "--out", tmp_path / "none.parquet"), "trees.gpkg", "--catalog")
+
+
+def test_load_without_catalog_describes_a_file_once(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+
+    def count(name: str) -> None:
+        function = getattr(pyogrio, name)
+
+        def counted(*arguments: object, **options: object) -> object:
+            calls.append(name)
+            return function(*arguments, **options)
+
+        monkeypatch.setattr(pyogrio, name, counted)
+
+    count("list_layers")
+    count("read_info")
+    path = write(tmp_path, "benches.geojson")
+    assert run("load", path, "--out", tmp_path / "objects.parquet")[0] == 0
+    assert calls == ["read_info"]
+
+
+def test_changed_file_is_probed_again(tmp_path: Path) -> None:
+    for suffix in ("geojson", "shp", "parquet"):
+        path = write(tmp_path, f"benches.{suffix}")
+        before = probe_file(path)
+        assert probe_file(path) is before
+        write(tmp_path, f"benches.{suffix}", rows=2)
+        assert probe_file(path) is not before
+    path = tmp_path / "benches.shp"
+    before = probe_file(path)
+    path.with_suffix(".prj").unlink()
+    assert before.layers[0][1].crs != probe_file(path).layers[0][1].crs == ""

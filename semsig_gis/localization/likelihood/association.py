@@ -20,23 +20,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
-from semsig_gis.core.signature import distance_units_of
-from semsig_gis.database.database import views_in
+from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, distance_units_of, signed_degrees
+from semsig_gis.database import visible_objects_in
 from semsig_gis.localization.likelihood.index import CellScores, own_sigma
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import View
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sightings import Views
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase, VisibleObjects
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable
@@ -197,7 +194,7 @@ class Association:
 
 def associate(
     table: NoiseTable,
-    views: Views,
+    views: VisibleObjects,
     seen: Detections,
     pairs: Pairs,
     *,
@@ -250,7 +247,7 @@ def associate(
     )
 
 
-def at_distances(table: NoiseTable, views: Views) -> NDArray[np.float64]:
+def at_distances(table: NoiseTable, views: VisibleObjects) -> NDArray[np.float64]:
     """Return the distances of objects in metres; the nearest is above 0."""
     return np.asarray(np.maximum(views.distances, table.distances[0]))
 
@@ -346,7 +343,7 @@ def align_cells(
     tables, weights = database_tables(database, noise)
     ways = np.zeros((len(cells), 1)) if turns is None else turns
     asked = PhotoTable.of(View.of(photo), tables[0])
-    loglik = photo_loglik(asked, views_in(database, cells), tables, weights, turns=ways)
+    loglik = photo_loglik(asked, visible_objects_in(database, cells), tables, weights, turns=ways)
     return loglik[:, 0] if turns is None else loglik
 
 
@@ -492,13 +489,13 @@ def _aligned(
     off_centre: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
-    from semsig_gis.localization.likelihood.off_centre import views_off_centre  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba loads slowly
 
     models, places = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
     seen = (
-        views_off_centre(index.database, cells, places)
+        visible_objects_off_centre(index.database, cells, places)
         if off_centre
-        else views_in(index.database, cells)
+        else visible_objects_in(index.database, cells)
     )
     total, likeliest = np.zeros((len(cells), len(places))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.jit import compiled
-from semsig_gis.core.signature import BEARING_UNITS
+from semsig_gis.core import BEARING_UNITS, FULL_TURN, compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

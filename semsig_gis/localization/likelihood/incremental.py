@@ -14,9 +14,9 @@ from semsig_gis.localization.likelihood.turns import TurnScores
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
     from semsig_gis.localization.likelihood.index import CellScores, LikelihoodIndex
-    from semsig_gis.observation.view import Sector, View
+    from semsig_gis.observation import Sector, View
 
     _Setting = tuple[tuple[Sector, ...], float]
 

@@ -17,24 +17,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import FULL_TURN, crs_label
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
-from semsig_gis.core.threads import share_rows
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    FULL_TURN,
+    Displayed,
+    crs_label,
+    distance_units_of,
+    share_rows,
+)
 from semsig_gis.localization.likelihood.photo import PhotoTable
 from semsig_gis.localization.likelihood.records import LANES, BinnedObjects, LevelModel, PhotoRows
 from semsig_gis.localization.likelihood.turns import TURNS, TurnPrior, TurnScores
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
 from semsig_gis.localization.noise.table import database_tables, mean_table
-from semsig_gis.observation.view import View, check_north
+from semsig_gis.observation import View, check_north
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable
 
@@ -193,7 +198,7 @@ class LikelihoodIndex(Displayed):
         Each of the four points is scored as in `scores`, but an observer off the centre sees every
         object shifted by the same offset.
         """
-        from semsig_gis.localization.likelihood.off_centre import views_off_centre  # noqa: PLC0415 - numba takes 250 ms
+        from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba takes 250 ms
 
         levels, points = self._quarters
         scorers = [
@@ -204,7 +209,7 @@ class LikelihoodIndex(Displayed):
             loglik = np.empty(len(cells))
 
             def score_part(part: NDArray[np.int64]) -> None:
-                views = views_off_centre(self.database, cells[slice(*part)], points)
+                views = visible_objects_off_centre(self.database, cells[slice(*part)], points)
                 bins = (views.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
                 units = distance_units_of(views.distances, levels.table.reach)
                 objects = levels.objects(views.offsets, views.codes, bins, units)

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN, cell_ids
-from semsig_gis.core.jit import compiled
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.core.threads import share_rows
-from semsig_gis.database.sightings import Views
+from semsig_gis.core import BEARING_UNITS, DISTANCE_UNITS, FULL_TURN, cell_ids, compiled, share_rows
+from semsig_gis.database import VisibleObjects
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 CELLS_A_THREAD = 64  # the fewest cells that are worth a thread
 # The cell itself and its neighbours, as steps east and north: number 3 * (east + 1) + (north + 1).
@@ -44,9 +41,9 @@ class _CellObjects(NamedTuple):
     step: float
 
 
-def views_off_centre(
+def visible_objects_off_centre(
     database: SignatureDatabase, cells: NDArray[np.int64], points: NDArray[np.float64]
-) -> Views:
+) -> VisibleObjects:
     """Return the views from points off the centres of some cells, computed only from the cells.
 
     The points, shape (p, 2), are metres to the east and north of the centre, less than a cell; that
@@ -80,14 +77,14 @@ def views_off_centre(
     parts = {}
 
     def view_part(part: NDArray[np.int64]) -> None:
-        parts[int(part[0])] = _views_from_points(part, around, points, objects)
+        parts[int(part[0])] = _objects_from_points(part, around, points, objects)
 
     share_rows(view_part, len(cells), least=CELLS_A_THREAD)
     lengths, codes, bearings, distances = (
         np.concatenate(values)
         for values in zip(*(parts[first] for first in sorted(parts)), strict=True)
     )
-    return Views(
+    return VisibleObjects(
         offsets=np.append(0, np.cumsum(lengths)),
         objects=np.full(len(codes), -1),
         codes=codes,
@@ -144,7 +141,7 @@ def _polar(east: NDArray[np.float64], north: NDArray[np.float64]) -> None:
 
 
 @compiled
-def _views_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one function
+def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one function
     part: NDArray[np.int64],
     around: NDArray[np.int64],
     points: NDArray[np.float64],

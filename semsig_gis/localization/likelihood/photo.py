@@ -23,11 +23,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.core.threads import share_rows
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    FULL_TURN,
+    WILDCARD,
+    InputError,
+    distance_units_of,
+    share_rows,
+)
 from semsig_gis.localization.likelihood.records import (
     NoiseModels,
     PhotoArrays,
@@ -40,9 +44,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sightings import Views
+    from semsig_gis.database import VisibleObjects
     from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.observation.view import View
+    from semsig_gis.observation import View
 
 PLACES_A_THREAD = 32  # the fewest places that are worth a thread
 FIRST = 128  # likely places whose best likelihood bounds those of the others
@@ -131,7 +135,7 @@ class PhotoTable:
 
 def photo_loglik(
     photo: PhotoTable,
-    views: Views,
+    views: VisibleObjects,
     tables: Sequence[NoiseTable],
     weights: NDArray[np.float64],
     *,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core import FULL_TURN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,1 +1,1 @@
-"""Requests that are cached, resumed and polite."""
+"""HTTP requests with a cache, resumed downloads, retries and limits."""

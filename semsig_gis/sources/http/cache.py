@@ -1,10 +1,10 @@
-"""A folder of what was fetched: whole files, known by checksum, shared safely by processes.
+"""Cache folder of downloaded files, checked by checksum and safe for several processes.
 
-A request is known by a key. Its entry is a body ``KEY-SHA.suffix`` and a sidecar ``KEY.meta.json``
-that names the body, with its checksum, date and validators. Bodies never change: a new one has
-another name, and becomes the entry when the sidecar is replaced by rename. So a reader meets the
-old pair or the new one, nothing between. What is under way is ``KEY.part``; a lock of the operating
-system, which a crash releases, lets one process at a time work on an entry.
+A request has a key. Its entry is a body ``KEY-SHA.suffix`` and a sidecar ``KEY.meta.json`` with the
+name of the body, its checksum, date and validators. Bodies never change: a new body has another
+name, and becomes the entry when a rename replaces the sidecar. So a reader gets the old pair or the
+new one. A download in progress is ``KEY.part``. A lock of the operating system, which a crash
+releases, lets only one process work on an entry.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from typing import TYPE_CHECKING
 
 from filelock import lock_descriptor
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.text import parse_json
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.core import InputError
+from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-KEPT_S = 86_400.0  # how long a superseded body stays after its last use
+SUPERSEDED_S = 86_400.0  # a superseded body is deleted this long after its last use
 
 
 @dataclass(frozen=True, slots=True)
-class Edition:
-    """What a server says of the file that it sends; empty where it says nothing.
+class FileVersion:
+    """Version of a file by the headers of a response; empty where a header is absent.
 
-    `encoding` is how it is packed for sending, such as ``"gzip"``, `content_type` in lower case.
+    `encoding` is the compression for the transfer, such as ``"gzip"``; `content_type` is in lower
+    case.
     """
 
     etag: str = ""
@@ -43,8 +43,8 @@ class Edition:
     content_type: str = ""
 
     @classmethod
-    def of(cls, headers: Mapping[str, str]) -> Edition:
-        """Return the edition that the headers of a response describe."""
+    def from_headers(cls, headers: Mapping[str, str]) -> FileVersion:
+        """Return the version that the headers of a response describe."""
         encoding = headers.get("Content-Encoding", "").strip().lower()
         return cls(
             etag=headers.get("ETag", ""),
@@ -55,16 +55,16 @@ class Edition:
 
     @property
     def if_range(self) -> str:
-        """Return what asks for the rest of this very edition; a weak tag does not promise that."""
+        """Value of If-Range to resume this version; a weak tag does not identify the bytes."""
         return self.last_modified if self.etag.startswith("W/") else self.etag or self.last_modified
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fetched:
-    """A file that was fetched, now or earlier (`from_cache`): where it lies and came from.
+    """A file that was fetched now or earlier (`from_cache`): its path and its source.
 
-    `fetched_at` is in UTC by ISO 8601; `url` is the address after redirects. The last three are the
-    server's words, empty where it said nothing.
+    `fetched_at` is in UTC in ISO 8601; `url` is the address after redirects. The last three come
+    from the server, empty where it sent none.
     """
 
     path: Path
@@ -79,32 +79,32 @@ class Fetched:
 
     @property
     def condition(self) -> dict[str, str]:
-        """Return headers that ask for the file only if it is another edition."""
+        """Headers that request the file only if it has changed."""
         headers = {"If-None-Match": self.etag, "If-Modified-Since": self.last_modified}
         return {name: value for name, value in headers.items() if value}
 
 
-# What the sidecar keeps of it, beside the name of the file and the request.
-KEPT = ("url", "sha256", "fetched_at", "bytes", "content_type", "etag", "last_modified")
+# Fields of `Fetched` in the sidecar, in addition to the name of the file and the request.
+SIDECAR_FIELDS = ("url", "sha256", "fetched_at", "bytes", "content_type", "etag", "last_modified")
 
 
 @dataclass(frozen=True, slots=True)
 class Cache:
-    """A folder of fetched files, made when something is put in it."""
+    """A folder of fetched files, created when the first file is stored."""
 
     folder: Path
 
-    def entry(self, key: str) -> Entry:
-        """Return the entry of a request, which may hold nothing yet."""
-        return Entry(Path(self.folder), key)
+    def entry(self, key: str) -> CacheEntry:
+        """Return the entry of a request, which may be empty."""
+        return CacheEntry(Path(self.folder), key)
 
     def forget(self, file: Fetched) -> None:
-        """Have a file fetched anew the next time; it stays for those who read it."""
-        Entry(Path(self.folder), file.path.name.partition("-")[0]).sidecar.unlink(missing_ok=True)
+        """Make the next request fetch a file again; the file itself stays for its readers."""
+        self.entry(file.path.name.partition("-")[0]).sidecar.unlink(missing_ok=True)
 
     @contextlib.contextmanager
-    def locked(self, key: str) -> Iterator[Entry]:
-        """Give the entry of a request while no other process works on it."""
+    def locked(self, key: str) -> Iterator[CacheEntry]:
+        """Provide the entry of a request while no other process works on it."""
         try:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
             lock = (Path(self.folder) / f"{key}.lock").open("ab")
@@ -119,78 +119,79 @@ class Cache:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """What the cache in a folder holds for the request of one key."""
+class CacheEntry:
+    """Files in a cache folder that belong to one request."""
 
     folder: Path
     key: str
 
     @property
     def sidecar(self) -> Path:
-        """Return the path of the description of the body."""
+        """Path of the JSON file that describes the body."""
         return self.folder / f"{self.key}.meta.json"
 
     @property
     def part(self) -> Path:
-        """Return the path of what has arrived so far, as it was sent."""
+        """Path of the bytes received until now, as they were sent."""
         return self.folder / f"{self.key}.part"
 
     @property
     def _part_info(self) -> Path:
         return self.folder / f"{self.key}.part.json"
 
-    def scratch(self, suffix: str) -> Path:
-        """Return a path to unpack a body to, for the holder of the lock."""
+    def temporary_path(self, suffix: str) -> Path:
+        """Return a path for unpacking a body, for the process that has the lock."""
         return self.folder / f"{self.key}.tmp{suffix}"
 
-    def copy(self) -> Fetched | None:
-        """Return the cached copy, or None where there is none or it is damaged."""
+    def cached_file(self) -> Fetched | None:
+        """Return the cached file, or None if it is absent or damaged."""
         try:
             meta = parse_json(self.sidecar.read_text(encoding="utf-8"))
             path = self.folder / Path(meta["file"]).name
-            copy = Fetched(path=path, from_cache=True, **{name: meta[name] for name in KEPT})
-            if checksum(path) != copy.sha256:
+            fields = {name: meta[name] for name in SIDECAR_FIELDS}
+            cached = Fetched(path=path, from_cache=True, **fields)
+            if checksum(path) != cached.sha256:
                 return None
         except (OSError, KeyError, TypeError, ValueError):
             return None
-        with contextlib.suppress(OSError):  # a cache on a read-only disk serves all the same
-            path.touch()  # still wanted, see `store`
-        return copy
+        with contextlib.suppress(OSError):  # a cache on a read-only disk can still be read
+            path.touch()  # so that `store` does not delete a body in use
+        return cached
 
     def store(self, fetched: Fetched, request: Mapping[str, object]) -> Fetched:
-        """Make a checked body, at `scratch`, the entry; forget what was under way; return its file.
+        """Move a body from `temporary_path` into the entry, delete the part and return the file.
 
-        `request` is kept for people who look into the cache.
+        `request` is stored for people who look into the cache.
         """
         final = self.folder / f"{self.key}-{fetched.sha256[:16]}{fetched.path.suffix}"
         fetched.path.replace(final)
-        meta = {name: getattr(fetched, name) for name in KEPT}
+        meta = {name: getattr(fetched, name) for name in SIDECAR_FIELDS}
         with whole_file(self.sidecar) as partial:
             content = {"request": request, "url": fetched.url, "file": final.name, **meta}
             partial.write_text(json.dumps(content, indent=1), encoding="utf-8")
         self.drop_part()
-        # Another process may have been given the path of the former body and has yet to read it.
+        # Another process may still read the previous body, so only old ones are deleted.
         for old in self.folder.glob(f"{self.key}-*"):
-            if old != final and old.stat().st_mtime < time.time() - KEPT_S:
+            if old != final and old.stat().st_mtime < time.time() - SUPERSEDED_S:
                 old.unlink(missing_ok=True)
         return dataclasses.replace(fetched, path=final)
 
-    def resumable(self) -> tuple[int, Edition]:
-        """Return how many bytes have arrived, and of what; 0 where the rest cannot be asked for."""
+    def resumable(self) -> tuple[int, FileVersion]:
+        """Return the number of bytes in the part and their version; 0 if it cannot be resumed."""
         try:
             size = self.part.stat().st_size
-            edition = Edition(**parse_json(self._part_info.read_text(encoding="utf-8")))
+            version = FileVersion(**parse_json(self._part_info.read_text(encoding="utf-8")))
         except (OSError, TypeError, ValueError):
-            return 0, Edition()
-        return (size, edition) if edition.if_range else (0, Edition())
+            return 0, FileVersion()
+        return (size, version) if version.if_range else (0, FileVersion())
 
-    def start_part(self, edition: Edition) -> None:
-        """Begin an empty part."""
+    def start_part(self, version: FileVersion) -> None:
+        """Start an empty part."""
         self.drop_part()
-        self._part_info.write_text(json.dumps(dataclasses.asdict(edition)), encoding="utf-8")
+        self._part_info.write_text(json.dumps(dataclasses.asdict(version)), encoding="utf-8")
 
     def drop_part(self) -> None:
-        """Forget what has arrived so far."""
+        """Delete the bytes received until now."""
         self.part.unlink(missing_ok=True)
         self._part_info.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""A deadline for a whole request; a socket's own timeout begins anew with every byte."""
+"""A deadline for a whole request; the timeout of a socket starts again with every byte."""
 
 from __future__ import annotations
 
@@ -17,69 +17,70 @@ if TYPE_CHECKING:
     from urllib3.connectionpool import HTTPConnectionPool
 
 
-class OverdueError(Exception):
+class DeadlineError(Exception):
     """The time for a request is over."""
 
 
 class SlowError(Exception):
-    """A server sends, but next to nothing."""
+    """The server sends fewer bytes per second than accepted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Deadline:
-    """How long a request may take, from now: its redirects, headers, body and further attempts.
+    """End of a request that starts now, with its redirects, headers, body and retries.
 
-    No bytes at all for `patience` seconds raise TimeoutError, fewer than `slowest` a second over so
-    long SlowError, and the end of the `seconds` OverdueError.
+    No byte within `read_timeout` seconds raises TimeoutError, fewer than `min_bytes_per_s` over
+    that time SlowError, and the end of `seconds` DeadlineError.
     """
 
     seconds: float
-    patience: float
-    slowest: float
-    begin: float = field(default_factory=time.monotonic)
+    read_timeout: float
+    min_bytes_per_s: float
+    start: float = field(default_factory=time.monotonic)
 
     @property
     def seconds_left(self) -> float:
         """Seconds until the end, below 0 after it."""
-        return self.begin + self.seconds - time.monotonic()
+        return self.start + self.seconds - time.monotonic()
 
 
 class _Stream(io.RawIOBase):
-    """What comes in by a socket until a deadline."""
+    """Bytes that a socket receives until a deadline."""
 
     def __init__(self, sock: socket.socket, deadline: Deadline) -> None:
         self._sock = sock
         self._raw: Any = sock.makefile("rb", buffering=0)
         self._deadline = deadline
-        self._since, self._got = 0.0, 0
+        # Start of the interval over which the speed is measured, and the bytes received in it.
+        self._interval_start, self._interval_bytes = 0.0, 0
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: Any) -> int | None:  # noqa: ANN401 - typeshed's WriteableBuffer
-        left = self._deadline.seconds_left
-        if left <= 0:
-            raise OverdueError
-        self._sock.settimeout(min(left, self._deadline.patience))
+        remaining = self._deadline.seconds_left
+        if remaining <= 0:
+            raise DeadlineError
+        self._sock.settimeout(min(remaining, self._deadline.read_timeout))
         try:
             size: int | None = self._raw.readinto(buffer)
         except TimeoutError as error:
             if self._deadline.seconds_left <= 0:
-                raise OverdueError from error
+                raise DeadlineError from error
             raise
-        self._require_pace(size or 0)
+        self._check_speed(size or 0)
         return size
 
-    def _require_pace(self, size: int) -> None:
+    def _check_speed(self, size: int) -> None:
         now = time.monotonic()
-        if not self._got:  # a server may think before it says the first byte
-            self._since = now
-        self._got += size
-        elapsed = now - self._since
-        if size and elapsed >= self._deadline.patience:
-            if self._got < self._deadline.slowest * elapsed:
+        if not self._interval_bytes:  # the time before the first byte does not count
+            self._interval_start = now
+        self._interval_bytes += size
+        elapsed = now - self._interval_start
+        if size and elapsed >= self._deadline.read_timeout:
+            if self._interval_bytes < self._deadline.min_bytes_per_s * elapsed:
                 raise SlowError
-            self._since, self._got = now, 0
+            self._interval_start, self._interval_bytes = now, 0
 
     def close(self) -> None:
         self._raw.close()
@@ -87,7 +88,7 @@ class _Stream(io.RawIOBase):
 
 
 class _Socket:
-    """As much of a socket as an HTTP response asks for."""
+    """The part of a socket's interface that an HTTP response uses."""
 
     def __init__(self, sock: socket.socket, deadline: Deadline) -> None:
         self._stream = functools.partial(_Stream, sock, deadline)
@@ -96,8 +97,8 @@ class _Socket:
         return io.BufferedReader(self._stream())
 
 
-class PunctualAdapter(HTTPAdapter):
-    """Transport of a session whose requests end by a deadline."""
+class DeadlineAdapter(HTTPAdapter):
+    """Transport adapter of a session; its requests end at a deadline."""
 
     def __init__(self, deadline: Deadline) -> None:
         super().__init__()
@@ -110,6 +111,7 @@ class PunctualAdapter(HTTPAdapter):
         def response(sock: socket.socket, *args: Any, **kwargs: Any) -> http.client.HTTPResponse:  # noqa: ANN401
             return http.client.HTTPResponse(_Socket(sock, self._deadline), *args, **kwargs)  # type: ignore[arg-type]
 
+        # urllib3 has no option for it, so the pool gets a subclass of its connection class.
         connection = {"response_class": staticmethod(response)}
-        pool.ConnectionCls = type("PunctualConnection", (pool.ConnectionCls,), connection)
+        pool.ConnectionCls = type("DeadlineConnection", (pool.ConnectionCls,), connection)
         return pool

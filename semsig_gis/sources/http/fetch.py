@@ -1,6 +1,7 @@
-"""The one module that talks to the network: polite, resumable, bounded, and cached.
+"""HTTP requests with retries, resumed downloads, size and time limits, and a cache.
 
-Nothing is fetched from a host that the caller did not name.
+The only module that uses the network, but for Overture Maps. Requests go only to hosts that the
+caller names.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ import requests
 import urllib3.exceptions
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.compression import bomb, swells
-from semsig_gis.sources.http.cache import Edition, Fetched
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
+from semsig_gis.sources.http.cache import Fetched, FileVersion
 from semsig_gis.sources.http.deadline import (
     Deadline,
-    OverdueError,
-    PunctualAdapter,
+    DeadlineAdapter,
+    DeadlineError,
     SlowError,
 )
 from semsig_gis.sources.http.errors import error_text
@@ -39,35 +40,34 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from semsig_gis.sources.http.cache import Cache, Entry
-    from semsig_gis.sources.http.secret import Secret
+    from semsig_gis.sources.http.access_token import AccessToken
+    from semsig_gis.sources.http.cache import Cache, CacheEntry
 
 USER_AGENT = f"semsig_gis/{__version__} (reads open data once, into a cache)"
-MOST_REDIRECTS = 5
-TOO_SLOWLY = "sent too slowly"
-RETRIED = frozenset({408, 429, 500, 502, 503, 504})
-MOVED = frozenset({301, 302, 303, 307, 308})
-BLOCK = 2**16
+MAX_REDIRECTS = 5
+TOO_SLOW = "sent too slowly"
+RETRY_STATUSES = frozenset({408, 429, 500, 502, 503, 504})
+REDIRECTS = frozenset({301, 302, 303, 307, 308})
+BLOCK_BYTES = 2**16
 ANYTHING = "*/*;q=0.1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HttpSpec:
-    """How requests are made: times in seconds, sizes in bytes.
+    """Settings of requests: times in seconds, sizes in bytes.
 
-    A file has to be there `deadline_s` after it was asked for, with all redirects, attempts and
-    pauses. `timeout` is for the connection and for the next bytes; less than `slowest` bytes a
-    second over the latter counts as stalled, and is tried `slow_attempts` times. The pause after a
-    failure, `backoff_s`, doubles each time; a server that asks for more than `longest_wait_s` is
-    not waited for. `max_bytes` holds as sent and as unpacked. `fresh_s` is how long a copy is used
-    that the server cannot confirm. `tell` takes a line about what is waited for.
-    `hosts` are those to which a server may redirect, beside itself. `secret` authorizes every
-    request; it is not told, and not in the cache.
+    A request ends after `deadline_s`, with all redirects, attempts and pauses. `timeout` is for the
+    connection and for the next bytes; fewer than `min_bytes_per_s` over the latter count as stalled
+    and are tried `slow_attempts` times. The pause after a failure, `backoff_s`, doubles each time;
+    a server that asks for more than `longest_wait_s` is an error. `max_bytes` limits a file as sent
+    and as unpacked. A cached file that the server cannot confirm is used for `fresh_s`. `report`
+    takes a line about each pause. A server may redirect to `hosts` in addition to itself. `token`
+    authorizes every request; it is never logged or cached.
     """
 
     deadline_s: float = 600.0
     timeout: tuple[float, float] = (10.0, 60.0)
-    slowest: float = 100.0
+    min_bytes_per_s: float = 100.0
     attempts: int = 5
     slow_attempts: int = 2
     backoff_s: float = 2.0
@@ -76,37 +76,37 @@ class HttpSpec:
     fresh_s: float = 86_400.0
     offline: bool = False
     sleep: Callable[[float], None] = time.sleep
-    tell: Callable[[str], None] = lambda _: None
+    report: Callable[[str], None] = lambda _: None
     hosts: frozenset[str] = frozenset()
-    secret: Secret | None = None
+    token: AccessToken | None = None
 
     def __post_init__(self) -> None:
-        """Refuse numbers of attempts below 1, and a deadline that is now."""
+        """Raise InputError for fewer attempts than 1 or a deadline that is not in the future."""
         if self.attempts < 1:
             raise InputError(f"attempts is {self.attempts}; it takes at least 1.")
         if not 0 < self.deadline_s < math.inf:
             raise InputError(f"deadline_s is {self.deadline_s}; give seconds above 0.")
 
     def deadline(self) -> Deadline:
-        """Return the deadline of a request that begins now."""
-        return Deadline(self.deadline_s, patience=self.timeout[1], slowest=self.slowest)
+        """Return the deadline of a request that starts now."""
+        return Deadline(self.deadline_s, self.timeout[1], self.min_bytes_per_s)
 
 
 DEFAULT_HTTP: HttpSpec = HttpSpec()
 
 
 class HttpError(SourceError):
-    """A server did not give what it was asked for; `status` is its answer, 0 if it gave none."""
+    """A request failed; `status` is the HTTP status of the answer, 0 without an answer."""
 
     def __init__(self, message: str, status: int = 0) -> None:
         super().__init__(message)
         self.status = status
 
 
-class PassingError(Exception):
-    """Something failed that may work the next time, after `wait` seconds if the server said so.
+class TransientError(Exception):
+    """A failure that a retry may solve, after `wait` seconds if the server sent Retry-After.
 
-    `slow` says that the failure took its time, as the next one will.
+    `slow` marks a failure that took long, so that it is retried less often.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class PassingError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for: an address with its query, by GET, or by POST where there is a form."""
+    """An address with its query, requested by GET, or by POST if there is a form in `data`."""
 
     url: str
     params: tuple[tuple[str, str], ...] = ()
@@ -128,29 +128,29 @@ class Request:
 
     @property
     def method(self) -> str:
-        """Return the HTTP method."""
+        """The HTTP method."""
         return "POST" if self.data else "GET"
 
 
 @contextlib.contextmanager
-def polite_session(deadline: Deadline) -> Iterator[requests.Session]:
-    """Give a session that introduces itself, asks for nothing but gzip, and ends by a deadline."""
+def open_session(deadline: Deadline) -> Iterator[requests.Session]:
+    """Open a session with our User-Agent that accepts only gzip and ends at a deadline."""
     with requests.Session() as session:
         for scheme in ("http://", "https://"):
-            session.mount(scheme, PunctualAdapter(deadline))
+            session.mount(scheme, DeadlineAdapter(deadline))
         session.headers.update({"User-Agent": USER_AGENT, "Accept-Encoding": "gzip"})
         session.auth = lambda prepared: prepared  # no password from the user's .netrc
         yield session
 
 
 @contextlib.contextmanager
-def answer_to(
+def open_response(
     session: requests.Session, request: Request, headers: Mapping[str, str], spec: HttpSpec
 ) -> Iterator[requests.Response]:
-    """Send a request, follow redirects within the host, and give the response, its body unread."""
+    """Send a request, follow redirects within the host, and provide the response, body unread."""
     url = request.url
     params: tuple[tuple[str, str], ...] | None = request.params
-    for _ in range(MOST_REDIRECTS + 1):
+    for _ in range(MAX_REDIRECTS + 1):
         try:
             response = session.request(
                 request.method,
@@ -163,21 +163,21 @@ def answer_to(
                 allow_redirects=False,
             )
         except (requests.RequestException, urllib3.exceptions.HTTPError, SlowError) as error:
-            raise _failure(error, request.url) from error
+            raise _connection_error(error, request.url) from error
         with response:
-            if response.status_code not in MOVED:
+            if response.status_code not in REDIRECTS:
                 yield response
                 return
             target = urljoin(response.url, response.headers.get("Location", ""))
-            _require_named_host(response.url, target, spec)
+            _check_redirect(response.url, target, spec)
             url, params = target, None
     raise HttpError(
         f"{host_of(request.url)} redirects too often from {request.url}; check the address."
     )
 
 
-def _require_named_host(source: str, target: str, spec: HttpSpec) -> None:
-    """Refuse a redirect to another host, but for those of the specification without a secret."""
+def _check_redirect(source: str, target: str, spec: HttpSpec) -> None:
+    """Raise SourceError for a redirect to another host, except to `spec.hosts` without a token."""
     old, new = urlsplit(source), urlsplit(target)
     try:
         same = (old.scheme, old.hostname, old.port) == (new.scheme, new.hostname, new.port)
@@ -186,38 +186,37 @@ def _require_named_host(source: str, target: str, spec: HttpSpec) -> None:
         safer = safer and old.port in {None, 80} and new.port in {None, 443}
     except ValueError:  # a port that is no number
         same = safer = False
-    named = new.hostname in spec.hosts and new.scheme in {old.scheme, "https"}
-    safer = safer or (named and spec.secret is None)
-    if not (same or safer):
+    listed = new.hostname in spec.hosts and new.scheme in {old.scheme, "https"}
+    if not (same or safer or (listed and spec.token is None)):
         raise SourceError(
             f"{old.netloc} redirects to {new.netloc or target}, which neither you nor the "
             f"catalogue named; if you trust it, put its address in the catalogue."
         )
 
 
-def _failure(error: Exception, url: str) -> Exception:
-    """Return what to raise for a connection that failed."""
+def _connection_error(error: Exception, url: str) -> Exception:
+    """Return the error for a failed connection: HttpError, or TransientError to retry."""
     if isinstance(error, requests.exceptions.SSLError):
         msg = f"{host_of(url)} has no certificate that this machine trusts; check the address."
         return HttpError(msg)
     if isinstance(error, SlowError):
-        return PassingError(TOO_SLOWLY, slow=True)
+        return TransientError(TOO_SLOW, slow=True)
     if isinstance(error, requests.exceptions.ConnectTimeout | requests.exceptions.ReadTimeout):
-        return PassingError("did not answer in time", slow=True)
+        return TransientError("did not answer in time", slow=True)
     if isinstance(error, requests.exceptions.ConnectionError):
-        return PassingError("could not be reached or hung up")
+        return TransientError("could not be reached or hung up")
     msg = f"{url} cannot be requested ({' '.join(str(error).split()).rstrip('.')}); correct it."
     return HttpError(msg)
 
 
-def require_success(response: requests.Response) -> None:
-    """Refuse an answer that is no part of the file; PassingError if a later one may be."""
+def check_status(response: requests.Response) -> None:
+    """Raise HttpError if a response is not a file or a part of it; TransientError to retry."""
     status = response.status_code
     if status in {requests.codes.ok, requests.codes.partial}:
         return
     what = f"answered {status} {response.reason or ''}".rstrip()
-    if status in RETRIED:
-        raise PassingError(what, status, _retry_after(response))
+    if status in RETRY_STATUSES:
+        raise TransientError(what, status, _retry_after(response))
     detail = _detail(response)
     raise HttpError(
         f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it.",
@@ -226,39 +225,44 @@ def require_success(response: requests.Response) -> None:
 
 
 def _detail(response: requests.Response) -> str:
-    """Return what a service says about an error, as part of a sentence."""
-    body = b""
-    with contextlib.suppress(PassingError):
-        for block in blocks_of(response):
-            body += block
-            if len(body) > BLOCK:
-                break
+    """Return the error message of a service in parentheses, or ""."""
+    body = bytearray()
+    with contextlib.suppress(TransientError):
+        _read_start(response, body)
     with contextlib.suppress(zlib.error):
-        if response.headers.get("Content-Encoding", "") == "gzip":
-            body = zlib.decompressobj(wbits=31).decompress(body, BLOCK)
-        text = error_text(body)
-        if text:
-            return f" ({text})"
+        packed = response.headers.get("Content-Encoding", "") == "gzip"
+        text = error_text(
+            zlib.decompressobj(wbits=31).decompress(body, BLOCK_BYTES) if packed else body
+        )
+        return f" ({text})" if text else ""
     return ""
 
 
-def blocks_of(response: requests.Response) -> Iterator[bytes]:
-    """Yield the body as it is sent; PassingError if the server hangs up, stops or is too slow."""
+def _read_start(response: requests.Response, body: bytearray) -> None:
+    """Append a little more than the first `BLOCK_BYTES` of a response to `body`."""
+    for block in raw_blocks(response):
+        body += block
+        if len(body) > BLOCK_BYTES:
+            break
+
+
+def raw_blocks(response: requests.Response) -> Iterator[bytes]:
+    """Yield the body as it is sent; TransientError if the server hangs up, stops or is slow."""
     try:
-        while block := response.raw.read1(BLOCK, decode_content=False):
+        while block := response.raw.read1(BLOCK_BYTES, decode_content=False):
             yield block
     except SlowError as error:
-        raise PassingError(TOO_SLOWLY, slow=True) from error
+        raise TransientError(TOO_SLOW, slow=True) from error
     except urllib3.exceptions.ReadTimeoutError as error:
         what = "stopped sending"
-        raise PassingError(what, slow=True) from error
+        raise TransientError(what, slow=True) from error
     except (urllib3.exceptions.HTTPError, OSError) as error:
         what = "cut the connection"
-        raise PassingError(what) from error
+        raise TransientError(what) from error
 
 
 def _retry_after(response: requests.Response) -> float | None:
-    """Return the seconds that a server asks to wait, which it may say as a date."""
+    """Return the seconds to wait from a Retry-After header, which may be a date."""
     text = response.headers.get("Retry-After", "").strip()
     if text.isdecimal():
         return float(text)
@@ -269,12 +273,12 @@ def _retry_after(response: requests.Response) -> float | None:
     return max(0.0, (date.astimezone(UTC) - datetime.now(UTC)).total_seconds())
 
 
-def require_address(url: str) -> None:
-    """Refuse an address that is not http, or holds a password, which would end up in the cache."""
+def check_url(url: str) -> None:
+    """Raise InputError for an address that is not HTTP, or has a password: it would be cached."""
     try:
         parts = urlsplit(url)
         usable = parts.scheme in {"http", "https"} and parts.hostname and parts.password is None
-    except ValueError:  # half a bracket
+    except ValueError:  # an unclosed bracket
         usable = False
     if not usable:
         raise InputError(
@@ -283,21 +287,21 @@ def require_address(url: str) -> None:
 
 
 def host_of(url: str) -> str:
-    """Return the host of an address, with its port if it names one."""
+    """Return the host of an address, with its port if there is one."""
     return urlsplit(url).netloc
 
 
 Progress = Callable[[int, int], None]
 
-NOT_MODIFIED, PARTIAL, BEYOND_THE_END = 304, 206, 416
+NOT_MODIFIED, PARTIAL, RANGE_NOT_SATISFIABLE = 304, 206, 416
 
 
 class TooLargeError(SourceError):
-    """A server sends more than is accepted."""
+    """A server sends more bytes than accepted."""
 
 
 class NotCachedError(SourceError):
-    """Offline, and the cache does not have it."""
+    """A file is not in the cache, and the network is off."""
 
 
 def fetch(
@@ -316,41 +320,41 @@ def fetch(
 ) -> Fetched:
     """Fetch a file into the cache, or find it there; with `data`, post a form.
 
-    `accept` are the content types that may come, all by default. The cache knows the request by
-    `identity` instead of the address where services mirror one another. `check` raises SourceError
-    for a file that is not to be kept; `progress` takes the bytes that have arrived and those there
-    are, 0 where nobody knows. A cached copy is confirmed by a conditional request where the server
-    gave an ETag or a date; else it is taken as it is for ``spec.fresh_s``. A connection that is cut
-    goes on where it was cut (RFC 9110, If-Range), also in a later run, if the server can do that.
+    `accept` lists the accepted content types, by default all. `identity` replaces the address in
+    the key of the cache, for services that mirror each other. `check` raises SourceError for a file
+    that must not be cached. `before` is called before each attempt. `progress` takes the bytes
+    received and their total, 0 if it is unknown. A cached file with an ETag or a date is confirmed
+    by a conditional request; another one is used for ``spec.fresh_s``. A download that was cut is
+    resumed (RFC 9110, If-Range), also in a later run, if the server supports it.
 
-    HttpError, TooLargeError, NotCachedError or another SourceError says why there is no file.
+    Raises HttpError, TooLargeError, NotCachedError or another SourceError.
     """
-    require_address(url)
+    check_url(url)
     request = Request(url, _pairs(params), _pairs(data))
     what = json.dumps([request.method, identity or url, request.params, request.data])
     key = hashlib.sha256(what.encode()).hexdigest()[:32]
     if spec.offline:
         entry = cache.entry(key)
-        held = entry.copy()
-        if held is None:
+        cached = entry.cached_file()
+        if cached is None:
             state = "is damaged in" if entry.sidecar.exists() else "is not in"
             raise NotCachedError(
                 f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
             )
-        return held
+        return cached
     with cache.locked(key) as entry:
-        held = entry.copy()
-        if held is not None and not held.condition:
-            age = datetime.now(UTC) - datetime.fromisoformat(held.fetched_at)
+        cached = entry.cached_file()
+        if cached is not None and not cached.condition:
+            age = datetime.now(UTC) - datetime.fromisoformat(cached.fetched_at)
             if age.total_seconds() < spec.fresh_s:
-                return held
-        job = _Job(request, entry, held, spec, accept, suffix, check, progress)
+                return cached
+        download = _Download(request, entry, cached, spec, accept, suffix, check, progress)
         try:
-            return _persist(job, before)
+            return _fetch_with_retries(download, before)
         except HttpError as error:
-            if spec.secret is None:
+            if spec.token is None:
                 raise
-            raise HttpError(spec.secret.hide(str(error)), error.status) from None
+            raise HttpError(spec.token.redact(str(error)), error.status) from None
         except TooLargeError:
             entry.drop_part()
             raise
@@ -362,56 +366,56 @@ def fetch(
 
 
 def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
-    """Ask once for a short text that is not worth keeping, and return up to 64 KiB of it."""
-    require_address(url)
-    request = Request(url)
+    """Request a short text once, without the cache, and return up to 64 KiB of it."""
+    check_url(url)
+    request, body = Request(url), bytearray()
     try:
         with (
-            polite_session(spec.deadline()) as session,
-            answer_to(session, request, {}, spec) as response,
+            open_session(spec.deadline()) as session,
+            open_response(session, request, {}, spec) as response,
         ):
-            require_success(response)
-            body = b""
-            for block in blocks_of(response):
-                body += block
-                if len(body) > BLOCK:
-                    break
-    except OverdueError as error:
-        raise _overdue(url, spec) from error
-    except PassingError as error:
+            check_status(response)
+            _read_start(response, body)
+    except DeadlineError as error:
+        raise _deadline_error(url, spec) from error
+    except TransientError as error:
         raise HttpError(f"{host_of(url)} {error}; try again later.", error.status) from error
-    return body[:BLOCK].decode("utf-8", errors="replace")
+    return body[:BLOCK_BYTES].decode("utf-8", errors="replace")
 
 
 # --- One file, several attempts -----------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
-class _Job:
+class _Download:
     request: Request
-    entry: Entry
-    held: Fetched | None
+    entry: CacheEntry
+    cached: Fetched | None
     spec: HttpSpec
     accept: tuple[str, ...]
     suffix: str
     check: Callable[[Path], object] | None
     progress: Progress | None
 
+    @property
+    def host(self) -> str:
+        return host_of(self.request.url)
 
-def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
-    """Try until it works, has failed too often, or the time is over."""
-    spec, host = job.spec, host_of(job.request.url)
+
+def _fetch_with_retries(download: _Download, before: Callable[[], None] | None) -> Fetched:
+    """Try until the file is complete, the attempts are used up or the time is over."""
+    spec = download.spec
     deadline = spec.deadline()
-    with polite_session(deadline) as session:
+    with open_session(deadline) as session:
         for attempt in itertools.count(1):
             if before is not None:
                 before()
             try:
-                return _attempt(session, job)
-            except PassingError as error:
+                return _try_download(session, download)
+            except TransientError as error:
                 failure = error
-            except OverdueError as error:
-                raise _overdue(job.request.url, spec, job.entry) from error
+            except DeadlineError as error:
+                raise _deadline_error(download.request.url, spec, download.entry) from error
             if failure.wait is not None and failure.wait > spec.longest_wait_s:
                 remedy = f" and asks to wait {failure.wait:.0f} s; try again after that"
                 break
@@ -423,15 +427,17 @@ def _persist(job: _Job, before: Callable[[], None] | None) -> Fetched:
             if pause >= deadline.seconds_left:
                 remedy = f", and {spec.deadline_s:g} s are over; try again later"
                 break
-            spec.tell(f"{host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s")
+            spec.report(
+                f"{download.host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s"
+            )
             spec.sleep(pause)
-    if job.held is not None:
-        remedy += f", or work offline with the copy of {job.held.fetched_at} in the cache"
-    raise HttpError(f"{host} {failure}{remedy}.", failure.status) from failure
+    if download.cached is not None:
+        remedy += f", or work offline with the copy of {download.cached.fetched_at} in the cache"
+    raise HttpError(f"{download.host} {failure}{remedy}.", failure.status) from failure
 
 
-def _overdue(url: str, spec: HttpSpec, entry: Entry | None = None) -> HttpError:
-    """Return the plain sentence for a request whose time is over."""
+def _deadline_error(url: str, spec: HttpSpec, entry: CacheEntry | None = None) -> HttpError:
+    """Return the error for a request that is over its deadline."""
     resumed = entry is not None and entry.resumable()[0] > 0
     remedy = "run it again to go on from there" if resumed else "ask for less"
     return HttpError(
@@ -440,35 +446,35 @@ def _overdue(url: str, spec: HttpSpec, entry: Entry | None = None) -> HttpError:
     )
 
 
-def _attempt(session: requests.Session, job: _Job) -> Fetched:
-    request, entry, spec = job.request, job.entry, job.spec
-    have, begun, headers = _conditions(job)
-    with answer_to(session, request, headers, spec) as response:
-        if response.status_code == NOT_MODIFIED and job.held is not None:
+def _try_download(session: requests.Session, download: _Download) -> Fetched:
+    request, entry, spec = download.request, download.entry, download.spec
+    offset, part_version, headers = _range_and_headers(download)
+    with open_response(session, request, headers, spec) as response:
+        if response.status_code == NOT_MODIFIED and download.cached is not None:
             entry.drop_part()
-            return job.held
-        if not (have and _continues(response, have, begun)):
-            have = 0
-            if response.status_code in {PARTIAL, BEYOND_THE_END}:
+            return download.cached
+        if not (offset and _continues(response, offset, part_version)):
+            offset = 0
+            if response.status_code in {PARTIAL, RANGE_NOT_SATISFIABLE}:
                 entry.drop_part()
                 what = "sent another part of the file than the one asked for"
-                raise PassingError(what, wait=0.0)
-        require_success(response)
-        edition = begun if have else Edition.of(response.headers)
-        if job.accept and edition.content_type and edition.content_type not in job.accept:
+                raise TransientError(what, wait=0.0)
+        check_status(response)
+        version = part_version if offset else FileVersion.from_headers(response.headers)
+        if download.accept and version.content_type and version.content_type not in download.accept:
             raise SourceError(
-                f"{host_of(request.url)} sent {edition.content_type} where "
-                f"{' or '.join(job.accept)} was expected; check the address {request.url}."
+                f"{host_of(request.url)} sent {version.content_type} where "
+                f"{' or '.join(download.accept)} was expected; check the address {request.url}."
             )
-        if not have:
-            entry.start_part(edition)
-        _receive(response, job, have)
-        url = response.url if spec.secret is None else spec.secret.hide(response.url)
-    body = entry.scratch(job.suffix)
+        if not offset:
+            entry.start_part(version)
+        _receive(response, download, offset)
+        url = response.url if spec.token is None else spec.token.redact(response.url)
+    body = entry.temporary_path(download.suffix)
     try:
-        sha256, size = _unpack(entry.part, body, edition.encoding, job)
-        if job.check is not None:
-            job.check(body)
+        sha256, size = _unpack(entry.part, body, version.encoding, download)
+        if download.check is not None:
+            download.check(body)
         fetched = Fetched(
             path=body,
             sha256=sha256,
@@ -476,79 +482,81 @@ def _attempt(session: requests.Session, job: _Job) -> Fetched:
             url=url,
             from_cache=False,
             bytes=size,
-            content_type=edition.content_type,
-            etag=edition.etag,
-            last_modified=edition.last_modified,
+            content_type=version.content_type,
+            etag=version.etag,
+            last_modified=version.last_modified,
         )
         return entry.store(fetched, dataclasses.asdict(request))
     finally:
         body.unlink(missing_ok=True)
-        entry.drop_part()  # it was whole: what is wrong with it now stays wrong
+        entry.drop_part()  # the part was complete, so resuming it cannot correct an error
 
 
-def _conditions(job: _Job) -> tuple[int, Edition, dict[str, str]]:
-    """Return how many bytes are there already, of which edition, and the headers to send."""
-    secret = job.spec.secret
-    may_go_on = job.request.method == "GET" and secret is None  # what has a secret in it is changed
-    have, begun = job.entry.resumable() if may_go_on else (0, Edition())
-    headers = job.held.condition if job.held and job.request.method == "GET" else {}
-    if job.accept:
-        headers |= {"Accept": ", ".join((*job.accept, ANYTHING))}
-    if secret is not None:
-        headers |= secret.headers
-    if have:
-        headers |= {"Range": f"bytes={have}-", "If-Range": begun.if_range}
-    return have, begun, headers
+def _range_and_headers(download: _Download) -> tuple[int, FileVersion, dict[str, str]]:
+    """Return the size and version of the part to resume, and the headers to send."""
+    token, is_get = download.spec.token, download.request.method == "GET"
+    # The token is removed from a body, so a part has another length than on the server.
+    resumable = is_get and token is None
+    offset, version = download.entry.resumable() if resumable else (0, FileVersion())
+    headers = download.cached.condition if download.cached and is_get else {}
+    if download.accept:
+        headers |= {"Accept": ", ".join((*download.accept, ANYTHING))}
+    if token is not None:
+        headers |= token.headers
+    if offset:
+        headers |= {"Range": f"bytes={offset}-", "If-Range": version.if_range}
+    return offset, version, headers
 
 
-def _continues(response: requests.Response, have: int, begun: Edition) -> bool:
-    """Tell whether a response goes on where the part ends, in the same edition."""
-    starts = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
-    tag = response.headers.get("ETag", begun.etag)
-    return response.status_code == PARTIAL and starts and tag == begun.etag
+def _continues(response: requests.Response, offset: int, version: FileVersion) -> bool:
+    """Whether a response continues the part, in the same version."""
+    starts = response.headers.get("Content-Range", "").startswith(f"bytes {offset}-")
+    tag = response.headers.get("ETag", version.etag)
+    return response.status_code == PARTIAL and starts and tag == version.etag
 
 
-def _receive(response: requests.Response, job: _Job, have: int) -> None:
-    """Append the body to the part, within the limit."""
+def _receive(response: requests.Response, download: _Download, offset: int) -> None:
+    """Append the body of a response to the part, within the size limit."""
     length = response.headers.get("Content-Length", "")
-    total = have + int(length) if length.isdecimal() else 0
-    _require_room(total, job)
-    blocks = blocks_of(response)
-    if job.spec.secret is not None:
-        if Edition.of(response.headers).encoding:
+    size = offset
+    total = offset + int(length) if length.isdecimal() else 0
+    _check_size(total, download)
+    blocks = raw_blocks(response)
+    if download.spec.token is not None:
+        if FileVersion.from_headers(response.headers).encoding:
             raise HttpError(
-                f"{host_of(job.request.url)} sent a compressed answer although none was requested."
+                f"{download.host} sent a compressed answer although none was requested."
             )
-        blocks = job.spec.secret.strained(blocks)
-    with job.entry.part.open("ab") as stream:
+        blocks = download.spec.token.redact_blocks(blocks)
+    with download.entry.part.open("ab") as stream:
         for block in blocks:
-            have += len(block)
-            _require_room(have, job)
+            size += len(block)
+            _check_size(size, download)
             stream.write(block)
-            if job.progress is not None:
-                job.progress(have, total)
+            if download.progress is not None:
+                download.progress(size, total)
 
 
-def _unpack(part: Path, body: Path, encoding: str, job: _Job) -> tuple[str, int]:
-    """Write what was meant from what was sent; return its checksum and size."""
+def _unpack(part: Path, body: Path, encoding: str, download: _Download) -> tuple[str, int]:
+    """Decompress a part into a body; return its checksum and size."""
     digest = hashlib.sha256()
     size = 0
     with part.open("rb") as packed, body.open("wb") as stream:
-        for block in _unpacked(packed.read, encoding, host_of(job.request.url)):
+        for block in _unpacked(packed.read, encoding, download.host):
             size += len(block)
-            _require_room(size, job)
-            if swells(packed.tell(), size):
-                what = f"what {host_of(job.request.url)} sends"
-                raise bomb(what, "tell its publisher")
+            _check_size(size, download)
+            if ratio_too_high(packed.tell(), size):
+                what = f"what {download.host} sends"
+                raise decompression_bomb_error(what, "report it to the publisher")
             digest.update(block)
             stream.write(block)
     return digest.hexdigest(), size
 
 
 def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterator[bytes]:
-    """Yield a body in blocks of bounded size, however well it is packed."""
+    """Yield an uncompressed body in blocks of limited size."""
     if not encoding:
-        while block := read(BLOCK):
+        while block := read(BLOCK_BYTES):
             yield block
         return
     if encoding not in {"gzip", "x-gzip"}:
@@ -557,22 +565,22 @@ def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterato
         )
     unzip = zlib.decompressobj(wbits=31)
     try:
-        while packed := unzip.unconsumed_tail or unzip.unused_data or read(BLOCK):
+        while packed := unzip.unconsumed_tail or unzip.unused_data or read(BLOCK_BYTES):
             if unzip.eof:  # a gzip body may have several members
                 unzip = zlib.decompressobj(wbits=31)
-            yield unzip.decompress(packed, BLOCK)
+            yield unzip.decompress(packed, BLOCK_BYTES)
     except zlib.error as error:
         what = "sent a damaged gzip body"
-        raise PassingError(what) from error
+        raise TransientError(what) from error
     if not unzip.eof:
         what = "sent a gzip body without its end"
-        raise PassingError(what)
+        raise TransientError(what)
 
 
-def _require_room(size: int, job: _Job) -> None:
-    if size > job.spec.max_bytes:
+def _check_size(size: int, download: _Download) -> None:
+    if size > download.spec.max_bytes:
         raise TooLargeError(
-            f"{host_of(job.request.url)} sends more than the {job.spec.max_bytes:,} bytes that are "
+            f"{download.host} sends more than the {download.spec.max_bytes:,} bytes that are "
             "accepted; ask for a smaller area or for fewer layers."
         )
 

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import functools
+import re
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urljoin, urlsplit
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
-from semsig_gis.sources.services.layers import Download, Positions
-from semsig_gis.sources.services.pages import HTML, NOT_FOUND, Page, Query, json_object
-from semsig_gis.sources.services.table import Table
+from semsig_gis.sources.services.layers import Download, PositionReader
+from semsig_gis.sources.services.pages import HTML, NOT_FOUND, Page, ServiceQuery, json_object
+from semsig_gis.sources.services.table import ServiceTable
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.services.pages import Client
 
     Resource = dict[str, Any]
 
 PAGE_ROWS = 10_000
-# What portals call the formats that can be read, best first, and the suffixes of their files.
+# Names of the readable formats on portals, best first, and the suffixes of their files.
 FORMATS = {
     "geojson": ".geojson",
     "geopackage": ".gpkg",
@@ -39,21 +40,20 @@ FORMATS = {
     "json": ".json",
     "parquet": ".parquet",
 }
-# Of these, the datastore has the rows with their types.
+# For files of these suffixes, the datastore has the rows with their types.
 TABLES = frozenset({".csv", ".json", ""})
 
 
 def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 - not in CKAN
     """Fetch a dataset by its name: rows of the datastore, or the file of a resource.
 
-    The resource is the one of the best format; of several, the newest whose name is one of the
-    layer's `files`. ``server_where`` is a filter of the datastore in JSON. No area can be asked
-    for.
+    The resource has the best format; of several, it is the newest that matches the layer's `files`.
+    ``server_where`` is a filter of the datastore in JSON. CKAN cannot select by area.
     """
     package = _package(client)
     resource, suffix = _resource(client, list(package.get("resources") or ()))
     owner = (package.get("organization") or {}).get("title")
-    spec = client.licensed(
+    spec = client.with_license(
         package.get("license_title") or package.get("license_id"), owner or package.get("author")
     )
     if resource.get("datastore_active") and suffix in TABLES:
@@ -66,29 +66,28 @@ def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 
         )
     address = urljoin(f"{client.endpoint}/", str(resource.get("url") or ""))
     file = client.file(
-        Query(address),
-        lambda path: _refuse_page(path, address),
+        ServiceQuery(address),
+        lambda path: _refuse_web_page(path, address),
         suffix=suffix,
         progress=client.progress,
     )
     return Download(spec=spec, files=(file,))
 
 
-def _action(client: Client, name: str) -> str:
-    return f"{client.endpoint}/api/3/action/{name}"
+def _action(client: Client, name: str, **params: str | float) -> ServiceQuery:
+    return ServiceQuery(f"{client.endpoint}/api/3/action/{name}", params)
 
 
 def _package(client: Client) -> dict[str, Any]:
-    """Return the description of a dataset; CatalogError, with the nearest name, if it is none."""
+    """Return the description of a dataset; CatalogError, with the nearest name, if unknown."""
     try:
-        reply = client.json(Query(_action(client, "package_show"), {"id": client.dataset}))
+        reply = client.json(_action(client, "package_show", id=client.dataset))
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        listed = client.json(Query(_action(client, "package_list")))
-        names = listed.get("result")
+        names = client.json(_action(client, "package_list")).get("result")
         names = [str(name) for name in names] if isinstance(names, list) else []
-        raise client.unknown(names, what="dataset") from error
+        raise client.unknown_dataset(names, what="dataset") from error
     package = reply.get("result")
     if not isinstance(package, dict):
         raise SourceError(
@@ -103,12 +102,12 @@ def _file_name(resource: Resource) -> str:
 
 
 def _suffix(resource: Resource) -> str | None:
-    """Return the suffix of what a resource is, or None where that is not read."""
-    said = str(resource.get("format") or "").lower()
-    words = said.replace("(", " ").replace(")", " ").replace(".", " ").split()
+    """Return the suffix for the format of a resource, or None if the format cannot be read."""
+    stated_format = str(resource.get("format") or "").lower()
+    words = re.split(r"[().\s]+", stated_format)
     words.append(PurePosixPath(_file_name(resource)).suffix.lower().lstrip("."))
-    found = next((FORMATS[word] for word in FORMATS if word in words), None)
-    return "" if found is None and resource.get("datastore_active") else found
+    suffix = next((FORMATS[word] for word in FORMATS if word in words), None)
+    return "" if suffix is None and resource.get("datastore_active") else suffix
 
 
 def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]:
@@ -120,55 +119,61 @@ def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]
             f"dataset {client.dataset!r} of layer {client.layer.name!r} has no resource that can "
             f"be read, only {', '.join(names) or 'none at all'}; choose another dataset."
         )
-    named = [pair for pair in usable if _is_named(pair[0], client.layer.files)]
+    matches = [pair for pair in usable if _matches(pair[0], client.layer.files)]
     order = [*dict.fromkeys(FORMATS.values()), ""]
-    chosen = named or usable
-    best = min((suffix for _, suffix in chosen), key=order.index)
-    chosen = [pair for pair in chosen if pair[1] == best]
-    if len(chosen) > 1 and not named:
-        listed = ", ".join(_shown(item) for item, _ in chosen)
+    candidates = matches or usable
+    best = min((suffix for _, suffix in candidates), key=order.index)
+    candidates = [pair for pair in candidates if pair[1] == best]
+    if len(candidates) > 1 and not matches:
+        file_names = ", ".join(_shown(item) for item, _ in candidates)
         raise CatalogError(
             f"dataset {client.dataset!r} of layer {client.layer.name!r} has several resources "
-            f"({listed}); name the one that is meant in `files`, by a pattern such as "
-            f"{_file_name(chosen[0][0])!r}."
+            f"({file_names}); name the one that is meant in `files`, by a pattern such as "
+            f"{_file_name(candidates[0][0])!r}."
         )
-    return max(chosen, key=lambda pair: _edition(pair[0]))
+
+    def age(pair: tuple[Resource, str]) -> tuple[str, str]:
+        # Names of files often contain their dates.
+        resource = pair[0]
+        date = resource.get("created") or resource.get("last_modified") or ""
+        return str(date), _shown(resource)
+
+    return max(candidates, key=age)
 
 
 def _shown(resource: Resource) -> str:
     return _file_name(resource) or str(resource.get("name") or resource.get("id"))
 
 
-def _is_named(resource: Resource, patterns: tuple[str, ...]) -> bool:
+def _matches(resource: Resource, patterns: tuple[str, ...]) -> bool:
     names = [_file_name(resource).casefold(), str(resource.get("name") or "").casefold()]
     return any(fnmatchcase(name, pattern.casefold()) for name in names for pattern in patterns)
 
 
-def _edition(resource: Resource) -> tuple[str, str]:
-    """Return what is greater for the newer of two editions, whose names often have their dates."""
-    return str(resource.get("created") or resource.get("last_modified") or ""), _shown(resource)
-
-
 def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:
-    """Fetch the rows that the datastore has of a resource, in its order."""
-    query = Query(_action(client, "datastore_search"), {"resource_id": resource})
-    described = client.document(query.also(limit=0), lambda content: _result(content, client))
-    names = tuple(str(item.get("id")) for item in described.get("fields") or ())
+    """Fetch the rows of a resource from the datastore, in its order."""
+    query = _action(client, "datastore_search", resource_id=resource)
+    description = client.document(
+        query.with_params(limit=0), lambda content: _result(content, client)
+    )
+    names = tuple(str(item.get("id")) for item in description.get("fields") or ())
     fields = client.fields(names)
     if fields:
-        table = Table(names, lambda _: iter(()))
-        places = Positions(spec, table, where=f"dataset {client.dataset!r}").fields
-        query = query.also(fields=",".join(dict.fromkeys([*fields, *places])))
+        table = ServiceTable(names, lambda _: iter(()))
+        places = PositionReader(spec, table, where=f"dataset {client.dataset!r}").fields
+        query = query.with_params(fields=",".join(dict.fromkeys([*fields, *places])))
     if client.layer.server_where:
-        query = query.also(filters=client.layer.server_where)
-    query = query.also(limit=PAGE_ROWS, sort="_id")
+        query = query.with_params(filters=client.layer.server_where)
+    query = query.with_params(limit=PAGE_ROWS, sort="_id")
 
-    def then(page: Page, rows: int) -> Query | None:
-        rest = page.rows and (page.told is None or rows < page.told)
-        return query.also(offset=rows) if rest else None
+    def then(page: Page, rows: int) -> ServiceQuery | None:
+        rest = page.rows and (page.total is None or rows < page.total)
+        return query.with_params(offset=rows) if rest else None
 
     read = functools.partial(_page, client=client)
-    return Download(spec=spec, files=client.pages(query.also(offset=0), read, then), fields=names)
+    return Download(
+        spec=spec, files=client.pages(query.with_params(offset=0), read, then), fields=names
+    )
 
 
 def _result(content: bytes, client: Client) -> dict[str, Any]:
@@ -183,16 +188,15 @@ def _result(content: bytes, client: Client) -> dict[str, Any]:
 
 def _page(content: bytes, client: Client) -> Page:
     result = _result(content, client)
-    told = result.get("total")
-    sure = isinstance(told, int) and not result.get("total_was_estimated")
-    return Page(result["records"], told=told if sure else None)
+    total = result.get("total")
+    exact = isinstance(total, int) and not result.get("total_was_estimated")
+    return Page(result["records"], total=total if exact else None)
 
 
-def _refuse_page(path: Path, address: str) -> None:
-    """Refuse a web page in the place of a file."""
+def _refuse_web_page(path: Path, address: str) -> None:
     with path.open("rb") as stream:
         if HTML.match(stream.read(200).lstrip()):
             raise SourceError(
                 f"{host_of(address)} sent a web page where the file {address} was expected; "
-                "download it by hand, or tell its publisher."
+                "download it by hand, or report it to the publisher."
             )

@@ -1,4 +1,4 @@
-"""Features in GML, of version 2 to 3.2, as Web Feature Services send them."""
+"""Features in GML 2 to 3.2, as Web Feature Services send them."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CrsError
+from semsig_gis.core import CrsError
 from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
 SRS_NAME = re.compile(r"\bsrsName=[\"']([^\"']+)[\"']")
-# By these names the axes are in the order of the authority; by others, x goes first.
+# Names of this form mean the axis order of the authority; other names mean x first.
 AUTHORITY_ORDER = re.compile(r"(?:urn:|https?://www\.opengis\.net/def/)", re.IGNORECASE)
-ID = "id"  # the field that the identifier of a feature becomes, if it has none of that name
+ID = "id"  # field for the identifier of a feature, unless it has another field of this name
 MEMBERS = frozenset({"member", "featureMember", "featureMembers"})
-BESIDE = frozenset({"boundedBy", "location"})  # of a feature, and none of its fields
+NOT_FIELDS = frozenset({"boundedBy", "location"})  # elements of a feature that are not fields
 POINTS, LINES = frozenset({"Point"}), frozenset({"LineString", "LinearRing", "LineStringSegment"})
 AREAS = frozenset({"Polygon", "PolygonPatch"})
-SEVERAL = frozenset(
+BOUNDARIES = frozenset({"exterior", "interior", "outerBoundaryIs", "innerBoundaryIs"})
+COLLECTIONS = frozenset(
     {"CompositeCurve", "CompositeSurface", "Curve", "MultiCurve", "MultiGeometry",
      "MultiLineString", "MultiPoint", "MultiPolygon", "MultiSurface", "Ring", "Surface"}
 )  # fmt: skip
-GEOMETRIES = POINTS | LINES | AREAS | SEVERAL
+GEOMETRIES = POINTS | LINES | AREAS | COLLECTIONS
 
 
 def local_name(element: ET.Element) -> str:
@@ -40,8 +41,9 @@ def local_name(element: ET.Element) -> str:
 
 
 def parse_xml(content: bytes) -> ET.Element:
-    """Return the root of a document; ValueError if it is none, or defines texts of its own."""
-    if b"<!DOCTYPE" in content.replace(b"\0", b""):  # may define texts that swell; in UTF-16, too
+    """Parse XML and return its root; ValueError if it is invalid or has a document type."""
+    # A document type can define entities that expand without limit. UTF-16 has zero bytes.
+    if b"<!DOCTYPE" in content.replace(b"\0", b""):
         raise ValueError("it has a document type")
     try:
         return ET.fromstring(content)  # noqa: S314 - without a document type
@@ -57,11 +59,11 @@ def features(root: ET.Element) -> Iterator[ET.Element]:
 
 
 def stated_crs(content: bytes) -> tuple[CRS | None, bool]:
-    """Return the first CRS that a document names, and whether it puts northing first."""
-    found = SRS_NAME.search(content.decode("utf-8", errors="replace"))
-    if found is None:
+    """Return the first CRS in a document, and whether its first coordinate is the northing."""
+    match = SRS_NAME.search(content.decode("utf-8", errors="replace"))
+    if match is None:
         return None, False
-    name = found[1]
+    name = match[1]
     if name.endswith("CRS84"):
         return WGS84, False
     code = re.search(r"epsg.*?(\d+)$", name, re.IGNORECASE)
@@ -69,7 +71,7 @@ def stated_crs(content: bytes) -> tuple[CRS | None, bool]:
         crs = CRS.from_user_input(f"EPSG:{code[1]}" if code else name)
     except CRSError as error:
         raise CrsError(
-            f"the GML names the CRS {name[:60]!r}, which is unknown; tell its publisher."
+            f"the GML names the CRS {name[:60]!r}, which is unknown; report it to the publisher."
         ) from error
     northing_first = crs.axis_info[0].direction.lower() in {"north", "south"}
     return crs, northing_first and AUTHORITY_ORDER.match(name) is not None
@@ -78,7 +80,7 @@ def stated_crs(content: bytes) -> tuple[CRS | None, bool]:
 def read_feature(
     feature: ET.Element, *, swap: bool
 ) -> tuple[dict[str, Any], shapely.Geometry | BadFeatureError | None]:
-    """Return the fields of a feature, and its geometry or what is wrong with it."""
+    """Return the fields of a feature, and its geometry or the error in it."""
     values: dict[str, Any] = {}
     geometry: shapely.Geometry | BadFeatureError | None = None
     for item in feature:
@@ -87,9 +89,9 @@ def read_feature(
         if inner is None:
             values[name] = (item.text or "").strip() or None
         elif local_name(inner) in GEOMETRIES:
-            if name not in BESIDE or geometry is None:
+            if name not in NOT_FIELDS or geometry is None:
                 geometry = _shape(inner, swap=swap)
-        elif name not in BESIDE:
+        elif name not in NOT_FIELDS:
             values[name] = " ".join(" ".join(item.itertext()).split()) or None
     identifier = next((v for k, v in feature.attrib.items() if k.rpartition("}")[2] == ID), None)
     if identifier is not None:
@@ -113,19 +115,24 @@ def _geometry(element: ET.Element, *, swap: bool) -> shapely.Geometry:
     if name in LINES:
         return shapely.LineString(_positions(element, swap=swap))
     if name in AREAS:
-        outer, *inner = (_ring(part, swap=swap) for part in element if _is_boundary(part))
+        boundaries = (part for part in element if local_name(part) in BOUNDARIES)
+        outer, *inner = (
+            shapely.get_coordinates(_geometry(part[0], swap=swap)) for part in boundaries
+        )
         return shapely.Polygon(outer, inner)
-    if name not in SEVERAL:
+    if name not in COLLECTIONS:
         raise ValueError(f"{name} is not read")
-    parts = [_geometry(part, swap=swap) for part in _parts(element)]
+    # The children of `element` are properties such as pointMember; their children are the parts.
+    parts = [_geometry(part, swap=swap) for member in element for part in member]
     if name in {"Curve", "CompositeCurve", "Ring"}:
         return shapely.LineString(np.vstack([shapely.get_coordinates(part) for part in parts]))
     if len(parts) == 1:
         return parts[0]
-    return shapely.union_all(parts) if name == "CompositeSurface" else _together(parts)
+    return shapely.union_all(parts) if name == "CompositeSurface" else _collection(parts)
 
 
-def _together(parts: list[shapely.Geometry]) -> shapely.Geometry:
+def _collection(parts: list[shapely.Geometry]) -> shapely.Geometry:
+    """Return parts as one geometry, of a Multi type if they have the same type."""
     flat = shapely.get_parts(parts)
     kind = {part.geom_type for part in flat}
     if kind == {"Point"}:
@@ -135,36 +142,19 @@ def _together(parts: list[shapely.Geometry]) -> shapely.Geometry:
     return shapely.MultiPolygon(flat) if kind == {"Polygon"} else shapely.GeometryCollection(flat)
 
 
-def _parts(element: ET.Element) -> Iterable[ET.Element]:
-    """Yield the geometries that are the members, segments or patches of one."""
-    for part in element:
-        yield from part
-
-
-def _is_boundary(element: ET.Element) -> bool:
-    return local_name(element) in {"exterior", "interior", "outerBoundaryIs", "innerBoundaryIs"}
-
-
-def _ring(element: ET.Element, *, swap: bool) -> NDArray[np.float64]:
-    return shapely.get_coordinates(_geometry(element[0], swap=swap))
-
-
 def _positions(element: ET.Element, *, swap: bool) -> NDArray[np.float64]:
     """Return x and y of the positions in a point, line or ring, shape (n, 2)."""
     rows: list[NDArray[np.float64]] = []
     for item in element.iter():
         name, text = local_name(item), item.text or ""
         if name in {"pos", "posList"}:
-            size = next(
-                (int(each.get("srsDimension", 0)) for each in (item, element)
-                 if each.get("srsDimension")), 2,
-            )  # fmt: skip
             numbers = np.array(text.split(), float)
+            size = int(item.get("srsDimension") or element.get("srsDimension") or 2)
             if name == "pos":
                 size = max(len(numbers), 1)
             rows.extend(numbers.reshape(-1, size)[:, :2])
         elif name == "coordinates":
-            between = item.get("cs", ",")
-            rows.extend(np.array(place.split(between)[:2], float) for place in text.split())
+            separator = item.get("cs", ",")
+            rows.extend(np.array(place.split(separator)[:2], float) for place in text.split())
     xy = np.array(rows, float).reshape(-1, 2)
     return xy[:, ::-1] if swap else xy

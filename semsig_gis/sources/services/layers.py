@@ -1,4 +1,4 @@
-"""Layers out of the files that services send, or that people download from them."""
+"""Layers from files of services, fetched or downloaded by hand."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ import shapely
 import shapely.geometry
 from shapely.errors import ShapelyError
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.sources import vector as vector_file
+from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import KNOWN_NAMES, SHAPE_NAMES
 from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.rows import (
@@ -28,39 +27,40 @@ from semsig_gis.sources.rows import (
     settle_crs,
 )
 from semsig_gis.sources.services.table import open_table
-from semsig_gis.storage.text import parse_json
+from semsig_gis.sources.vector import file as vector_file
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from semsig_gis.sources import RawLayer
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.http.cache import Fetched
-    from semsig_gis.sources.layers import LayerSpec
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Position
-    from semsig_gis.sources.services.table import Record, Table
+    from semsig_gis.sources.services.table import ServiceRecord, ServiceTable
 
 
 def fold(name: str) -> str:
-    """Return what the styles of a name share: `TYPE EMPLACEMENT` is `typeemplacement`."""
+    """Return a name in lower case without accents and signs: `TYPE (cm)` becomes `typecm`."""
     plain = unicodedata.normalize("NFKD", name).casefold()
     return "".join(letter for letter in plain if letter.isalnum())
 
 
 def find_field(name: str, spec: LayerSpec, fields: Sequence[str]) -> str | None:
-    """Return the field of that name, of an alias, or of one that differs in style, or None."""
+    """Return the field with a name or one of its aliases, exact or folded, or None."""
     names = (name, *dict(spec.aliases).get(name, ()))
-    folded = {fold(field): field for field in reversed(fields) if fold(field)}
+    by_folded_name = {fold(field): field for field in reversed(fields) if fold(field)}
     exact = (candidate for candidate in names if candidate in fields)
-    alike = (folded[fold(candidate)] for candidate in names if fold(candidate) in folded)
-    return next(exact, None) or next(alike, None)
+    similar = (by_folded_name.get(fold(candidate)) for candidate in names)
+    return next(exact, None) or next(filter(None, similar), None)
 
 
 def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
-    """Return a specification that calls every field as the file does."""
+    """Return a specification with the names of the fields in the file."""
 
     def own(name: str) -> str:
-        return find_field(name, spec, fields) or name  # which an error names if it is absent
+        return find_field(name, spec, fields) or name  # an absent field is an error later
 
     class_by, width_by = spec.class_by, spec.width_by
     return dataclasses.replace(
@@ -76,40 +76,39 @@ def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
     )
 
 
-# What portals call the two by default; a catalogue lists other names as their aliases.
+# Default names of the geometry fields on portals; a catalogue lists other names as aliases.
 SHAPE = "geo_shape"
 POINT = "geo_point_2d"
 
 
-class Positions:
-    """Finds the position of the records of a table; SourceError if it has no field for one.
+class PositionReader:
+    """Reads the positions of the records of a table; SourceError if it has no field for them.
 
-    The shape goes first, because it says which coordinate is which; then the point, which is ``lat,
-    lon``, and then two fields with a coordinate each.
+    The field of the shape goes first, because its axis order is certain; then the geometry outside
+    the fields, the field of the point, which is ``lat, lon``, and two fields of coordinates.
     """
 
-    def __init__(self, spec: LayerSpec, table: Table, *, where: str) -> None:
+    def __init__(self, spec: LayerSpec, table: ServiceTable, *, where: str) -> None:
         def own(name: str | None) -> str | None:
             return name and find_field(name, spec, table.fields)
 
         self._shape, self._point = own(SHAPE), own(POINT)
         self._x, self._y = own(spec.x_field), own(spec.y_field)
-        named = spec.x_field or (self._shape or self._point) or table.has_geometry
-        if not named:
+        if not (spec.x_field or self._shape or self._point or table.has_geometry):
+            # The catalogue names no field of the file: try common names.
             self._x, self._y = known_coordinates(table.fields)
             self._shape = None if self._x else known_field(SHAPE_NAMES, table.fields)
         columns = (self._shape, self._point, self._x, self._y)
         self.fields = tuple(field for field in columns if field is not None)
         coordinates = self._x and self._y
-        positioned = self._shape or self._point or coordinates or table.has_geometry
-        if not (positioned or table.empty):
+        if not (self._shape or self._point or coordinates or table.has_geometry or table.empty):
             raise SourceError(
                 f"{where} has no position: none of its fields {', '.join(table.fields)} is "
                 f"{SHAPE} or {POINT}; name the one that is, as an alias in the catalogue."
             )
 
-    def of(self, record: Record) -> Position:
-        """Return the position of a record, or None where it has none."""
+    def position(self, record: ServiceRecord) -> Position:
+        """Return the position of a record, or None; BadFeatureError if it is invalid."""
         values = record.values
         if isinstance(record.geometry, BadFeatureError):
             raise record.geometry
@@ -129,12 +128,12 @@ class Positions:
 
 
 def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
-    """Return the first field that has one of some names, in upper or lower case."""
+    """Return the first field with one of the names, which are in lower case."""
     return next((field for field in fields if field.lower() in names), None)
 
 
 def known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
-    """Return two fields whose names say that they are coordinates."""
+    """Return the fields of x and y by common names, or two None."""
     for xs, ys in KNOWN_NAMES:
         x, y = known_field(xs, fields), known_field(ys, fields)
         if x and y:
@@ -143,16 +142,16 @@ def known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
 
 
 def _shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
-    """Return a shape that is built, GeoJSON, JSON of Esri, such JSON as text, WKT, or WKB."""
+    """Return a geometry from GeoJSON, Esri's JSON (also as text), WKT, WKB or a geometry."""
     if value is None or value == "" or isinstance(value, shapely.Geometry):
         return value or None
     try:
-        return _built(value)
+        return _parse_shape(value)
     except (AttributeError, LookupError, TypeError, ValueError, ShapelyError) as error:
         raise BadFeatureError(f"its shape {_shown(value)} is not a geometry") from error
 
 
-def _built(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
+def _parse_shape(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
     if isinstance(value, bytes):
         return shapely.from_wkb(value)
     if isinstance(value, str) and value.lstrip()[:1].isalpha():
@@ -167,12 +166,12 @@ def _built(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
     if geometry["type"] == "Point" and geometry["coordinates"]:
         x, y = geometry["coordinates"][:2]
         return float(x), float(y)
-    with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+    with np.errstate(invalid="ignore"):  # all geometries are checked for NaN later
         return shapely.geometry.shape(geometry)
 
 
 def esri_shape(geometry: Mapping[str, Any]) -> Position:
-    """Return a geometry that is written as the ArcGIS REST API does; its rings take turns."""
+    """Return a geometry from JSON of the ArcGIS REST API; a ring inside another is a hole."""
     if "x" in geometry:
         x, y = (math.nan if value is None else float(value) for value in map(geometry.get, "xy"))
         return None if math.isnan(x) and math.isnan(y) else (x, y)
@@ -184,7 +183,7 @@ def esri_shape(geometry: Mapping[str, Any]) -> Position:
 
 
 def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
-    """Return a point written ``lat, lon``, as a list of the two, by name, as GeoJSON or WKB."""
+    """Return a point from text ``lat, lon``, a list of both, a dict, GeoJSON or WKB."""
     if value is None or (isinstance(value, str) and not value.strip()):
         return None
     if isinstance(value, bytes) or (isinstance(value, dict) and "type" in value):
@@ -209,7 +208,6 @@ def _coordinates(values: Mapping[str, Any], x: str, y: str) -> tuple[float, floa
     if all(value is None or value == "" for value in both):
         return None
     try:
-        # What is no number, raises.
         return tuple(decimal(v) if isinstance(v, str) else float(v) for v in both)  # type: ignore[arg-type, return-value]
     except (TypeError, ValueError) as error:
         raise BadFeatureError(
@@ -222,16 +220,16 @@ def _shown(value: object) -> str:
     return repr(text if len(text) <= 60 else f"{text[:60]}...")  # noqa: PLR2004 - fits a line
 
 
-# What people make of a service's data with other programs, and leave beside its own files.
+# Files that other programs make from the data of a service.
 VECTOR_SUFFIXES = frozenset({".fgb", ".gpkg", ".shp", ".zip"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Download:
-    """What a service sent of a layer: files that are read one after the other as one table.
+    """Files of a layer from a service, which are read one after the other as one table.
 
-    `fields` are those that it names, for rows may lack what they have no value for; `area` is what
-    it was asked for.
+    `fields` are the fields that the service lists, because rows may lack fields without a value;
+    `area` is the requested one.
     """
 
     spec: LayerSpec
@@ -244,43 +242,42 @@ class Download:
         first, *others = (file.path for file in self.files)
         if first.suffix.lower() in VECTOR_SUFFIXES:
             return _read_vector(first, self.spec, filters=filters, crs=None)
-        table = open_table(first)
+        first_table = open_table(first)
 
-        def records(names: Sequence[str]) -> Iterator[Record | str]:
-            yield from table.records(names)
+        def records(names: Sequence[str]) -> Iterator[ServiceRecord | str]:
+            yield from first_table.records(names)
             for path in others:
                 yield from open_table(path).records(names)
 
-        whole = dataclasses.replace(table, records=records, rest=0)
+        table = dataclasses.replace(first_table, records=records, rest=0)
         if self.fields:
-            whole = dataclasses.replace(whole, fields=self.fields, empty=False)
-        (layer,) = _read_table(whole, [self.spec], first, filters=filters, crs=None)
-        return layer if self.area is None else _righted(layer, self.area)
+            table = dataclasses.replace(table, fields=self.fields, empty=False)
+        (layer,) = _read_table(table, [self.spec], first, filters=filters, crs=None)
+        return layer if self.area is None else _with_axes_corrected(layer, self.area)
 
 
-def _righted(layer: RawLayer, area: Area) -> RawLayer:
-    """Exchange x and y where none of the rows touches the area that was asked for, but then do."""
+def _with_axes_corrected(layer: RawLayer, area: Area) -> RawLayer:
+    """Swap x and y if no row is in the requested area before, and some rows are after it."""
     shapes = layer.table.geometry.to_numpy()
     box = shapely.box(*area.bounds)
     if layer.table.crs != WGS84 or shapely.intersects(shapes, box).any():
         return layer
-    turned = shapely.transform(shapes, lambda xy: xy[:, ::-1])
-    if not shapely.intersects(turned, box).any():
+    new_shapes = shapely.transform(shapes, lambda xy: xy[:, ::-1])
+    if not shapely.intersects(new_shapes, box).any():
         return layer
     note = "the service sends latitude as x and longitude as y; exchanged here"
-    table = layer.table.set_geometry(gpd.GeoSeries(turned, layer.table.index, crs=WGS84))
+    table = layer.table.set_geometry(gpd.GeoSeries(new_shapes, layer.table.index, crs=WGS84))
     return dataclasses.replace(layer, table=table, notes=(*layer.notes, note))
 
 
 def read_layers(
     path: str | Path, specs: Sequence[LayerSpec], *, filters: bool = True, crs: str | None = None
 ) -> tuple[RawLayer, ...]:
-    """Read layers, in one pass, from a file that was downloaded from a service, as it is.
+    """Read layers, in one pass, from an unchanged file of a service.
 
-    JSON of Opendatasoft (version 1, 2.0 or 2.1 of its API), CKAN, Socrata and ArcGIS, GeoJSON, GML,
-    CSV and Parquet are told apart by what is in the file; a vector file or archive made of such a
-    file will do too. It is in WGS 84 if it states nothing else; `crs` is for a file that states
-    none.
+    The content of the file shows its format: JSON of Opendatasoft (version 1, 2.0 or 2.1 of its
+    API), CKAN, Socrata or ArcGIS, GeoJSON, GML, CSV or Parquet. A vector file or archive made from
+    such a file is read too. `crs` is for a file that states none, by default WGS 84.
     """
     path = Path(path)
     if path.suffix.lower() in VECTOR_SUFFIXES:
@@ -289,7 +286,7 @@ def read_layers(
 
 
 def _read_table(
-    table: Table, specs: Sequence[LayerSpec], path: Path, *, filters: bool, crs: str | None
+    table: ServiceTable, specs: Sequence[LayerSpec], path: Path, *, filters: bool, crs: str | None
 ) -> tuple[RawLayer, ...]:
     layers = [_TableLayer(spec, table, path, filters=filters, crs=crs) for spec in specs]
     for record in table.records([field for layer in layers for field in layer.fields]):
@@ -300,17 +297,17 @@ def _read_table(
 
 def _read_vector(path: Path, spec: LayerSpec, *, filters: bool, crs: str | None) -> RawLayer:
     layers = {info.name: info for info in vector_file.list_layers(path)}
-    named = [layers[spec.layer]] if spec.layer in layers else list(layers.values())
-    fields = [field for info in named for field in info.fields]
+    infos = [layers[spec.layer]] if spec.layer in layers else list(layers.values())
+    fields = [field for info in infos for field in info.fields]
     layer = vector_file.read_layer(path, settle_fields(spec, fields), filters=filters, crs=crs)
     return dataclasses.replace(layer, spec=spec)
 
 
 class _TableLayer:
-    """One layer that is being read from a table."""
+    """A layer during the reading of a table."""
 
     def __init__(
-        self, spec: LayerSpec, table: Table, path: Path, *, filters: bool, crs: str | None
+        self, spec: LayerSpec, table: ServiceTable, path: Path, *, filters: bool, crs: str | None
     ) -> None:
         self._spec = spec
         where = f"layer {spec.name!r} ({path})"
@@ -326,29 +323,28 @@ class _TableLayer:
                 "export the whole dataset instead"
             )
             self._notes += (rest,)
-        # A table without rows has no fields to look at.
+        # The fields of a table without rows are unknown.
         fields = [field for _, field in spec.fields] if table.empty else table.fields
-        named = settle_fields(spec, fields)
-        self._rules = RowRules(named, fields, filters=filters, where=where)
-        self._positions = Positions(spec, table, where=where)
+        self._rules = RowRules(settle_fields(spec, fields), fields, filters=filters, where=where)
+        self._positions = PositionReader(spec, table, where=where)
         self._rows = Rows()
         self.fields = (*self._rules.fields, *self._positions.fields)
 
-    def add(self, record: Record | str) -> None:
+    def add(self, record: ServiceRecord | str) -> None:
         """Add the next row of the table."""
         self._rows.read += 1
         if isinstance(record, str):
             self._rows.errors[self._rows.read] = record
             return
         try:
-            position: Position | str = self._positions.of(record)
+            position: Position | str = self._positions.position(record)
         except BadFeatureError as error:
             position = str(error)
         values = [record.values.get(field) for field in self._rules.fields]  # JSON omits nulls
         self._rows.add(values, str(self._rows.read), position)
 
     def raw(self) -> RawLayer:
-        """Return what was read."""
+        """Return the layer after the last row."""
         layer = raw_layer(
             self._rows, self._rules, self._crs, by_file=self._by_file, notes=self._notes
         )

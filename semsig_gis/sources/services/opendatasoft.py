@@ -1,4 +1,4 @@
-"""Opendatasoft portals, such as Open Data Paris, by their Explore API v2.1."""
+"""Datasets of Opendatasoft portals, such as Open Data Paris, by the Explore API v2.1."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from urllib.parse import quote
 
 import shapely
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
-from semsig_gis.sources.services.pages import NOT_FOUND, Query
-from semsig_gis.storage.text import parse_json
+from semsig_gis.sources.services.pages import NOT_FOUND, ServiceQuery
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,23 +22,25 @@ if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
     from semsig_gis.sources.services.pages import Client
 
-# Longer addresses are refused by some servers.
+# Some servers refuse longer addresses.
 LONGEST_OUTLINE = 2_000
 GEOJSON = ("application/geo+json", "application/vnd.geo+json", "application/json")
 
 
 def fetch_layer(client: Client, area: Area | None) -> Download:
-    """Fetch a dataset from a portal, as one file.
+    """Fetch a dataset from a portal as one file.
 
-    Its description is asked for, then one export (Explore API v2.1), whose ``where`` is the layer's
-    ``server_where`` and the area; for an outline of very many corners, a somewhat larger one. Where
-    a layer selects fields, those that its other keys name are selected too.
+    The first request gets its description, the second one an export. The ``where`` of the export
+    consists of the layer's ``server_where`` and the area; an outline with very many corners becomes
+    a slightly larger one. A layer that selects fields also gets the fields of its other keys.
     """
     dataset = quote(client.dataset, safe="")
     address = f"{client.endpoint}/api/explore/v2.1/catalog/datasets/{dataset}"
     file = client.file(
-        Query(f"{address}/exports/geojson", _query(client, _field_types(address, client), area)),
-        _require_whole,
+        ServiceQuery(
+            f"{address}/exports/geojson", _query(client, _field_types(address, client), area)
+        ),
+        _check_complete,
         accept=GEOJSON,
         suffix=".geojson",
         progress=client.progress,
@@ -47,20 +49,18 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
 
 
 def _field_types(address: str, client: Client) -> Mapping[str, str]:
-    """Return the fields of a dataset and their types, as its description has them."""
+    """Return the types of the fields of a dataset, by name."""
     try:
-        return client.document(Query(address), _described, accept=("application/json",))
+        return client.document(
+            ServiceQuery(address), _parse_description, accept=("application/json",)
+        )
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        raise CatalogError(
-            f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
-            f"layer {client.layer.name!r}; look for it at {client.endpoint}/explore and correct "
-            "`dataset` in the catalogue."
-        ) from error
+        raise client.absent_dataset("explore") from error
 
 
-def _described(reply: bytes) -> dict[str, str]:
+def _parse_description(reply: bytes) -> dict[str, str]:
     try:
         content: Any = parse_json(reply)
         return {field["name"]: field["type"] for field in content["fields"]}
@@ -94,7 +94,7 @@ def _query(client: Client, types: Mapping[str, str], area: Area | None) -> dict[
 
 
 def _inside(area: Area, field: str) -> str:
-    """Return the condition that a position is in an area, in the portal's language (ODSQL)."""
+    """Return the condition in ODSQL that a position is in an area."""
     west, south, east, north = area.bounds
     if area.polygon.equals(shapely.box(west, south, east, north)):
         return f"in_bbox({field}, {south:.7f}, {west:.7f}, {north:.7f}, {east:.7f})"
@@ -102,22 +102,22 @@ def _inside(area: Area, field: str) -> str:
 
 
 def _outline(polygon: BaseGeometry) -> str:
-    """Return an outline as text, short enough for an address and never smaller than it was."""
+    """Return a polygon as WKT, short enough for an address; it covers the given polygon."""
     text: str = shapely.to_wkt(polygon, rounding_precision=7)
-    room = 1e-5  # degrees: about a metre
+    tolerance = 1e-5  # degrees: about a metre
     while len(text) > LONGEST_OUTLINE:
-        # What is cut off is never wider than what was added, whose round corners are cut a little.
-        polygon = polygon.buffer(1.1 * room, quad_segs=2).simplify(room)
+        # The buffer is wider than the tolerance, because its round corners lie a little inside.
+        polygon = polygon.buffer(1.1 * tolerance, quad_segs=2).simplify(tolerance)
         text = shapely.to_wkt(polygon, rounding_precision=7)
-        room *= 2
+        tolerance *= 2
     return text
 
 
-def _require_whole(path: Path) -> None:
-    """Refuse a file that does not begin and end as GeoJSON does."""
+def _check_complete(path: Path) -> None:
+    """Raise SourceError for a file that does not start and end as GeoJSON does."""
     with path.open("rb") as stream:
-        begin = stream.read(16).lstrip()
+        start = stream.read(16).lstrip()
         stream.seek(max(0, path.stat().st_size - 16))
         end = stream.read().rstrip()
-    if not (begin.startswith(b"{") and end.endswith(b"}")):
+    if not (start.startswith(b"{") and end.endswith(b"}")):
         raise SourceError("what the portal sent is not whole geojson; try again later.")

@@ -7,13 +7,13 @@ import functools
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
 from semsig_gis.sources.services.pages import (
     NOT_FOUND,
     Page,
-    Query,
+    ServiceQuery,
     geojson_page,
     json_value,
 )
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     Box = tuple[float, float, float, float]
 
 PAGE_ROWS = 10_000
-LOCATION = "location"  # coordinates and an address, of which there is no GeoJSON
+LOCATION = "location"  # coordinates and an address; it cannot be exported as GeoJSON
 TEXT = "text"
 POINTS = frozenset({"location", "multipoint", "point"})
 SHAPES = frozenset({"line", "multiline", "multipolygon", "polygon"})
 
 
 def fetch_layer(client: Client, area: Area | None) -> Download:
-    """Fetch a dataset by its identifier, such as ``uvpi-gqnh``, ordered by its rows' own.
+    """Fetch a dataset by its identifier, such as ``uvpi-gqnh``, ordered by the ids of its rows.
 
-    ``server_where`` is a condition in SoQL. Of several columns with a geometry, that of an alias
-    holds, or the first.
+    ``server_where`` is a condition in SoQL. Of several geometry columns, the one of an alias is
+    used, or else the first.
     """
     about = _about(client)
     types = _types(about)
-    layer = client.licensed((about.get("license") or {}).get("name"), about.get("attribution"))
+    layer = client.with_license((about.get("license") or {}).get("name"), about.get("attribution"))
     places = [name for name, kind in types.items() if kind in POINTS | SHAPES]
     place = find_field(SHAPE, layer, places) or find_field(POINT, layer, places)
     place = place or next(iter(places), None)
@@ -54,39 +54,35 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     fields = client.fields(list(types))
     if not fields and len(places) > 1:
         fields = [name for name in types if name not in places]
-    beside = (place, *_coordinates(client, list(types)))
-    listed = dict.fromkeys([*fields, *(name for name in beside if name)])
+    position_fields = filter(None, (place, *_coordinates(client, list(types))))
+    columns = dict.fromkeys([*fields, *position_fields])
     files: tuple[Fetched, ...] = ()
     for box in area.boxes if area is not None else (None,):
         where = _where(client, types, place, box)
         params: dict[str, str | float] = {"$where": where} if where else {}
-        counted = client.document(
-            Query(f"{address}.json", {**params, "$select": "count(*)"}),
+        total = client.document(
+            ServiceQuery(f"{address}.json", {**params, "$select": "count(*)"}),
             lambda content: _count(content, client),
         )
         if fields:
-            params["$select"] = ",".join(listed)
+            params["$select"] = ",".join(columns)
         params |= {"$order": ":id", "$limit": PAGE_ROWS}
-        files += _fetch_pages(client, Query(f"{address}.{kind}", params), told=counted)
+        files += _fetch_pages(client, ServiceQuery(f"{address}.{kind}", params), total=total)
     return Download(spec=layer, files=files, fields=tuple(types))
 
 
 def _about(client: Client) -> dict[str, Any]:
     address = f"{client.endpoint}/api/views/{quote(client.dataset, safe='')}.json"
     try:
-        return client.json(Query(address))
+        return client.json(ServiceQuery(address))
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        raise CatalogError(
-            f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
-            f"layer {client.layer.name!r}; look for it at {client.endpoint}/browse and correct "
-            "`dataset` in the catalogue."
-        ) from error
+        raise client.absent_dataset("browse") from error
 
 
 def _types(about: Mapping[str, Any]) -> dict[str, str]:
-    """Return the columns of a dataset and their types, without those that the portal computes."""
+    """Return the types of a dataset's columns, without columns that the portal computes."""
     columns = about.get("columns")
     if not isinstance(columns, list):
         raise SourceError(
@@ -98,7 +94,7 @@ def _types(about: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | None]:
-    """Return the columns of longitude and latitude, by the catalogue or by their names."""
+    """Return the columns of longitude and latitude from the catalogue or by common names."""
     layer = client.layer
     if layer.x_field and layer.y_field:
         x, y = (find_field(name, layer, fields) for name in (layer.x_field, layer.y_field))
@@ -109,41 +105,43 @@ def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | N
 def _where(
     client: Client, types: Mapping[str, str], place: str | None, box: Box | None
 ) -> str | None:
-    """Return the condition for an area and the layer's filter."""
+    """Return the condition for a box and the layer's filter; None without both.
+
+    A dataset without columns of positions is not limited to the box.
+    """
     conditions = [client.layer.server_where] if client.layer.server_where else []
     if box is not None:
-        conditions += _inside(client, types, place, box)
+        west, south, east, north = (f"{number:.7f}" for number in box)
+        if place is None:
+            # Two columns of coordinates, which may be text.
+            names = _coordinates(client, list(types))
+            conditions += [
+                f"{name}{'::number' * (types[name] == TEXT)} between {least} and {most}"
+                for name, least, most in zip(names, (west, south), (east, north), strict=True)
+                if name is not None
+            ]
+        elif types[place] in POINTS:
+            conditions.append(f"within_box({place}, {north}, {west}, {south}, {east})")
+        else:
+            corners = [(west, south), (east, south), (east, north), (west, north), (west, south)]
+            ring = ", ".join(f"{x} {y}" for x, y in corners)
+            conditions.append(f"intersects({place}, 'POLYGON (({ring}))')")
     return " AND ".join(f"({condition})" for condition in conditions) or None
 
 
-def _inside(client: Client, types: Mapping[str, str], place: str | None, box: Box) -> list[str]:
-    """Return the conditions that a row is in a box, none where that cannot be asked."""
-    west, south, east, north = (f"{number:.7f}" for number in box)
-    if place is not None and types[place] in POINTS:
-        return [f"within_box({place}, {north}, {west}, {south}, {east})"]
-    if place is not None:
-        corners = [(west, south), (east, south), (east, north), (west, north), (west, south)]
-        ring = ", ".join(f"{x} {y}" for x, y in corners)
-        return [f"intersects({place}, 'POLYGON (({ring}))')"]
-    names = _coordinates(client, list(types))
-    return [
-        f"{name}{'::number' * (types[name] == TEXT)} between {least} and {most}"
-        for name, least, most in zip(names, (west, south), (east, north), strict=True)
-        if name is not None
-    ]
-
-
-def _fetch_pages(client: Client, query: Query, *, told: int | None) -> tuple[Fetched, ...]:
-    def then(page: Page, rows: int) -> Query | None:
-        rest = page.rows and (told is None or rows < told)
-        return Query(query.url, {**query.params, "$offset": rows}) if rest else None
+def _fetch_pages(client: Client, query: ServiceQuery, *, total: int | None) -> tuple[Fetched, ...]:
+    def then(page: Page, rows: int) -> ServiceQuery | None:
+        rest = page.rows and (total is None or rows < total)
+        return ServiceQuery(query.url, {**query.params, "$offset": rows}) if rest else None
 
     read = functools.partial(_page, client=client)
-    return client.pages(Query(query.url, {**query.params, "$offset": 0}), read, then, told=told)
+    return client.pages(
+        ServiceQuery(query.url, {**query.params, "$offset": 0}), read, then, total=total
+    )
 
 
 def _page(content: bytes, client: Client) -> Page:
-    """Return a page of GeoJSON, or a list of rows."""
+    """Parse a page of GeoJSON, or a list of rows."""
     value = json_value(content, client.endpoint)
     if isinstance(value, list):
         return Page(value)
@@ -151,7 +149,7 @@ def _page(content: bytes, client: Client) -> Page:
 
 
 def _count(content: bytes, client: Client) -> int | None:
-    """Return the only number in the only row of an answer."""
+    """Return the number in an answer with one row and one column, or None."""
     value = json_value(content, client.endpoint)
     try:
         return int(next(iter(value[0].values())))

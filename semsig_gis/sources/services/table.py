@@ -1,4 +1,4 @@
-"""The records of a file that a service sends: JSON of each kind, GML, CSV, Parquet."""
+"""Records of a file from a service: JSON in several forms, GML, CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.sources import require_file
+from semsig_gis.core import CrsError, SourceError
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.http.errors import error_text
+from semsig_gis.sources.paths import require_file
 from semsig_gis.sources.rows import WGS84
 from semsig_gis.sources.services.gml import (
     ID,
@@ -25,40 +25,37 @@ from semsig_gis.sources.services.gml import (
     read_feature,
     stated_crs,
 )
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from semsig_gis.sources.csv_file import CsvFile
-
 BATCH = 10_000
-ESRI_CODES = 37_000  # from which on codes are Esri's own
-# How services call the number of all rows: Opendatasoft 2.1 and 1, WFS and OGC API Features, CKAN.
+ESRI_CODES = 37_000  # codes from here on are Esri's, lower ones EPSG's
+# Names of the number of all rows: Opendatasoft 2.1 and 1, WFS and OGC API Features, CKAN.
 TOTALS = ("total_count", "nhits", "numberMatched", "totalFeatures", "total")
 
 
-class Record(NamedTuple):
-    """One row: its fields, and the geometry that stands beside them, or what is wrong with it."""
+class ServiceRecord(NamedTuple):
+    """A row: its fields, and its geometry outside the fields, or the error in that geometry."""
 
     values: Mapping[str, Any]
     geometry: object = None
 
 
-# A row that cannot be understood is the message that says why.
-Records = Iterator[Record | str]
+# A row that cannot be read is an error message.
+Records = Iterator[ServiceRecord | str]
 
 
 @dataclass(frozen=True)
-class Table:
-    """A file that has been opened.
+class ServiceTable:
+    """An opened file.
 
-    `records` takes the fields that are wanted and returns an iterator over the rows, which may have
-    a geometry that is not a field (`has_geometry`). `crs` is what the file states, if it does,
-    and `notes` what is to be told of it. `empty`: no rows, and so nothing to know
-    the fields by. `rest`: rows that the portal has beyond these, where the file is a page of a
-    longer answer.
+    `records` takes the names of the required fields and returns an iterator over the rows. The
+    rows of a file with `has_geometry` have a geometry outside the fields. `crs` is the one that the
+    file states, or None; `notes` are for the user. An `empty` file has no rows, so that its fields
+    are unknown. `rest` is the number of further rows on the portal, if the file is one page.
     """
 
     fields: tuple[str, ...]
@@ -70,47 +67,54 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
-def open_table(path: Path) -> Table:
-    """Open a file by what is in it, whatever its name; SourceError if it cannot be used."""
+def open_table(path: Path) -> ServiceTable:
+    """Open a file by its content, not its name; SourceError if it cannot be used."""
     require_file(path, "a file that a service sends")
     with path.open("rb") as stream:
-        begin = stream.read(256).removeprefix(b"\xef\xbb\xbf").lstrip()
-    if begin.startswith(b"PAR1"):
+        start = stream.read(256).removeprefix(b"\xef\xbb\xbf").lstrip()
+    if start.startswith(b"PAR1"):
         return _parquet(path)
-    if begin.startswith((b"{", b"[")):
+    if start.startswith((b"{", b"[")):
         return _json(path)
-    if begin.startswith(b"<"):
+    if start.startswith(b"<"):
         return _gml(path)
-    return _csv(path)
+    file = open_csv(lambda: path.open("rb"), str(path))
+    separator = file.separator
+
+    def records(_: Sequence[str]) -> Records:
+        for row in file.rows(separator):
+            yield row if isinstance(row, str) else ServiceRecord(row)
+
+    return ServiceTable(file.layouts[separator], records, notes=file.notes)
 
 
-def _json(path: Path) -> Table:
+def _json(path: Path) -> ServiceTable:
     try:
         content = parse_json(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise _not_utf8(path) from error
+        raise SourceError(f"{path} is not UTF-8 text; save it as UTF-8.") from error
     except (ValueError, RecursionError) as error:
         raise SourceError(f"{path} is not whole JSON ({error}); download it again.") from error
     if isinstance(content, dict) and isinstance(content.get("result"), dict):
-        content = content["result"]  # of CKAN, in an envelope
+        content = content["result"]  # CKAN wraps its answers
     collection = isinstance(content, dict) and content.get("type") == "FeatureCollection"
-    items, system, places = content, None, False
+    items, system, has_geometry = content, None, False
     if isinstance(content, dict):
         keys = ("features",) if collection else ("features", "results", "records")
         items = next((content[key] for key in keys if key in content), None)
-        places = "features" in content
+        has_geometry = "features" in content
         system = _member_crs(content, path) if collection else _esri_crs(content, path)
     records = [_record(item) for item in items] if isinstance(items, list) else [""]
-    good = [record for record in records if isinstance(record, Record)]
-    if records and not good:
+    readable = [record for record in records if isinstance(record, ServiceRecord)]
+    if records and not readable:
         raise SourceError(
             f"{path} has no records; give an export of a portal, which is a list of them or has "
             "one under features, results or records."
         )
-    return Table(
-        fields=tuple(dict.fromkeys(name for record in good for name in record.values)),
+    return ServiceTable(
+        fields=tuple(dict.fromkeys(name for record in readable for name in record.values)),
         records=lambda _: iter(records),
-        has_geometry=places or any(record.geometry for record in good),
+        has_geometry=has_geometry or any(record.geometry for record in readable),
         crs=system,
         empty=not records,
         rest=_rest(content, len(records)),
@@ -118,18 +122,21 @@ def _json(path: Path) -> Table:
 
 
 def _rest(content: object, rows: int) -> int:
-    """Return how many rows more a page says that there are, in the words of each service."""
+    """Return the number of rows that a page lacks, from the total that it states."""
     page = content if isinstance(content, dict) else {}
     total = next((page[name] for name in TOTALS if name in page), None)
     return max(total - rows, 0) if isinstance(total, int) else 0
 
 
-def _record(item: object) -> Record | str:
-    """Return a feature, one of Esri, a record of Opendatasoft 1 or 2.0, or a plain one."""
+def _record(item: object) -> ServiceRecord | str:
+    """Return the record in an item of GeoJSON, Esri's JSON, Opendatasoft 1 or 2.0, or plain JSON.
+
+    An error message if it is none of these.
+    """
     if not isinstance(item, dict):
         return f"is {json.dumps(item)[:40]}, not a record"
     if isinstance(item.get("attributes"), dict):
-        return Record(item["attributes"], item.get("geometry"))
+        return ServiceRecord(item["attributes"], item.get("geometry"))
     if item.get("type") == "Feature":
         fields = item.get("properties") or {}
         if not isinstance(fields, dict):
@@ -137,15 +144,15 @@ def _record(item: object) -> Record | str:
         own = item.get(ID)
         if own is not None and ID not in fields:
             fields = {**fields, ID: own}
-        return Record(fields, item.get("geometry"))
+        return ServiceRecord(fields, item.get("geometry"))
     inner = item.get("record", item)
     if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
-        return Record(inner["fields"], inner.get("geometry"))
-    return Record(item)
+        return ServiceRecord(inner["fields"], inner.get("geometry"))
+    return ServiceRecord(item)
 
 
 def _member_crs(content: dict[str, Any], path: Path) -> CRS | None:
-    """Return the CRS that a GeoJSON file of before RFC 7946 states."""
+    """Return the CRS in a GeoJSON file from before RFC 7946."""
     if content.get("crs") is None:
         return None
     try:
@@ -156,7 +163,7 @@ def _member_crs(content: dict[str, Any], path: Path) -> CRS | None:
 
 
 def _esri_crs(content: Mapping[str, Any], path: Path) -> CRS | None:
-    """Return the CRS that the ArcGIS REST API states by its number."""
+    """Return the CRS in JSON of the ArcGIS REST API, given by its code or as WKT."""
     stated = content.get("spatialReference")
     if not isinstance(stated, dict):
         return None
@@ -173,61 +180,47 @@ def _stated_crs(definition: object, path: Path) -> CRS:
         raise CrsError(
             f"{path} states a CRS that is unknown ({str(definition)[:60]}); correct it."
         ) from error
-    return _usual(system)
+    return _without_axis_order(system)
 
 
-def _usual(system: CRS) -> CRS:
+def _without_axis_order(system: CRS) -> CRS:
+    """Return WGS 84 with longitude first for WGS 84 in any axis order."""
     return WGS84 if system.equals(WGS84, ignore_axis_order=True) else system
 
 
-def _gml(path: Path) -> Table:
+def _gml(path: Path) -> ServiceTable:
     content = path.read_bytes()
     try:
         root = parse_xml(content)
     except ValueError as error:
         raise SourceError(f"{path} is not whole GML ({error}); download it again.") from error
-    said = error_text(content)
-    found = list(features(root))
-    if said or not (found or local_name(root) == "FeatureCollection"):
-        what = f"contains the error {said}" if said else "has no features"
+    message = error_text(content)
+    items = list(features(root))
+    if message or not (items or local_name(root) == "FeatureCollection"):
+        what = f"contains the error {message}" if message else "has no features"
         raise SourceError(f"{path} {what}; give GML as a Web Feature Service sends it.")
     crs, swap = stated_crs(content)
-    records = [Record(*read_feature(item, swap=swap)) for item in found]
-    return Table(
+    records = [ServiceRecord(*read_feature(item, swap=swap)) for item in items]
+    return ServiceTable(
         fields=tuple(dict.fromkeys(name for record in records for name in record.values)),
         records=lambda _: iter(records),
         has_geometry=True,
-        crs=None if crs is None else _usual(crs),
+        crs=None if crs is None else _without_axis_order(crs),
         empty=not records,
     )
 
 
-def _csv(path: Path) -> Table:
-    file = open_csv(lambda: path.open("rb"), str(path))
-    separator = file.separator
-    return Table(file.layouts[separator], lambda _: _csv_records(file, separator), notes=file.notes)
-
-
-def _csv_records(file: CsvFile, separator: str) -> Records:
-    for row in file.rows(separator):
-        yield row if isinstance(row, str) else Record(row)
-
-
-def _not_utf8(path: Path) -> SourceError:
-    return SourceError(f"{path} is not UTF-8 text; save it as UTF-8.")
-
-
-def _parquet(path: Path) -> Table:
+def _parquet(path: Path) -> ServiceTable:
     try:
         with pq.ParquetFile(path) as file:
             fields = tuple(file.schema_arrow.names)
             metadata = parse_json((file.schema_arrow.metadata or {}).get(b"geo", b"{}"))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise _broken_parquet(path, error) from error
-    # A portal's own exports name no geometry; those that other programs made of them do.
+    # Exports of portals have no GeoParquet metadata; files from other programs have.
     primary = metadata.get("primary_column")
     stated = metadata.get("columns", {}).get(primary, {}).get("crs")
-    return Table(
+    return ServiceTable(
         fields,
         lambda columns: _parquet_records(path, columns, primary),
         has_geometry=primary is not None,
@@ -241,7 +234,7 @@ def _parquet_records(path: Path, fields: Sequence[str], primary: str | None) -> 
         with pq.ParquetFile(path) as file:
             for batch in file.iter_batches(BATCH, columns=columns):
                 for values in batch.to_pylist():
-                    yield Record(values, values.get(primary))
+                    yield ServiceRecord(values, values.get(primary))
     except (pa.ArrowException, OSError) as error:
         raise _broken_parquet(path, error) from error
 

@@ -1,4 +1,4 @@
-"""Layers of Web Feature Services (OGC WFS 2.0), as GeoJSON or, where there is none, as GML."""
+"""Layers of Web Feature Services (OGC WFS 2.0), as GeoJSON or, if not available, as GML."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import host_of
 from semsig_gis.sources.services.gml import ID, features, local_name
 from semsig_gis.sources.services.layers import Download, find_field
-from semsig_gis.sources.services.pages import Page, Query, geojson_page, xml_root
+from semsig_gis.sources.services.pages import Page, ServiceQuery, geojson_page, xml_root
 
 if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 VERSION = "2.0.0"
 PAGE_ROWS = 5_000
-# Of these, GML has latitude first, and GeoJSON as asked for by its short name has longitude first.
+# With the URN, coordinates in GML are latitude first; with the short name, in GeoJSON, longitude.
 URN, SHORT = "urn:ogc:def:crs:EPSG::4326", "EPSG:4326"
-# How services call GeoJSON, before a semicolon and what they say beside it.
+# Names of GeoJSON in capabilities, without the parameters after a semicolon.
 JSON_FORMATS = frozenset(
     {"application/geo+json", "application/json", "application/vnd.geo+json", "geojson", "json"}
 )
@@ -38,7 +38,7 @@ BOX = (
 
 @dataclass(frozen=True, slots=True)
 class _Capabilities:
-    """What a service says of itself: its types, formats and constraints, and its terms."""
+    """Feature types, formats, constraints and terms of a service."""
 
     types: tuple[str, ...]
     formats: tuple[str, ...]
@@ -46,45 +46,53 @@ class _Capabilities:
     terms: str = ""
     provider: str = ""
 
-    def denies(self, name: str) -> bool:
-        """Tell whether the service says that it lacks something."""
+    def lacks(self, name: str) -> bool:
+        """Whether the service states that it does not support something."""
         return self.constraints.get(name, "").upper() == "FALSE"
 
 
 def fetch_layer(client: Client, area: Area | None) -> Download:
-    """Fetch a feature type, named with or without its prefix, in WGS 84.
+    """Fetch a feature type in WGS 84; its name may lack the prefix.
 
     ``server_where`` is a condition in XML (OGC Filter Encoding 2.0). Rows are ordered by the
-    layer's `id_field` where the service can do that.
+    layer's `id_field` if the service supports it.
     """
-    said = client.document(
+    service = client.document(
         _query(client, "GetCapabilities"), lambda content: _capabilities(content, client)
     )
-    name = _type_name(client, said)
+    dataset = client.dataset
+    matches = [name for name in service.types if dataset in {name, name.rpartition(":")[2]}]
+    if dataset not in matches and len(matches) != 1:
+        raise client.unknown_dataset(service.types, what="feature type")
+    name = dataset if dataset in matches else matches[0]
     types = client.document(
-        _query(client, "DescribeFeatureType").also(typeName=name),
+        _query(client, "DescribeFeatureType").with_params(typeName=name),
         lambda content: _field_types(xml_root(content, client.endpoint)),
     )
     fields = tuple(dict.fromkeys([*types, ID])) if types else ()
-    names = {text.partition(";")[0].strip().lower(): text for text in reversed(said.formats)}
+    names = {text.partition(";")[0].strip().lower(): text for text in reversed(service.formats)}
     json_format = next((text for kind, text in names.items() if kind in JSON_FORMATS), None)
-    query = _query(client, "GetFeature").also(typeNames=name, srsName=SHORT if json_format else URN)
+    query = _query(client, "GetFeature").with_params(
+        typeNames=name, srsName=SHORT if json_format else URN
+    )
     properties = [field for field in client.fields(fields) if field in types]
     places = [field for field, kind in types.items() if kind.startswith("gml:")]
     if properties and places:
-        query = query.also(propertyName=",".join(dict.fromkeys([*properties, *places])))
+        query = query.with_params(propertyName=",".join(dict.fromkeys([*properties, *places])))
     order: dict[str, str | float] = {"outputFormat": json_format} if json_format else {}
     key = client.layer.id_field and find_field(client.layer.id_field, client.layer, fields)
-    if key and key in types and not said.denies("ImplementsSorting"):
+    if key and key in types and not service.lacks("ImplementsSorting"):
         order["sortBy"] = key
     files: tuple[Fetched, ...] = ()
     for box in area.boxes if area is not None else (None,):
-        files += _fetch_pages(client, query.also(**_condition(client, box)), said, order)
-    return Download(spec=client.licensed(said.terms, said.provider), files=files, fields=fields)
+        files += _fetch_pages(client, query.with_params(**_condition(client, box)), service, order)
+    return Download(
+        spec=client.with_license(service.terms, service.provider), files=files, fields=fields
+    )
 
 
-def _query(client: Client, request: str) -> Query:
-    return Query(client.endpoint, {"service": "WFS", "version": VERSION, "request": request})
+def _query(client: Client, request: str) -> ServiceQuery:
+    return ServiceQuery(client.endpoint, {"service": "WFS", "version": VERSION, "request": request})
 
 
 def _capabilities(content: bytes, client: Client) -> _Capabilities:
@@ -129,31 +137,21 @@ def _texts(element: ET.Element, name: str) -> list[str]:
     return [text for text in texts if text]
 
 
-def _type_name(client: Client, said: _Capabilities) -> str:
-    dataset = client.dataset
-    names = [name for name in said.types if dataset in {name, name.rpartition(":")[2]}]
-    if dataset in names:
-        return dataset
-    if len(names) != 1:
-        raise client.unknown(said.types, what="feature type")
-    return names[0]
-
-
 def _field_types(schema: ET.Element) -> dict[str, str]:
-    """Return the properties that a schema describes, and their types."""
-    whole = set(schema)
+    """Return the types of the properties in a schema, by name."""
+    top_level = set(schema)
     elements = (item for item in schema.iter() if local_name(item) == "element")
     return {
         item.get("name", ""): item.get("type", "")
         for item in elements
-        if item not in whole and "name" in item.attrib
+        if item not in top_level and "name" in item.attrib
     }
 
 
 def _condition(
     client: Client, box: tuple[float, float, float, float] | None
 ) -> dict[str, str | float]:
-    """Return the parameters for an area and the layer's filter, of which KVP takes only one."""
+    """Return the parameter for an area and the layer's filter; KVP accepts only one of them."""
     where = client.layer.server_where
     if box is None and not where:
         return {}
@@ -167,27 +165,27 @@ def _condition(
 
 
 def _fetch_pages(
-    client: Client, query: Query, said: _Capabilities, order: dict[str, str | float]
+    client: Client, query: ServiceQuery, service: _Capabilities, order: dict[str, str | float]
 ) -> tuple[Fetched, ...]:
-    """Fetch all rows of a query, as many as the service says that there are."""
-    told = client.document(
-        query.also(resultType="hits"), lambda content: _gml_page(content, client).told
+    """Fetch all rows of a query and check their number."""
+    total = client.document(
+        query.with_params(resultType="hits"), lambda content: _gml_page(content, client).total
     )
     as_json = "outputFormat" in order
     read = functools.partial(geojson_page if as_json else _gml_page, client=client)
     suffix = ".json" if as_json else ".gml"
-    query = query.also(**order)
-    if said.denies("ImplementsResultPaging"):
-        return client.pages(query, read, lambda *_: None, told=told, suffix=suffix)
-    most = said.constraints.get("CountDefault", "")
+    query = query.with_params(**order)
+    if service.lacks("ImplementsResultPaging"):
+        return client.pages(query, read, lambda *_: None, total=total, suffix=suffix)
+    most = service.constraints.get("CountDefault", "")
     count = min(PAGE_ROWS, int(most) if most.isdecimal() and int(most) else PAGE_ROWS)
 
-    def then(page: Page, rows: int) -> Query | None:
-        rest = told is None or rows < told
-        return query.also(count=count, startIndex=rows) if page.rows and rest else None
+    def then(page: Page, rows: int) -> ServiceQuery | None:
+        rest = total is None or rows < total
+        return query.with_params(count=count, startIndex=rows) if page.rows and rest else None
 
-    # Services that cannot order rows by nature refuse any startIndex.
-    return client.pages(query.also(count=count), read, then, told=told, suffix=suffix)
+    # No startIndex for the first page: a service that cannot order rows refuses it.
+    return client.pages(query.with_params(count=count), read, then, total=total, suffix=suffix)
 
 
 def _gml_page(content: bytes, client: Client) -> Page:
@@ -199,4 +197,4 @@ def _gml_page(content: bytes, client: Client) -> Page:
         )
     matched = root.get("numberMatched", "")
     rows = [ET.tostring(item, encoding="unicode") for item in features(root)]
-    return Page(rows, told=int(matched) if matched.isdecimal() else None)
+    return Page(rows, total=int(matched) if matched.isdecimal() else None)

@@ -9,21 +9,20 @@ import pytest
 from sentences import refused
 from worlds import QUERIES, TOWN, contents, save_town
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.paper.reproduction import paper_experiments, reproduce, time_queries
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.reports.paper.report import reproduction_report
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import InputError, SemsigError
+from semsig_gis.database import open_database, save_database
+from semsig_gis.evaluation import paper_experiments, reproduce, time_queries
+from semsig_gis.evaluation import published as paris
+from semsig_gis.localization import Method, score_cells
+from semsig_gis.reports import reproduction_report
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.evaluation.paper.reproduction import Reproduction
-    from semsig_gis.reports.report_model import Number, Report
+    from semsig_gis.evaluation import Reproduction
+    from semsig_gis.reports import Number, Report
 
 
 def test_everything_that_the_paper_runs_is_there(snapshot: Callable[[str, str], None]) -> None:
@@ -102,7 +101,7 @@ def test_a_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPa
     before = contents(reproduced)
     for name in ("build_database", "time_queries", "save_database"):
         monkeypatch.setattr(f"semsig_gis.evaluation.paper.reproduction.{name}", never)
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", never)
+    monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", never)
     database = reproduced.parent / "city.parquet"
     found = reproduce(reproduced, database=database, queries=QUERIES)
     assert found.settings["queries"] == QUERIES
@@ -245,7 +244,7 @@ def test_every_figure_that_the_paper_prints_stands_beside_ours(report: Report) -
           for text in paris.GROUPS[key]),
         *(value for pair in paris.ACCURACY.values() for value in pair if value is not None),
         *paris.QUERY_MS.values(),
-        paris.ALONE,
+        paris.UNAMBIGUOUS,
     ]  # fmt: skip
     assert set(printed) <= set(told)
     points = [y for part in report.sections for plot in part.plots for _, y, _ in plot.paper]

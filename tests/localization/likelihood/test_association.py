@@ -25,32 +25,35 @@ from noisy_cells import (
 from view_oracle import bearing_density, cell_loglik, random_view
 from worlds import CODES, World, random_town
 
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.database import views_in
-from semsig_gis.localization.likelihood.association import (
+from semsig_gis.core import ObjectIndex, Signature
+from semsig_gis.database import visible_objects_in
+from semsig_gis.localization import (
     Detections,
+    NoiseMixture,
+    NoiseSpec,
     Pairs,
+    PhotoTable,
     align_cells,
     associate,
     associate_pairs,
+    build_index,
+    cell_noise,
+    database_tables,
+    explain,
+    explain_cell,
+    named_noise,
     near_pairs,
+    photo_loglik,
+    query_bearings,
     rerank,
+    visible_objects_off_centre,
 )
-from semsig_gis.localization.likelihood.explain import explain, explain_cell
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.off_centre import views_off_centre
-from semsig_gis.localization.likelihood.photo import LOST, PhotoTable, photo_loglik
-from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, cell_noise, named_noise
-from semsig_gis.localization.noise.table import database_tables, query_bearings
-from semsig_gis.observation.view import FULL_VIEW, Photo, View
+from semsig_gis.localization.likelihood.photo import LOST
+from semsig_gis.observation import FULL_VIEW, Photo, View
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.likelihood.association import Association
-    from semsig_gis.localization.likelihood.explain import Explanation
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Association, Explanation, Noise, NoiseTable
 
 SEEDS = st.integers(0, 10_000)
 GENERIC = named_noise("generic")
@@ -158,7 +161,7 @@ def test_pairs_weigh_as_one_at_a_time(seed: int, size: int, noise: NoiseSpec, si
     database = random_database(seed)
     query = random_query(database, seed, size=size)
     (table,), _ = database_tables(database, noise)
-    views, starts = views_in(database, np.array([0])), np.array([0, size])
+    views, starts = visible_objects_in(database, np.array([0])), np.array([0, size])
     pairs = near_pairs(views.offsets, views.bearings, starts, query_bearings(query))
     found = associated_views(database, query, noise)
     weights = slow_weights(table, database, query, 0)
@@ -175,7 +178,7 @@ def associated_views(
     """Associate what the photos of a query show with what the first cell sees."""
     (table,), _ = database_tables(database, noise)
     seen = Detections.of([query], table)
-    views = views_in(database, np.zeros(len(seen.photos), np.int64))
+    views = visible_objects_in(database, np.zeros(len(seen.photos), np.int64))
     return associate(
         table,
         views,
@@ -279,7 +282,7 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
     cells = rng.choice(longest[:80], 40, replace=False)
     along = (np.arange(side) - 1) * town.grid.step / side
     places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
-    seen = views_off_centre(town, cells, places)
+    seen = visible_objects_off_centre(town, cells, places)
     query = View.of(town.signature(int(cells[0])))
     sharp = [replace(spec, bearing_sigma=1.5) for spec in GENERIC.specs]
     noise = NoiseMixture(specs=tuple(sharp), weights=weights, name="sharp")

@@ -15,19 +15,21 @@ from scipy.stats import binom, poisson
 from view_oracle import cell_loglik, random_view, scene_of, set_loglik, turned_loglik
 from worlds import random_town
 
-from semsig_gis.core.geometry import consecutive
-from semsig_gis.core.signature import Signature
-from semsig_gis.localization.likelihood.index import build_index, index_fingerprint
-from semsig_gis.localization.likelihood.kernels import promising_cells
-from semsig_gis.localization.likelihood.off_centre import views_off_centre
-from semsig_gis.localization.likelihood.turns import TURNS
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.core import Signature, consecutive
+from semsig_gis.localization import (
+    TURNS,
+    build_index,
+    cell_noise,
+    database_tables,
+    index_fingerprint,
+    named_noise,
+    promising_cells,
+    visible_objects_off_centre,
+)
+from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.noise.model import NoiseSpec
+    from semsig_gis.localization import LikelihoodIndex, NoiseSpec
 
 SEEDS = st.integers(0, 10_000)
 NOISE = named_noise("generic")
@@ -134,7 +136,7 @@ def test_places_aside_are_summed_over(
     cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
     step = town.grid.step
     places = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
-    seen = views_off_centre(town, cells, places)
+    seen = visible_objects_off_centre(town, cells, places)
     (spec,) = cell_noise(noise, step / 2.0).specs
     (table,), _ = database_tables(town, spec)
     codes = town.present_codes.tolist()

@@ -14,28 +14,28 @@ from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_q
 from sentences import refused
 from worlds import CODES, World
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.database import views_in
-from semsig_gis.localization.noise.fit import (
+from semsig_gis.core import InputError, Signature, wilson_interval
+from semsig_gis.database import visible_objects_in
+from semsig_gis.localization import (
     ALL,
+    Sample,
     drawn_rates,
     estimated_rates,
     expected_counts,
     gather_evidence,
+    learn_noise,
     model_change,
     next_model,
+    noise_from_dict,
+    read_samples,
 )
-from semsig_gis.localization.noise.learn import Sample, learn_noise, read_samples
-from semsig_gis.localization.noise.model import noise_from_dict
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.learn import NoiseEstimate
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import NoiseEstimate
 
 # What the simulated detector does; the estimator has no part in it.
 DETECTION = {1: 0.9, 2: 0.7, 3: 0.8, 4: 0.6}
@@ -68,7 +68,7 @@ def detector(seed: int, seen: list[tuple[int, float]]) -> Signature:
 
 
 def simulated(database: SignatureDatabase, count: int, *, seed: int = 0) -> list[Sample]:
-    views = views_in(database, np.arange(len(database)))
+    views = visible_objects_in(database, np.arange(len(database)))
     samples = []
     for number in range(count):
         cell = number % len(database)
@@ -227,7 +227,7 @@ def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
 def photographed(count: int, *, seed: int = 0) -> NoiseEstimate:
     """Learn from photos from the cells of a random city."""
     database = random_database(seed, cells=100, longest=14)
-    views = views_in(database, np.arange(len(database)))
+    views = visible_objects_in(database, np.arange(len(database)))
     samples = []
     for number in range(count):
         cell = number % len(database)
@@ -321,7 +321,7 @@ def test_counts_add_up(seed: int) -> None:
         query = random_query(database, seed + cell, size=cell % 7)
         codes, bearings = parts_of(query)
         detected.append(Signature(codes[codes > 0], bearings[codes > 0]))
-    views = views_in(database, np.arange(20))
+    views = visible_objects_in(database, np.arange(20))
     evidence = gather_evidence(views, detected, taxonomy=TAXONOMY, position_sigma=2.0)
     model = evidence.start
     counts = expected_counts(evidence, model)
@@ -341,7 +341,9 @@ def test_rounds_raise_the_likelihood() -> None:
     database = random_database(3, cells=60, longest=5)
     rng = np.random.default_rng(0)
     detected = [distorted(database, cell, rng) for cell in range(60)]
-    evidence = gather_evidence(views_in(database, np.arange(60)), detected, taxonomy=TAXONOMY)
+    evidence = gather_evidence(
+        visible_objects_in(database, np.arange(60)), detected, taxonomy=TAXONOMY
+    )
     model = evidence.start
     before = -math.inf
     for _ in range(8):
@@ -356,7 +358,7 @@ def test_rounds_raise_the_likelihood() -> None:
 
 def test_where_every_association_is_certain_the_intervals_are_the_text_books() -> None:
     database = random_database(0, cells=300, longest=1, classes=1)
-    views = views_in(database, np.arange(300))
+    views = visible_objects_in(database, np.arange(300))
     seen = [
         Signature(views.codes[[row]], (views.bearings[[row]] + 1.0 - 2.0 * (row % 2)) % 360)
         if row % 10

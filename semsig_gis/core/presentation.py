@@ -1,0 +1,31 @@
+"""Calls of public plot and map functions by name, for the methods `plot` and `explore` of results.
+
+The packages that draw import the packages of the results, so a result cannot import them. The root
+package `semsig_gis`, which lists all public names, registers here a function that loads one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from semsig_gis.core.display import Axes, MapFrame
+
+_loaders: list[Callable[[str], Any]] = []
+
+
+def register_loader(load: Callable[[str], Any]) -> None:
+    """Register the function that returns a public function by name."""
+    _loaders[:] = [load]
+
+
+def plot_with(name: str, *results: object, **options: Any) -> Axes:  # noqa: ANN401 - as it takes
+    """Return the axes on which the public function `name` draws results."""
+    return _loaders[0](name)(*results, **options)
+
+
+def map_with(name: str, *results: object) -> MapFrame:
+    """Return the map by the public function `name` of results, to show in a notebook."""
+    return _loaders[0]("show_map")(_loaders[0](name)(*results))

@@ -1,0 +1,221 @@
+"""Keywords of several languages for classes, roles and fields."""
+
+from __future__ import annotations
+
+import functools
+import re
+import tomllib
+import unicodedata
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
+from semsig_gis.sources.catalog import data_folder, load_catalog
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from semsig_gis.core import Taxonomy
+
+# Word boundaries in camel case, such as ArbresAlign and WCPublic.
+CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+# Keywords up to this length must be a whole word, because too many words start with them.
+WHOLE_WORD_LETTERS = 3
+ARTICLES = frozenset(
+    {"a", "al", "alla", "and", "au", "aux", "d", "da", "das", "de", "dei", "del", "della", "dem",
+     "den", "der", "des", "di", "die", "do", "dos", "du", "e", "el", "en", "et", "for", "fur",
+     "het", "i", "il", "in", "l", "la", "las", "le", "les", "lo", "los", "mit", "o", "of", "on",
+     "per", "pour", "the", "to", "und", "van", "von"}
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """A class or role with a keyword in a text, and the matching words of the text.
+
+    `letters` is the length of the keyword; a longer keyword is a better match.
+    """
+
+    name: str
+    words: str
+    letters: int
+
+
+def words_of(text: str) -> tuple[str, ...]:
+    """Return the words of a name in lower case, without accents and articles.
+
+    Words also end where a capital follows (``WCPublic``) and between letters and digits.
+    """
+    letters = unicodedata.normalize("NFKD", text)
+    plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
+    parts = re.findall(r"[^\W\d_]+|\d+", CAMEL_CASE.sub(" ", plain))
+    return tuple(word for part in parts if (word := part.casefold()) not in ARTICLES)
+
+
+@dataclass(frozen=True, slots=True)
+class Keywords:
+    """Names of classes, roles or kinds of field, each with the words of a keyword."""
+
+    phrases: tuple[tuple[str, tuple[str, ...]], ...]
+
+    @classmethod
+    def of(cls, pairs: Iterable[tuple[str, str]]) -> Keywords:
+        """Return the keywords of pairs of a name and a phrase, without duplicates."""
+        return cls(tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs)))
+
+    def find(self, text: str) -> tuple[Match, ...]:
+        """Find the keywords in a text, the longest first and each name once.
+
+        A keyword inside a longer keyword does not count.
+        """
+        words = words_of(text)
+        spans = [
+            (start, end, Match(name, " ".join(words[start:end]), sum(map(len, phrase))))
+            for name, phrase in self.phrases
+            for start in range(len(words))
+            if (end := _end(words, start, phrase)) is not None
+        ]
+        # Python's sort keeps the order of the file among keywords of the same length.
+        spans.sort(key=lambda span: (-span[2].letters, span[0]))
+        best: dict[str, Match] = {}
+        for start, end, match in spans:
+            if not any(
+                first <= start and end <= last and other.letters > match.letters
+                for first, last, other in spans
+            ):
+                best.setdefault(match.name, match)
+        return tuple(best.values())
+
+
+def _end(words: tuple[str, ...], start: int, phrase: tuple[str, ...]) -> int | None:
+    """Return the end of a phrase that starts at a word of a text, or None without a match."""
+    if len(phrase) > 1 and words[start].startswith("".join(phrase)):
+        return start + 1  # written as one word
+    end = start + len(phrase)
+    if end > len(words):
+        return None
+    for word, keyword in zip(words[start:end], phrase, strict=True):
+        is_short = len(keyword) <= WHOLE_WORD_LETTERS
+        if not (word in {keyword, f"{keyword}s"} if is_short else word.startswith(keyword)):
+            return None
+    return end
+
+
+@functools.cache
+def keywords(kind: str) -> Keywords:
+    """Return the shipped keywords of a kind.
+
+    Kinds are ``"classes"`` (words for classes), ``"class_fields"`` (names of fields that imply the
+    class of a layer), ``"roles"`` (layers without objects) and ``"fields"`` (uses of fields).
+    """
+    content = _content()
+    if kind == "fields":
+        groups = content["fields"].items()
+        return Keywords.of((name, word) for name, words in groups for word in words)
+    fields = kind == "class_fields"
+    return Keywords.of(
+        (name, word)
+        for name, lists in content["classes" if fields else kind].items()
+        for key, words in lists.items()
+        if (key == "fields") == fields and key != SPOKEN
+        for word in words
+    )
+
+
+def class_code(word: str, taxonomy: Taxonomy) -> int:
+    """Return the code of the class for a word of a person or a detector.
+
+    Parameters
+    ----------
+    word : str
+        A symbol, a name or a title of the taxonomy, another word for it, in the singular or the
+        plural, or a tag of OpenStreetMap such as ``highway=street_lamp``; ``?`` or ``unknown``
+        where the class is not known.
+    taxonomy : Taxonomy
+        The classes.
+
+    Returns
+    -------
+    int
+        The code; `WILDCARD` where the class is not known.
+
+    Raises
+    ------
+    UnknownNameError
+        If no class of the taxonomy has the word; the message gives the nearest word.
+
+    Examples
+    --------
+    >>> from semsig_gis import paper_taxonomy
+    >>> [class_code(word, paper_taxonomy()) for word in ("D", "street lamps", "amenity=bench")]
+    [3, 3, 10]
+    """
+    text = word.strip()
+    if len(text) == 1:
+        return int(taxonomy.encode(text)[0])
+    class_words = _class_words(taxonomy)
+    code: int | None
+    if "=" in text:
+        key, _, value = (part.strip() for part in text.partition("="))
+        names = _tagged_classes()
+        name = names.get(f"{key}={value}") or names.get(f"{key}=*")
+        code = next((item.code for item in taxonomy.classes if item.name == name), None)
+    else:
+        joined = "".join(words_of(text))
+        # The word itself, then its singular.
+        forms = [joined.removesuffix(suffix) for suffix in ("", "s", "es")]
+        code = next((class_words[form][0] for form in forms if form in class_words), None)
+    if code is None:
+        near = nearest_name(text, (name for _, name in class_words.values()))
+        legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in taxonomy.classes)
+        raise UnknownNameError(
+            f"class {word!r} is unknown{near}; give a word for one of these: {legend}."
+        )
+    return code
+
+
+SPOKEN = "said"
+"""Key of words for classes in observations; layers are not recognised by them."""
+
+
+@functools.cache
+def _content() -> dict[str, Any]:
+    return tomllib.loads((data_folder() / "keywords.toml").read_text(encoding="utf-8"))
+
+
+@functools.lru_cache(maxsize=8)
+def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
+    """Return code and word of classes by the word in lower case without blanks."""
+    lists = _content()["classes"]
+    others = [
+        (key, item.code, word)
+        for item in taxonomy.classes
+        for key, words in lists.get(item.name, {}).items()
+        if key != "fields"
+        for word in words
+    ]
+    # English has priority over the other languages.
+    others.sort(key=lambda item: item[0] not in {"en", SPOKEN})
+    pairs = [
+        *((item.code, item.name.replace("_", " ")) for item in taxonomy.classes),
+        *((item.code, item.title) for item in taxonomy.classes),
+        (WILDCARD, "unknown"),
+        *((code, word) for _, code, word in others),
+    ]
+    class_words: dict[str, tuple[int, str]] = {}
+    for code, word in pairs:
+        if joined := "".join(words_of(word)):
+            class_words.setdefault(joined, (code, word))
+    return class_words
+
+
+@functools.cache
+def _tagged_classes() -> Mapping[str, str]:
+    """Return the class name of each OpenStreetMap tag that belongs to exactly one class."""
+    classes: dict[str, set[str]] = {}
+    for layer in load_catalog("openstreetmap").layers:
+        for tags in layer.tags if layer.role == "objects" else ():
+            for key, values in tags:
+                for value in values:
+                    classes.setdefault(f"{key}={value}", set()).add(layer.class_name)
+    return {tag: name for tag, (name, *others) in classes.items() if not others}

@@ -1,0 +1,193 @@
+"""Parse the area that a user gives, and clip layers to it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import geopandas as gpd
+import numpy as np
+import shapely
+
+from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
+from semsig_gis.sources.area import Area, join_areas
+from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.sources.paths import FILE_SUFFIXES
+from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT, WGS84
+from semsig_gis.sources.vector import file as vector_file
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from semsig_gis.sources.layer import RawLayer
+
+NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
+T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
+# The text by which a user requests the bounding box that a file states.
+BOX = "box"
+METRES_A_DEGREE = 111_195.0  # of latitude
+POLYGONAL = {"Polygon", "MultiPolygon"}
+
+
+def parse_area(text: str | gpd.GeoDataFrame) -> Area:
+    """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or of a file."""
+    if isinstance(text, gpd.GeoDataFrame):
+        return _area_of(text.geometry, "the table", name="table", kind="table")
+    if NUMBERS.fullmatch(text):
+        return _box(text)
+    if names_place(text):
+        raise InputError(
+            f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
+            "degrees, or the path of a file with polygons."
+        )
+    return _outline(Path(text))
+
+
+def names_place(text: str) -> bool:
+    """Whether a text is the name of a place, not numbers and not a path, existing or missing."""
+    path = Path(text)
+    is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
+    return not is_file and not NUMBERS.fullmatch(text)
+
+
+def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tuple[RawLayer, ...]:
+    """Remove the rows outside an area.
+
+    Parameters
+    ----------
+    layers : sequence of RawLayer
+        The layers.
+    text : str or GeoDataFrame
+        ``west,south,east,north`` in degrees, the path of a file with polygons, a table of them, or
+        ``"box"`` for the bounding boxes that OpenStreetMap files state.
+
+    Returns
+    -------
+    tuple of RawLayer
+        The layers; their counts include the rows outside. InputError if the area is not valid, or
+        no file states its box.
+
+    Examples
+    --------
+    >>> from semsig_gis import CitySpec, clip_layers, synthetic_city
+    >>> layers = synthetic_city(CitySpec(size=300.0))
+    >>> [layer.counts.kept for layer in clip_layers(layers[:2], "2.3,48.8,2.4,48.9")]
+    [0, 0]
+    """
+    if not isinstance(text, str) or text != BOX:
+        area = parse_area(text)
+    else:
+        boxes = [layer.extent.polygon for layer in layers if layer.extent is not None]
+        polygon = join_areas(np.array(boxes, dtype=object))
+        if polygon is None:
+            raise InputError(
+                f"none of the files states the area that it covers, so there is no {BOX!r} to clip "
+                "to; write west,south,east,north in degrees, or the path of a file with polygons."
+            )
+        area = Area(polygon, BOX)
+    return tuple(clip_layer(layer, area) for layer in layers)
+
+
+def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
+    """Remove the rows of a layer that are outside an area.
+
+    An object is kept if its centroid is in the area, a building or street if it touches the area,
+    and a row without a position always.
+    """
+    outside, _ = _outside(layer, area)
+    table = layer.table[~outside].reset_index(drop=True)
+    counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
+    return dataclasses.replace(layer, table=table, counts=counts)
+
+
+def note_outside(layer: RawLayer) -> RawLayer:
+    """Add a note on rows outside the bounding box that the source states; they may be errors."""
+    if layer.extent is None:
+        return layer
+    outside, places = _outside(layer, layer.extent)
+    if not outside.any():
+        return layer
+    metres = shapely.distance(places, _narrowed(layer.extent.polygon, layer.extent))
+    note = (
+        f"{outside.sum():,} of {len(outside):,} rows are outside the box that the file says it "
+        f"covers, by up to {metres.max() * METRES_A_DEGREE:,.0f} m; --clip {BOX} leaves them out"
+    )
+    return dataclasses.replace(layer, notes=(*layer.notes, note))
+
+
+def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np.object_]]:
+    """Return which rows are outside an area, and their geometries as of `_narrowed`."""
+    geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
+    shapely.prepare(area.polygon)
+    outside = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
+    outside &= ~shapely.covers(area.polygon, geometry)
+    places = _narrowed(geometry[outside], area)
+    if layer.spec.role == "objects":
+        places = shapely.centroid(places)
+    narrowed = _narrowed(area.polygon, area)
+    shapely.prepare(narrowed)
+    # The rows so far are not covered by the area; of these, keep the ones that do not touch it.
+    disjoint = ~shapely.intersects(narrowed, places)
+    outside[outside] = disjoint
+    return outside, places[disjoint]
+
+
+def _narrowed(geometry: T, area: Area) -> T:
+    """Return geometries with longitudes scaled to the length of a degree of latitude."""
+    # One scale for the whole area: that of its middle latitude.
+    _, south, _, north = area.bounds
+    scale = np.array([math.cos(math.radians((south + north) / 2)), 1.0])
+    narrowed: T = shapely.transform(geometry, lambda xy: xy * scale)
+    return narrowed
+
+
+def _box(text: str) -> Area:
+    try:
+        west, south, east, north = (float(number) for number in text.split(","))
+    except ValueError as error:
+        raise InputError(
+            f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
+        ) from error
+    # A box that crosses 180 degrees and is wider than half of the Earth is taken for an error.
+    across = east < west and east + FULL_TURN - west < HALF_TURN
+    on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
+    if not (on_earth and (west < east or across)) or not (
+        -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
+    ):
+        raise InputError(
+            f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
+            "west below east within -180 to 180, or above it across 180 degrees, and south below "
+            "north within -90 to 90."
+        )
+    spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
+    boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
+    return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
+
+
+def _outline(path: Path) -> Area:
+    polygons = LayerSpec(name="area", class_name="", geometry="polygon")
+    layer = vector_file.read_layer(path, polygons)
+    if layer.errors:
+        raise InputError(
+            f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
+        )
+    return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
+
+
+def _area_of(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
+    """Return the area of polygons; InputError if there are other geometries, or no area."""
+    if shapes.crs is None:
+        raise CrsError(f"{where} has no coordinate reference system; state it with set_crs.")
+    geometry = shapes.dropna()
+    others = sorted(set(geometry.geom_type) - POLYGONAL)
+    polygon = None if others else join_areas(geometry.to_crs(WGS84).to_numpy())
+    if polygon is None:
+        kinds = ", ".join(others) or "nothing"
+        what = "encloses no area" if len(geometry) and not others else f"contains {kinds}"
+        raise InputError(f"{where} {what}; give a {kind} of polygons.")
+    return Area(polygon, name)

@@ -1,0 +1,177 @@
+"""Find the files of layers and the readers of files."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from semsig_gis.core import SourceError, UnknownNameError, installed_readers, nearest_name
+from semsig_gis.sources.osm import features
+from semsig_gis.sources.paths import files_in
+from semsig_gis.sources.probe import probe_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from semsig_gis.sources.layer import Reader
+    from semsig_gis.sources.layer_spec import LayerSpec
+
+PACKAGE = __name__.rpartition(".")[0]
+# Module of this package that contains the function `read_layers` of a reader.
+READERS = {
+    "arcgis": "services.layers",
+    "ckan": "services.layers",
+    "mapillary": "mapillary",
+    "ogc_features": "services.layers",
+    "opendatasoft": "services.layers",
+    "osm_features": "osm.features",
+    "osm_file": "osm.file",
+    "overpass": "osm.overpass",
+    "overture": "overture",
+    "socrata": "services.layers",
+    "vector_file": "vector.file",
+    "wfs": "services.layers",
+}
+
+# Readers that read several files as one map, and readers that can skip rows outside an `area`.
+MERGING = frozenset({"mapillary", "osm_features", "osm_file", "overpass", "overture"})
+PRUNING = frozenset({"overture"})
+
+# The reader of layers that are selected by tags, in a file of any format.
+TAGS_READER = "osm_file"
+# Number of layers with the same files that a message lists.
+MOST_NAMES = 4
+
+
+def reader(name: str) -> Reader:
+    """Return a built-in reader, or one of the entry points ``semsig_gis.readers``, by name."""
+    if name in READERS:
+        read: Reader = importlib.import_module(f"{PACKAGE}.{READERS[name]}").read_layers
+        return read
+    others = installed_readers()
+    if name in others:
+        return others[name]
+    names = sorted({*READERS, *others})
+    raise UnknownNameError(
+        f"reader {name!r} is unknown{nearest_name(name, names)}; "
+        f"the readers are {', '.join(names)}."
+    )
+
+
+def file_reader(path: Path, *, sure: bool = False) -> str | None:
+    """Return the reader of a file of OpenStreetMap by its name or content, or None.
+
+    With `sure`, a table needs columns that identify its elements, not only columns of tags.
+    """
+    if path.name.lower().endswith(tuple(features.FORMATS)):
+        return "osm_file"
+    probe = probe_file(path)
+    if probe.format == "overpass":
+        return "overpass"
+    is_osm = features.has_element_columns if sure else features.has_tag_columns
+    return "osm_features" if any(map(is_osm, probe.columns)) else None
+
+
+def find_files(
+    specs: Iterable[LayerSpec], paths: Iterable[str | Path]
+) -> tuple[tuple[tuple[LayerSpec, Path], ...], tuple[LayerSpec, ...]]:
+    """Pair the layers of a catalogue with the files that hold them.
+
+    Parameters
+    ----------
+    specs : iterable of LayerSpec
+        Layers to look for, by the file-name patterns in ``files`` (case is ignored).
+    paths : iterable of str or Path
+        Files, and folders to look in. Of their subfolders, only partitions such as
+        ``theme=base`` are searched. A file that is given directly has priority over the files of
+        folders. Of these, a layer gets the matches of its first pattern that matches a file. A
+        layer of a map gets the extracts that match any pattern, and vector files with columns of
+        OpenStreetMap tags; in a folder only if no file of the folder matches a pattern.
+
+    Returns
+    -------
+    pairs : tuple of (LayerSpec, Path)
+        Layers and their files, in the order of `specs`. One file may hold several layers, and a
+        layer of OpenStreetMap may be in several extracts.
+    missing : tuple of LayerSpec
+        Layers without a file. SourceError if a path does not exist or matches no layer, or if
+        several files match a layer that can have only one.
+
+    Examples
+    --------
+    >>> from semsig_gis import LayerSpec, find_files
+    >>> find_files([LayerSpec(name="trees", class_name="alignment_tree")], [])[1][0].name
+    'trees'
+    """
+    specs = tuple(specs)
+    files, in_folders, tagged = _group_paths(specs, paths)
+    pairs: list[tuple[LayerSpec, Path]] = []
+    missing = []
+    for spec in specs:
+        direct_files = [path for path in files if _matches(path, spec.files)]
+        merging = spec.reader in MERGING
+        patterns = (spec.files,) if merging else tuple((pattern,) for pattern in spec.files)
+        in_folder = ([path for path in in_folders if _matches(path, any_)] for any_ in patterns)
+        candidates = direct_files or next(filter(None, in_folder), [])
+        if spec.reader == TAGS_READER:
+            candidates = [*candidates, *tagged]
+        if len(candidates) > 1 and not (spec.unique_id or merging):
+            names = " and ".join(str(path) for path in candidates)
+            raise SourceError(f"layer {spec.name!r} is matched by {names}; give one of them.")
+        pairs.extend((spec, path) for path in candidates)
+        if not candidates:
+            missing.append(spec)
+    return tuple(pairs), tuple(missing)
+
+
+def _group_paths(
+    specs: Sequence[LayerSpec], paths: Iterable[str | Path]
+) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return the files given directly, the files in folders, and the files with tags."""
+    files: list[Path] = []
+    in_folders: list[Path] = []
+    tagged: list[Path] = []
+    for path in dict.fromkeys(Path(item) for item in paths):
+        if not path.exists():
+            raise SourceError(f"{path} does not exist; give a file or a folder of files.")
+        inside = files_in(path) if path.is_dir() else [path]
+        if any(_matches(file, spec.files) for file in inside for spec in specs):
+            (in_folders if path.is_dir() else files).extend(inside)
+            continue
+        with_tags = [file for file in inside if _has_tags(file, specs, skip_damaged=path.is_dir())]
+        if not with_tags:
+            _refuse_unmatched(path, specs)
+        tagged.extend(with_tags)
+    return files, in_folders, tagged
+
+
+def _matches(path: Path, patterns: Iterable[str]) -> bool:
+    name = path.name.casefold()
+    return any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
+
+
+def _has_tags(path: Path, specs: Iterable[LayerSpec], *, skip_damaged: bool) -> bool:
+    """Whether a file has OpenStreetMap tags and a layer is selected by tags."""
+    if all(spec.reader != TAGS_READER for spec in specs):
+        return False
+    with contextlib.suppress(*([SourceError] if skip_damaged else [])):
+        return file_reader(path) is not None
+    return False
+
+
+def _refuse_unmatched(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
+    patterns: dict[tuple[str, ...], list[str]] = {}
+    for spec in specs:
+        patterns.setdefault(spec.files, []).append(spec.name)
+    layers = ", ".join(
+        f"{', '.join(names if len(names) <= MOST_NAMES else (*names[:MOST_NAMES], '...'))} "
+        f"({', '.join(files)})"
+        for files, names in patterns.items()
+    )
+    verb = "contains no file of" if path.is_dir() else "is not the file of"
+    tags = any(spec.reader == TAGS_READER for spec in specs)
+    more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
+    raise SourceError(f"{path} {verb} any layer; the layers and their files are {layers}{more}.")

@@ -1,0 +1,66 @@
+"""Access token of a service: sent to that service, and removed from everything it returns."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from semsig_gis.core import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+REDACTED = "(token)"
+LONGEST_SPELLING = len(r"\u007c")
+
+
+@dataclass(frozen=True, slots=True)
+class AccessToken:
+    """An access token, sent in a header of every request and never logged or cached."""
+
+    value: str = field(repr=False)
+
+    @classmethod
+    def from_environment(cls, variable: str) -> AccessToken:
+        """Return the token in an environment variable; InputError if it is not a token."""
+        value = os.environ.get(variable, "").strip()
+        if not re.fullmatch(r"[!-~]+", value):
+            what = (
+                "contains blanks or other characters that a token cannot have"
+                if value
+                else "is not set"
+            )
+            raise InputError(
+                f"the environment variable {variable} {what}; set it to the access token that the "
+                "service gave you."
+            )
+        return cls(value)
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that authorize a request and ask for an uncompressed answer."""
+        return {"Authorization": f"OAuth {self.value}", "Accept-Encoding": "identity"}
+
+    def redact(self, text: str) -> str:
+        """Return a text without the token, however its letters are escaped."""
+        return re.sub("".join(map(_spellings, self.value)), REDACTED, text)
+
+    def redact_blocks(self, blocks: Iterable[bytes]) -> Iterator[bytes]:
+        """Yield a body without the token, which may start in one block and end in another."""
+        longest = LONGEST_SPELLING * len(self.value)
+        rest = ""
+        for block in blocks:
+            text = self.redact(rest + block.decode("latin-1"))
+            # The end may be the start of the token, so it waits for the next block.
+            ready = max(0, len(text) - longest)
+            rest = text[ready:]
+            yield text[:ready].encode("latin-1")
+        yield rest.encode("latin-1")
+
+
+def _spellings(letter: str) -> str:
+    r"""Return a pattern for a letter as it is, in an address (``%7c``) or in JSON (``\u007c``)."""
+    code = f"(?i:{ord(letter):02x})"
+    return rf"(?:\\?{re.escape(letter)}|%{code}|\\u00{code})"

@@ -1,0 +1,343 @@
+"""Read vector files, each suffix with one driver of GDAL; count and report bad rows.
+
+pyogrio reads a layer as a whole. If a row may be damaged, fiona reads the layer again row by row
+and reports the error of each row; without fiona, pyogrio does it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
+from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
+from semsig_gis.sources.rows import (
+    WGS84,
+    RowRules,
+    fits_the_globe,
+    raw_layer,
+    settle_crs,
+    usable_crs,
+)
+from semsig_gis.sources.vector import by_pyogrio
+from semsig_gis.sources.vector.by_pyogrio import (
+    describe,
+    first_rows_of,
+    layer_names,
+    read_whole,
+)
+from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
+from semsig_gis.storage import parse_json
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+
+    from pyproj import CRS
+
+    from semsig_gis.sources.csv_layer import CsvTable
+    from semsig_gis.sources.layer import RawLayer
+    from semsig_gis.sources.layer_spec import LayerSpec
+    from semsig_gis.sources.rows import Rows
+    from semsig_gis.sources.vector.by_pyogrio import LayerDescription
+
+WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class LayerInfo:
+    """Name, geometry type, CRS, number of rows and fields of a layer of a file.
+
+    `geometry` is a term of GDAL, ``"Point"`` for a CSV file with coordinates; `crs` is a code or
+    name.
+    """
+
+    name: str
+    geometry: str
+    crs: str | None
+    rows: int
+    fields: tuple[str, ...]
+
+
+def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
+    """List the layers of a vector file or archive; SourceError for another file."""
+    return tuple(_describe(member) for member in _layers(Path(path)))
+
+
+def read_layer(
+    path: str | Path, spec: LayerSpec, *, filters: bool = True, crs: str | None = None
+) -> RawLayer:
+    r"""Read one layer of a vector file.
+
+    A row that cannot be read is counted and reported, and the other rows are read.
+    The CRS of the file has priority; the CRS of `spec` and `crs` apply to a file without one.
+    GeoJSON without a ``crs`` member is such a file: it is WGS 84 only if no CRS is given and the
+    coordinates are in its range.
+
+    Parameters
+    ----------
+    path : str or Path
+        A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such.
+    spec : LayerSpec
+        Description of the layer, its rows and their class.
+    filters : bool, default True
+        Whether ``where`` of the specification applies.
+    crs : str, optional
+        CRS of a file that states none; it overrides the CRS of the specification.
+
+    Returns
+    -------
+    RawLayer
+        The features in the CRS of the file, and notes on differences from the expectation.
+
+    Raises
+    ------
+    SourceError
+        If the file is missing, damaged or of another kind, or has several layers and `spec` names
+        none.
+    UnknownNameError, CatalogError
+        If the file does not have the layer, or a field, that `spec` names.
+    CrsError
+        If there is no CRS, or it is in degrees and most coordinates are out of range.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from semsig_gis import LayerSpec, read_layer
+    >>> spec = LayerSpec(name="benches", class_name="bench", crs="EPSG:4326")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "benches.csv")
+    ...     _ = path.write_text("id;lon;lat\n7;3.88;43.61\n8;here;43.61\n")
+    ...     layer = read_layer(path, spec)
+    >>> len(layer.table), layer.counts.read, layer.errors
+    (1, 2, ("row 2: lon 'here' is not a number",))
+    """
+    where = f"layer {spec.name!r} ({path})"
+    member = _pick(Path(path), spec.layer)
+    if (csv := _csv(member, spec, where=where)) is not None:
+        return read_csv_layer(csv, spec, filters=filters, crs=crs, where=where)
+    layer = describe(member)
+    if layer.geometry == NO_GEOMETRY:
+        raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
+    rules = RowRules(spec, layer.fields, filters=filters, where=where)
+    table = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
+    return raw_layer(table.rows, rules, table.crs, by_file=table.by_file, notes=table.notes)
+
+
+@dataclass(frozen=True, slots=True)
+class TableRows:
+    """Rows of a layer with the values of some `fields`, and the CRS of their positions."""
+
+    fields: tuple[str, ...]
+    rows: Rows
+    crs: CRS
+    by_file: bool
+    notes: tuple[str, ...]
+
+
+def read_tables(
+    layers: Iterable[tuple[Member, LayerDescription]],
+    choose: Callable[[Sequence[str]], Collection[str]],
+    *,
+    crs: str | None = None,
+) -> Iterator[TableRows]:
+    """Yield the rows of layers with the fields that `choose` returns; none if it returns none."""
+    for member, layer in layers:
+        if names := choose(layer.fields):
+            fields = tuple(field for field in layer.fields if field in names)
+            yield _read_member(member, layer, fields, expected=None, given=crs, where=str(member))
+
+
+def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
+    """Return the layers of a vector file that have a geometry, without those in CSV files."""
+    layers = (
+        (layer, describe(layer))
+        for member in members(path)
+        if member.driver != CSV
+        for layer in _layers_of(member)
+    )
+    return tuple(item for item in layers if item[1].geometry != NO_GEOMETRY)
+
+
+def _layers_of(member: Member) -> list[Member]:
+    """Return the layers of a member; only a GeoPackage has to be opened to list them."""
+    if member.driver != CONTAINER:
+        return [member]
+    return [Member(member.file, member.inner, name) for name in layer_names(member)]
+
+
+def _read_member(
+    member: Member,
+    layer: LayerDescription,
+    fields: tuple[str, ...],
+    *,
+    expected: str | None,
+    given: str | None,
+    where: str,
+) -> TableRows:
+    """Read a layer; its CRS is that of the file, or the `given` one, or the `expected` one."""
+    own, implicit = _own_crs(member, layer)
+    system, notes = settle_crs(own, implicit=implicit, expected=expected, given=given, where=where)
+    rows = read_whole(member, fields, layer.rows)
+    if rows is None:
+        rows, more = _row_reader()(member, fields, layer.rows)
+        notes += more
+    if member.driver == GEOJSON:
+        _mark_invalid(rows, member)
+    return TableRows(fields, rows, system, own is not None and not implicit, notes)
+
+
+def _row_reader() -> Callable[[Member, Sequence[str], int], tuple[Rows, tuple[str, ...]]]:
+    """Return the function that reads a layer row by row, of fiona if it is installed."""
+    try:
+        # fiona takes 190 ms to import, and is needed only for damaged files.
+        from semsig_gis.sources.vector.by_fiona import read_each  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if error.name != "fiona":
+            raise
+        return by_pyogrio.read_each
+    return read_each
+
+
+def read_layers(
+    path: str | Path, specs: Iterable[LayerSpec], *, filters: bool = True, crs: str | None = None
+) -> tuple[RawLayer, ...]:
+    """Read several layers of one file, as `read_layer` reads one."""
+    return tuple(read_layer(path, spec, filters=filters, crs=crs) for spec in specs)
+
+
+def first_rows(
+    path: Path, *, limit: int
+) -> Iterator[tuple[LayerInfo, tuple[Mapping[str, Any], ...], tuple[str, ...]]]:
+    """Yield each layer of a file, its first readable rows, and its columns of coordinates."""
+    for member in _layers(path):
+        table = _csv(member, None, where=str(member))
+        info = _describe(member)
+        if table is None:
+            count = min(limit, info.rows)
+            yield info, tuple(first_rows_of(member, info.fields, count)), ()
+            continue
+        readable = (row for row in table.rows() if not isinstance(row, str))
+        coordinates = (table.x, table.y) if table.x and table.y else ()
+        yield info, tuple(itertools.islice(readable, limit)), coordinates
+
+
+def _layers(path: Path) -> tuple[Member, ...]:
+    """Return the layers of a file, or of all the files in an archive."""
+    layers: list[Member] = []
+    for member in members(path):
+        if member.driver == CSV:
+            layers.append(Member(member.file, member.inner, Path(member.inner or path).stem))
+            continue
+        layers += [Member(member.file, member.inner, name) for name in layer_names(member)]
+    return tuple(layers)
+
+
+def _pick(path: Path, name: str | None) -> Member:
+    """Return the layer of a name, or the only layer; SourceError if there are several."""
+    files = members(path)
+    if name is None and len(files) == 1 and files[0].driver != CONTAINER:
+        return files[0]
+    layers = _layers(path)
+    if name is None and len(layers) > 1:
+        # Ignore tables without geometry, such as the styles in a GeoPackage.
+        with_geometry = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
+        layers = tuple(with_geometry) or layers
+    names = [str(member.layer) for member in layers]
+    matches = [item for item in layers if name is None or item.layer == name]
+    if len(matches) == 1:
+        return matches[0]
+    if name is not None and not matches:
+        raise UnknownNameError(
+            f"{path} has no layer {name!r}{nearest_name(name, names)}; "
+            f"its layers are {', '.join(names)}."
+        )
+    raise SourceError(
+        f"{path} contains {len(matches)} layers ({', '.join(names)}); give the name of one."
+    )
+
+
+def _csv(member: Member, spec: LayerSpec | None, *, where: str) -> CsvTable | None:
+    """Return the table of a CSV file, which is read without GDAL; None for other formats."""
+    if member.driver != CSV:
+        return None
+    try:
+        return csv_table(member.open, spec, what=str(member), where=where)
+    except OSError as error:
+        raise unreadable(member, error) from error
+
+
+def _describe(member: Member) -> LayerInfo:
+    table = _csv(member, None, where=str(member))
+    if table is not None:
+        rows, kinds = table.survey()
+        return LayerInfo(
+            name=str(member.layer),
+            geometry=kinds,
+            crs=None if table.crs is None else crs_label(table.crs),
+            rows=rows,
+            fields=tuple(table.names),
+        )
+    layer = describe(member)
+    crs, implicit = _own_crs(member, layer)
+    if implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
+        crs = None
+    return LayerInfo(
+        name=str(member.layer),
+        geometry=layer.geometry,
+        crs=None if crs is None else crs_label(crs),
+        rows=layer.rows,
+        fields=layer.fields,
+    )
+
+
+def _own_crs(member: Member, layer: LayerDescription) -> tuple[CRS | None, bool]:
+    """Return the CRS of a layer, and whether it is only the default of GeoJSON."""
+    own = usable_crs(layer.crs)
+    if member.driver == GEOJSON:
+        document = _geojson(member)
+        if "crs" not in document:
+            return WGS84, True
+        if own == WGS84 and not WGS84_NAMES.search(str(document["crs"])):
+            return None, False  # GDAL reads an unknown CRS as WGS 84
+    return own, False
+
+
+def _geojson(member: Member) -> dict[str, Any]:
+    """Parse a GeoJSON file; SourceError if it is not valid JSON, which GDAL may accept."""
+    try:
+        with member.open() as stream:
+            document = parse_json(stream.read().decode("utf-8-sig", errors="replace"))
+    except (OSError, ValueError) as error:
+        raise unreadable(member, error) from error
+    return document if isinstance(document, dict) else {}
+
+
+def _mark_invalid(rows: Rows, member: Member) -> None:
+    """Mark the rows of a GeoJSON file whose geometry is not null but could not be read."""
+    null = [row for row, position in enumerate(rows.positions) if position is None]
+    if not null:
+        return
+    document = _geojson(member)
+    listed = document.get("features", [document])
+    features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
+    if len(features) != rows.read:
+        return  # GDAL counts differently, so that rows cannot be assigned
+    for row in null:
+        if not _is_empty(features[rows.numbers[row] - 1].get("geometry")):
+            rows.positions[row] = "its geometry is not valid GeoJSON"
+
+
+def _is_empty(geometry: object) -> bool:
+    """Whether a GeoJSON geometry is null or valid and empty."""
+    if not isinstance(geometry, dict):
+        return geometry is None
+    return _is_blank(geometry.get("coordinates", geometry.get("geometries")))
+
+
+def _is_blank(parts: object) -> bool:
+    return isinstance(parts, list) and all(_is_blank(part) for part in parts)
