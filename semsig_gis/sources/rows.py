@@ -81,11 +81,8 @@ def usable_crs(text: str) -> CRS | None:
     if not geodetic.name or crs.name.lower().startswith("undefined"):
         return None  # without a named datum, a transformation is off by up to hundreds of metres
     code = crs.to_epsg()
-    if code is not None:
-        epsg = CRS.from_epsg(code)
-        if epsg.equals(crs, ignore_axis_order=True):
-            return epsg
-    return crs
+    epsg = crs if code is None else CRS.from_epsg(code)
+    return epsg if epsg.equals(crs, ignore_axis_order=True) else crs
 
 
 def settle_crs(

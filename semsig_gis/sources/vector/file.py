@@ -25,12 +25,7 @@ from semsig_gis.sources.rows import (
     usable_crs,
 )
 from semsig_gis.sources.vector import by_pyogrio
-from semsig_gis.sources.vector.by_pyogrio import (
-    describe,
-    first_rows_of,
-    layer_names,
-    read_whole,
-)
+from semsig_gis.sources.vector.by_pyogrio import describe, first_rows_of, layer_names, read_whole
 from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
 from semsig_gis.storage import parse_json
 
@@ -154,20 +149,15 @@ def read_tables(
 
 def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
     """Return the layers of a vector file that have a geometry, without those in CSV files."""
+    # Only a GeoPackage has to be opened to list its layers.
     layers = (
-        (layer, describe(layer))
+        layer
         for member in members(path)
         if member.driver != CSV
-        for layer in _layers_of(member)
+        for layer in (_layers_of(member) if member.driver == CONTAINER else [member])
     )
-    return tuple(item for item in layers if item[1].geometry != NO_GEOMETRY)
-
-
-def _layers_of(member: Member) -> list[Member]:
-    """Return the layers of a member; only a GeoPackage has to be opened to list them."""
-    if member.driver != CONTAINER:
-        return [member]
-    return [Member(member.file, member.inner, name) for name in layer_names(member)]
+    described = ((layer, describe(layer)) for layer in layers)
+    return tuple(item for item in described if item[1].geometry != NO_GEOMETRY)
 
 
 def _read_member(
@@ -228,13 +218,13 @@ def first_rows(
 
 def _layers(path: Path) -> tuple[Member, ...]:
     """Return the layers of a file, or of all the files in an archive."""
-    layers: list[Member] = []
-    for member in members(path):
-        if member.driver == CSV:
-            layers.append(Member(member.file, member.inner, Path(member.inner or path).stem))
-            continue
-        layers += [Member(member.file, member.inner, name) for name in layer_names(member)]
-    return tuple(layers)
+    return tuple(layer for member in members(path) for layer in _layers_of(member))
+
+
+def _layers_of(member: Member) -> list[Member]:
+    is_csv = member.driver == CSV
+    names = [Path(member.inner or member.file).stem] if is_csv else layer_names(member)
+    return [Member(member.file, member.inner, name) for name in names]
 
 
 def _pick(path: Path, name: str | None) -> Member:
@@ -274,25 +264,16 @@ def _csv(member: Member, spec: LayerSpec | None, *, where: str) -> CsvTable | No
 def _describe(member: Member) -> LayerInfo:
     table = _csv(member, None, where=str(member))
     if table is not None:
-        rows, kinds = table.survey()
-        return LayerInfo(
-            name=str(member.layer),
-            geometry=kinds,
-            crs=None if table.crs is None else crs_label(table.crs),
-            rows=rows,
-            fields=tuple(table.names),
-        )
-    layer = describe(member)
-    crs, implicit = _own_crs(member, layer)
-    if implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
-        crs = None
-    return LayerInfo(
-        name=str(member.layer),
-        geometry=layer.geometry,
-        crs=None if crs is None else crs_label(crs),
-        rows=layer.rows,
-        fields=layer.fields,
-    )
+        rows, geometry = table.survey()
+        crs, fields = table.crs, table.names
+    else:
+        layer = describe(member)
+        rows, geometry, fields = layer.rows, layer.geometry, layer.fields
+        crs, implicit = _own_crs(member, layer)
+        if implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
+            crs = None
+    label = None if crs is None else crs_label(crs)
+    return LayerInfo(str(member.layer), geometry, label, rows, fields)
 
 
 def _own_crs(member: Member, layer: LayerDescription) -> tuple[CRS | None, bool]:
