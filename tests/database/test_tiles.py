@@ -35,7 +35,7 @@ from semsig_gis.database.tiles import (
     TileSpec,
     begin,
     build_tiles,
-    describe,
+    describe_part,
     finished_tiles,
     plan_tiles,
     publish,
@@ -299,7 +299,7 @@ def build(folder: Path, database: SignatureDatabase) -> Part:
     path = folder / part_name((0, 0))
     save_database(database, path)
     (folder / part_name((0, 1))).with_suffix(".empty").touch()
-    return describe((0, 0), database, path)
+    return describe_part((0, 0), database, path)
 
 
 def test_tiles_that_are_done_are_found_and_damaged_ones_built_again(
