@@ -11,12 +11,18 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.localization.distance.ties import expected_best, rank_range, top_candidates
-from semsig_gis.localization.likelihood.association import rerank
-from semsig_gis.localization.likelihood.posterior import KEPT, posterior, refine
-from semsig_gis.localization.likelihood.route import route_posteriors
+from semsig_gis.core import ObjectIndex
+from semsig_gis.localization import (
+    KEPT,
+    expected_best,
+    posterior,
+    rank_range,
+    refine,
+    rerank,
+    route_posteriors,
+    score_cells,
+    top_candidates,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,10 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks._accuracy_queries import City, Query, Walk
-    from semsig_gis.localization.distance.method import Method
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.likelihood.posterior import Posterior
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization import LikelihoodIndex, Method, Noise, Posterior
 
 __all__ = [
     "NEAR",

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.geometry import cell_ids, wrap_degrees
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.sightings import visible_objects_at
-from semsig_gis.evaluation.queries.distortions import distort, named_distortion
-from semsig_gis.observation.leg import Leg
+from semsig_gis.core import Signature, cell_ids, wrap_degrees
+from semsig_gis.database import visible_objects_at
+from semsig_gis.evaluation import distort, named_distortion
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.rtree import ObjectIndex
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.core import ObjectIndex
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 __all__ = ["City", "Query", "Walk", "off_grid", "on_grid", "straight_walk", "turned", "walks"]
 

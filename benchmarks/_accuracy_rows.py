@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from benchmarks._accuracy_methods import NEAR
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.localization.distance.ties import expected_recall
+from semsig_gis.core import wilson_interval
+from semsig_gis.localization import expected_recall
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.load import build_objects, choose_layers, read_files
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.synthetic.city import synthetic_city, synthetic_surroundings
+from semsig_gis.database import ViewpointSpec, build_database
+from semsig_gis.objects import build_objects, choose_layers, read_files
+from semsig_gis.sources import load_catalog, paper_taxonomy, synthetic_city, synthetic_surroundings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
-    from semsig_gis.sources.synthetic.city import CitySpec
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.sources import CitySpec
 
 __all__ = ["MADE_UP", "MONTPELLIER", "PARIS_LIKE", "made_up", "made_up_streets", "real"]
 

@@ -14,14 +14,14 @@ import geopandas as gpd
 import numpy as np
 import scipy.spatial
 
-from semsig_gis.core.geometry import CLASS_CODE, COUNT, SOURCE, SOURCE_ID
+from semsig_gis.core import CLASS_CODE, COUNT, SOURCE, SOURCE_ID
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
     Places = NDArray[np.float64]
 

@@ -25,10 +25,10 @@ import osmium
 import semsig_gis as sg
 from benchmarks._contents import digest
 from benchmarks._soak_runs import LIMIT_S
-from semsig_gis.evaluation.identifiability.result import open_identifiability
-from semsig_gis.localization.noise.model import open_noise
-from semsig_gis.objects.surroundings import read_area
-from semsig_gis.observation.files import read_queries, read_route
+from semsig_gis.evaluation import open_identifiability
+from semsig_gis.localization import open_noise
+from semsig_gis.objects import read_area
+from semsig_gis.observation import read_queries, read_route
 from semsig_gis.sources import reader
 
 if TYPE_CHECKING:

@@ -30,20 +30,17 @@ from benchmarks._accuracy_queries import City, off_grid, on_grid, turned, walks
 from benchmarks._accuracy_rows import Bar, Row
 from benchmarks._cities import MONTPELLIER, made_up, made_up_streets, real
 from benchmarks._cities import PARIS_LIKE as PARIS
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.database.build import build_database
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.answer_rule import calibrate
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
+from semsig_gis.core import ObjectIndex
+from semsig_gis.database import build_database
+from semsig_gis.localization import Method, build_index, calibrate, cell_noise, named_noise
+from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from benchmarks._accuracy_methods import Outcome
     from benchmarks._accuracy_queries import Query
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization import LikelihoodIndex
 
 __all__ = ["main"]
 

@@ -17,18 +17,15 @@ from rapidfuzz.process import cdist
 
 from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.database.file import save_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
+from semsig_gis.database import ObjectStore, save_database
+from semsig_gis.localization import build_index, cell_noise, locate, named_noise
+from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
 
 __all__ = ["comparisons"]
 

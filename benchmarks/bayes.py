@@ -23,28 +23,23 @@ from scipy.stats import norm
 
 from benchmarks._cities import MADE_UP, made_up, made_up_streets
 from benchmarks.views import DEGREES, NOISE
-from semsig_gis.core.geometry import FULL_TURN, signed_degrees
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.database import visible_objects_in
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import View
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import FULL_TURN, signed_degrees, wilson_interval
+from semsig_gis.database import visible_objects_in
+from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
+from semsig_gis.localization import LikelihoodLocator, build_index, database_tables
+from semsig_gis.observation import View
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sightings import VisibleObjects
-    from semsig_gis.evaluation.queries.draw import Query
-    from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase, VisibleObjects
+    from semsig_gis.evaluation import Query
+    from semsig_gis.localization import NoiseTable
+    from semsig_gis.observation import Photo
 
 __all__ = ["ExactPosterior", "association_sum", "main"]
 

@@ -12,15 +12,14 @@ from scipy.spatial import cKDTree
 
 from benchmarks._cities import made_up, made_up_streets
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.sources.synthetic.city import PARIS_LIKE, CitySpec
+from semsig_gis.database import build_database, open_database, save_database
+from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 __all__ = ["comparisons"]
 

@@ -22,27 +22,36 @@ import pandas as pd
 from benchmarks._cities import MADE_UP, MONTPELLIER, made_up, real
 from benchmarks._later_city import later_city
 from benchmarks.tables import TODAY
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.figures import calibration_bins, plain_records
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.evaluation.scoring import score_queries, scored_tables
-from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.noise.age import Drift, aged_noise, named_drift
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.objects.changes import compare_objects
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import wilson_interval
+from semsig_gis.database import ObjectStore, build_database
+from semsig_gis.evaluation import (
+    QuerySpec,
+    calibration_bins,
+    draw_queries,
+    parse_chain,
+    plain_records,
+    score_queries,
+    scored_tables,
+)
+from semsig_gis.localization import (
+    DEFAULT_RULE,
+    Drift,
+    LikelihoodLocator,
+    aged_noise,
+    build_index,
+    cell_noise,
+    named_drift,
+    named_noise,
+)
+from semsig_gis.objects import compare_objects
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Noise
+    from semsig_gis.objects import StreetObjects
 
 __all__ = ["main"]
 

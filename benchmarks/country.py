@@ -17,20 +17,22 @@ from distributed import Client, LocalCluster
 
 from benchmarks.comparison import Comparison
 from benchmarks.memory import own_peak
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.tiles import TileSpec, build_tile, build_tiles, plan_tiles
-from semsig_gis.database.update import update_tiles
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.load import build_objects
-from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.core import GridSpec, SignatureSpec
+from semsig_gis.database import (
+    TileSpec,
+    ViewpointSpec,
+    build_tile,
+    build_tiles,
+    plan_tiles,
+    update_tiles,
+)
+from semsig_gis.objects import build_objects, open_objects, save_objects
+from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.database.file import Manifest
+    from semsig_gis.database import Manifest
     from semsig_gis.sources import RawLayer
 
 __all__ = ["comparisons"]

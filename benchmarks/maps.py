@@ -12,20 +12,12 @@ import numpy as np
 
 from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison
-from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.maps.cells import ambiguity_map
-from semsig_gis.maps.drift import drift_map
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.page import available, save_map
-from semsig_gis.objects.table import StreetObjects
-from semsig_gis.sources.synthetic.city import (
-    PARIS_LIKE,
-    CitySpec,
-    synthetic_surroundings,
-)
+from semsig_gis.database import ViewpointSpec, build_database
+from semsig_gis.evaluation import evaluate
+from semsig_gis.localization import Method
+from semsig_gis.maps import ambiguity_map, available, drift_map, evaluation_map, save_map
+from semsig_gis.objects import StreetObjects
+from semsig_gis.sources import PARIS_LIKE, CitySpec, synthetic_surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -15,13 +15,11 @@ from rapidfuzz.process import cdist
 
 from benchmarks.comparison import compare
 from benchmarks.likelihood import growth_of_likelihood, likelihood_rows
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
-from semsig_gis.database.database import SignatureDatabase
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import BEARING_UNITS, GridSpec, SignatureSpec
+from semsig_gis.database import SignatureDatabase
+from semsig_gis.evaluation import published as paris
+from semsig_gis.localization import Method, score_cells
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks.comparison import Comparison
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
 
 __all__ = ["comparisons", "random_database"]
 

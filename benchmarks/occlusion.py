@@ -9,9 +9,9 @@ import shapely
 
 from benchmarks._cities import made_up
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.core.geometry import GridSpec, cells_near
-from semsig_gis.database.occlusion import GAP_M, TOLERANCE_M, Footprints, hidden
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_surroundings
+from semsig_gis.core import GridSpec, cells_near
+from semsig_gis.database import GAP_M, TOLERANCE_M, Footprints, hidden
+from semsig_gis.sources import CitySpec, synthetic_surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,8 +13,7 @@ import osmium
 from osmium.osm.mutable import Node
 
 from benchmarks.comparison import Comparison, compare
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.osm.file import read_layers
+from semsig_gis.sources import load_catalog, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

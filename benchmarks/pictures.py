@@ -23,25 +23,23 @@ from axe_core_python.selenium import Axe
 from benchmarks._cities import MONTPELLIER, made_up, real
 from benchmarks.maps import DRAWN, FRAMES, started
 from benchmarks.workbench import asked, photo_in, serving
-from semsig_gis.database.build import build_database
-from semsig_gis.database.city import open_city
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.evaluation.identifiability.analysis import identify
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.maps.cells import ambiguity_map, identifiability_map
-from semsig_gis.maps.city import city_map
-from semsig_gis.maps.drift import drift_map
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.location import localization_map, location_map
-from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.page import available, save_map
-from semsig_gis.objects.table import StreetObjects
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
+from semsig_gis.evaluation import evaluate, identify
+from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
+from semsig_gis.maps import (
+    ambiguity_map,
+    available,
+    city_map,
+    drift_map,
+    evaluation_map,
+    identifiability_map,
+    localization_map,
+    location_map,
+    objects_map,
+    save_map,
+)
+from semsig_gis.objects import StreetObjects
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -49,8 +47,7 @@ if TYPE_CHECKING:
     import folium
     from selenium.webdriver import Chrome
 
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation, Identifiability
 
     Looks = Sequence[tuple[str, str]]
 

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.observation.detectors.camera import Camera
+    from semsig_gis.observation import Camera
 
 EYE_M = 1.6
 

@@ -9,15 +9,14 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from benchmarks.rendered import Scene
-from semsig_gis.core.symbology import class_signs
-from semsig_gis.observation.detectors.camera import Camera
-from semsig_gis.observation.detectors.views import with_heights
+from semsig_gis.core import class_signs
+from semsig_gis.observation import Camera, with_heights
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.evaluation.queries.true_view import Sight
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.evaluation import Sight
 
 SKY, WALLS, GROUND = "#b9d3ea", "#c9bba7", "#9a9a94"
 TRUNK, METAL = "#6b4a2b", "#4a4f55"

@@ -11,15 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.comparison import compare
-from semsig_gis.sources.vector.by_fiona import read_each
-from semsig_gis.sources.vector.by_pyogrio import describe, read_whole
-from semsig_gis.sources.vector.member import members
+from semsig_gis.sources import describe, members, read_each, read_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from semsig_gis.sources.vector.by_pyogrio import Layer
-    from semsig_gis.sources.vector.member import Member
+    from semsig_gis.sources import LayerDescription, Member
 
 REPEATS = 3
 
@@ -45,7 +42,7 @@ def main() -> None:
 
 
 def _read_all(
-    layers: Sequence[tuple[Member, Layer]],
+    layers: Sequence[tuple[Member, LayerDescription]],
     read: Callable[[Member, Sequence[str], int], object],
     _: int,
 ) -> None:

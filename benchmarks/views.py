@@ -29,30 +29,36 @@ import pandas as pd
 from benchmarks._accuracy_queries import straight_walk
 from benchmarks._accuracy_rows import Bar
 from benchmarks._cities import MONTPELLIER, PARIS_LIKE, made_up, made_up_streets, real
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.figures import calibration_bins, plain_records
-from semsig_gis.evaluation.queries.distortion_text import parse_chain, ready_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.evaluation.queries.true_view import CitySights, Sight
-from semsig_gis.localization.answers import REGION_SHARE
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.noise.model import NoiseSpec, cell_noise
-from semsig_gis.observation.leg import Leg
-from semsig_gis.sources.synthetic.city import PARIS_LIKE as LIKE_PARIS
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import wilson_interval
+from semsig_gis.database import ObjectStore, build_database, open_database, save_database
+from semsig_gis.evaluation import (
+    CitySights,
+    QuerySpec,
+    Sight,
+    calibration_bins,
+    draw_queries,
+    parse_chain,
+    plain_records,
+    ready_chain,
+)
+from semsig_gis.localization import (
+    REGION_SHARE,
+    LikelihoodLocator,
+    NoiseSpec,
+    build_index,
+    cell_noise,
+)
+from semsig_gis.observation import Leg
+from semsig_gis.sources import PARIS_LIKE as LIKE_PARIS
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
-    from semsig_gis.evaluation.queries.draw import SeenFrom
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import QueryDistortion, SeenFrom
+    from semsig_gis.localization import Location
 
 __all__ = ["NOT_TOLD", "RANGES", "SECTORS", "bars", "lines", "main"]
 

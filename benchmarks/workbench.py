@@ -14,9 +14,8 @@ from selenium.webdriver.support.ui import Select
 
 from benchmarks.street_photos import WIDTH, street_photo
 from semsig_gis.cli.options import object_store
-from semsig_gis.evaluation.queries.true_view import Sight
-from semsig_gis.serve import server
-from semsig_gis.serve.workbench import Workbench
+from semsig_gis.evaluation import Sight
+from semsig_gis.serve import Workbench, server
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
     from benchmarks.street_photos import StreetPhoto
-    from semsig_gis.database.city import City
+    from semsig_gis.database import City
 
 __all__ = ["asked", "photo_in", "serving"]
 

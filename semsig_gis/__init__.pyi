@@ -24,7 +24,7 @@ from .sources.synthetic.city import (
 )
 from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
-from .objects.conflate import conflate as conflate
+from .objects.conflation import conflate as conflate
 from .objects.draft import draft_catalog as draft_catalog
 from .objects.fetch import (
     fetch_layers as fetch_layers,
@@ -155,7 +155,7 @@ from .maps.location import localization_map as localization_map
 from .maps.location import location_map as location_map, posterior_map as posterior_map
 from .maps.objects import ground_map as ground_map, objects_map as objects_map
 from .maps.page import save_map as save_map, show_map as show_map
-from .exports import (
+from .exports.export import (
     export_answer as export_answer,
     export_database as export_database,
     export_item as export_item,
@@ -174,7 +174,7 @@ from .reports.axes import (
     plot_objects as plot_objects,
 )
 from .reports.evaluation import evaluation_tables as evaluation_tables
-from .reports.evaluation_page import evaluation_page as evaluation_page
+from .reports.evaluation_html import evaluation_page as evaluation_page
 from .reports.page import write_page as write_page
 from .reports.report_model import Curve as Curve, Plot as Plot
 from .reports.quality import quality_tables as quality_tables

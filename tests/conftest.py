@@ -280,7 +280,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """
     from worlds import QUERIES, save_town
 
-    from semsig_gis.evaluation.paper.reproduction import reproduce
+    from semsig_gis.evaluation import reproduce
 
     place = tmp_path_factory.mktemp("reproduced")
     base = tmp_path_factory.getbasetemp()

@@ -12,13 +12,11 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from worlds import CODES, random_town
 
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import BEARING_UNITS, Signature, SignatureSpec
-from semsig_gis.core.taxonomy import ObjectClass
-from semsig_gis.database.database import SignatureDatabase
-from semsig_gis.evaluation.queries.distortions import distort, named_distortion
-from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import BEARING_UNITS, GridSpec, ObjectClass, Signature, SignatureSpec
+from semsig_gis.database import SignatureDatabase
+from semsig_gis.evaluation import distort, named_distortion
+from semsig_gis.localization import NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,8 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from worlds import World
 
-    from semsig_gis.core.tables import Table
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.core import Table
+    from semsig_gis.localization import Noise
 
 TAXONOMY = paper_taxonomy()
 METHODS = [

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from servers import Seen, Server
 
-    from semsig_gis.sources.layer_spec import LayerSpec
+    from semsig_gis.sources import LayerSpec
 
 # Of each city, a place in it, and of each layer, the name of its file and the fields of rows: those
 # that count, and those that do not. A file of CSV has its positions in fields, too.

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import geopandas as gpd
 import numpy as np
 
-from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.sources import LayerSpec, RawLayer, RowCounts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from map_pages import HOSTILE, hostile_taxonomy
 
-from semsig_gis.reports.report_model import (
+from semsig_gis.reports import (
     Curve,
     Number,
     OutcomeMap,
@@ -20,7 +20,7 @@ from semsig_gis.reports.report_model import (
     SceneObject,
     Section,
 )
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.sources import paper_taxonomy
 
 FORMULA = '=cmd|"/C calc"!A0'
 HARM = f"{FORMULA} $\\frac{{}}$ _x_ ![a](http://example.org/a.png)\0\r\n# | {HOSTILE}"

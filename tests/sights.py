@@ -8,9 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from semsig_gis.evaluation.queries.distortions import Distortion
-from semsig_gis.evaluation.queries.true_view import CitySights, Sight
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.evaluation import CitySights, Distortion, Sight
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

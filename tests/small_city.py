@@ -8,25 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.database.build import build_database
-from semsig_gis.evaluation.identifiability.result import BANDS, ClassGain, Identifiability
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.objects.load import build_objects
-from semsig_gis.objects.table import Licence
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.database import build_database
+from semsig_gis.evaluation import BANDS, ClassGain, Identifiability, evaluate
+from semsig_gis.localization import Method, build_index, localize, locate, named_noise
+from semsig_gis.objects import Licence, build_objects
+from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.locate import Location
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.localization import Localization, Location
+    from semsig_gis.objects import StreetObjects
 
 
 @functools.cache

@@ -25,18 +25,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.database.database import visible_objects_in
-from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import View
+from semsig_gis.database import visible_objects_in
+from semsig_gis.localization import database_tables
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.model import Noise, NoiseSpec
-    from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Noise, NoiseSpec, NoiseTable
+    from semsig_gis.observation import Photo
 
 LAPS = range(-4, 5)
 

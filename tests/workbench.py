@@ -18,7 +18,7 @@ from semsig_gis.serve import server
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from semsig_gis.serve.workbench import Workbench
+    from semsig_gis.serve import Workbench
 
 TOKEN = "the-token-of-the-tests"  # noqa: S105 - of a server that lives for a test
 

@@ -14,21 +14,24 @@ import shapely
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, SignatureSpec
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.table import Licence, StreetObjects
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    EmptyResultError,
+    GridSpec,
+    ObjectIndex,
+    SignatureSpec,
+)
+from semsig_gis.database import ObjectStore, build_database, save_with_store
+from semsig_gis.objects import Licence, StreetObjects
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import SignatureDatabase
 
 TAXONOMY = load_catalog("montpellier").taxonomy
 CORNER = np.array([765_200.0, 6_275_000.0])

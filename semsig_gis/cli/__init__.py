@@ -24,7 +24,7 @@ import warnings
 from typing import TextIO
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core import InputError, SemsigError
 
 FAULT, UNUSABLE = 1, 2
 # As a shell counts programs that SIGINT and SIGPIPE end.

@@ -27,10 +27,10 @@ from semsig_gis.cli.console import (
     require_suffix,
     say,
 )
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.database.companions import Companion
+    from semsig_gis.database import Companion
 
 MB = 1e6
 
@@ -90,13 +90,10 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Build a signature database from street objects."""
-    from semsig_gis.core.geometry import GridSpec
-    from semsig_gis.core.signature import SignatureSpec
-    from semsig_gis.database.city import open_city
-    from semsig_gis.database.viewpoints import ViewpointSpec
-    from semsig_gis.objects.surroundings import read_area
-    from semsig_gis.objects.table import open_objects
-    from semsig_gis.storage.geoparquet import NOWHERE
+    from semsig_gis.core import GridSpec, SignatureSpec
+    from semsig_gis.database import ViewpointSpec, open_city
+    from semsig_gis.objects import open_objects, read_area
+    from semsig_gis.storage import EMPTY_BOX
 
     if streets is not None and viewpoints != "streets":
         raise InputError("--streets is used only with --viewpoints streets; give both or neither.")
@@ -109,14 +106,14 @@ def build(
             width=street_width / 2,
             area=None
             if area is None
-            else read_area(area, crs=open_objects(objects, box=NOWHERE).crs),
+            else read_area(area, crs=open_objects(objects, box=EMPTY_BOX).crs),
         ),
     }
     if tile is None and not workers and scheduler is None:
         require_suffix(".parquet", out)
         cells, entries = _build_whole(objects, out, buildings, streets, specs)
     else:
-        from semsig_gis.database.tiles import TileSpec, build_tiles
+        from semsig_gis.database import TileSpec, build_tiles
 
         with progress("building tiles") as advance:
             manifest = build_tiles(
@@ -143,10 +140,8 @@ def _build_whole(
     objects: Path, out: Path, buildings: Path | None, streets: Path | None, specs: dict[str, Any]
 ) -> tuple[int, int]:
     """Build a database in one piece, and the object store beside it; return cells and entries."""
-    from semsig_gis.database.build import build_database
-    from semsig_gis.database.store import ObjectStore, save_with_store
-    from semsig_gis.objects.surroundings import read_surroundings
-    from semsig_gis.objects.table import open_objects
+    from semsig_gis.database import ObjectStore, build_database, save_with_store
+    from semsig_gis.objects import open_objects, read_surroundings
 
     opened = open_objects(objects)
     notes: list[str] = []
@@ -189,9 +184,8 @@ def update(
     as_json: AsJson = False,
 ) -> None:
     """Apply changed street objects to a database."""
-    from semsig_gis.database.city import open_city
-    from semsig_gis.database.update import update_file, update_tiles
-    from semsig_gis.objects.table import open_objects
+    from semsig_gis.database import open_city, update_file, update_tiles
+    from semsig_gis.objects import open_objects
 
     keep_inputs(out, read=(objects,))
     had_columns = open_city(database).has_columns
@@ -219,7 +213,7 @@ def update(
     if as_json:
         print_json(report.to_dict() | ({} if years is None else {"years": years}))
         return
-    from semsig_gis.reports.quality import update_tables
+    from semsig_gis.reports import update_tables
 
     print_tables(update_tables(report))
 
@@ -238,7 +232,7 @@ def merge(
 
     Objects in both are kept once, and cells near both are computed again.
     """
-    from semsig_gis.database.merge import merge_databases
+    from semsig_gis.database import merge_databases
 
     keep_inputs(out, read=(first, second))
     require_suffix(".parquet", out)
@@ -260,10 +254,8 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     if as_json:
         print_json(_info(database))
         return
-    from semsig_gis.database.city import open_city
-    from semsig_gis.database.companions import companions
-    from semsig_gis.reports.database import database_tables
-    from semsig_gis.reports.identifiability import identifiability_tables
+    from semsig_gis.database import companions, open_city
+    from semsig_gis.reports import database_tables, identifiability_tables
 
     city = open_city(database)
     counts = city.object_counts
@@ -279,9 +271,7 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
 
 
 def _info(path: Path) -> dict[str, Any]:
-    from semsig_gis.database.city import open_city
-    from semsig_gis.database.companions import companions
-    from semsig_gis.database.summary import database_summary
+    from semsig_gis.database import companions, database_summary, open_city
 
     city = open_city(path)
     counts = city.object_counts
@@ -317,7 +307,7 @@ def clean(
 
     Older versions and interrupted runs leave them; the database is not changed.
     """
-    from semsig_gis.database.companions import remove_companions
+    from semsig_gis.database import remove_companions
 
     removed = remove_companions(database, objects=objects, dry_run=dry_run)
     total = sum(one.bytes for one in removed)

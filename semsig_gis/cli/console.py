@@ -20,16 +20,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 import typer
 
 from semsig_gis import __version__
-from semsig_gis.core.defaults import DEFAULT_METHOD, PAPER_METHOD
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.text import visible
+from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, DatabaseError, InputError, visible
+from semsig_gis.localization import METRIC_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from semsig_gis.core.tables import Table
-    from semsig_gis.database.city import City
-    from semsig_gis.evaluation.identifiability.result import Identifiability
+    from semsig_gis.core import Table
+    from semsig_gis.database import City
+    from semsig_gis.evaluation import Identifiability
 
 
 VARIABLE = "SEMSIG_SUPERVISED"
@@ -305,7 +304,7 @@ MethodText = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help="Rank by likelihood, or by distance as TYPES+ANGLES (edit, histogram, jaccard), "
+        help=f"Rank by likelihood, or by distance as TYPES+ANGLES ({', '.join(METRIC_NAMES)}), "
         "types:edit or angles:edit; add :5% for two stages, :alpha=0.7, :raw or "
         f":weights=INSERT/DELETE/SUBSTITUTE.  [default: {DEFAULT_METHOD}]",
         show_default=False,
@@ -377,7 +376,7 @@ def known_identifiability(city: City) -> Identifiability | None:
     try:
         if not city.has_columns:
             return None
-        from semsig_gis.evaluation.identifiability.result import open_identifiability
+        from semsig_gis.evaluation import open_identifiability
 
         return open_identifiability(city.database, city.path)
     except DatabaseError as error:

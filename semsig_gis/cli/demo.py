@@ -31,19 +31,14 @@ def demo(
     ] = 0,
 ) -> None:
     """Run every step on a small made-up city, offline."""
-    from semsig_gis.database.build import build_database
-    from semsig_gis.database.file import save_database
-    from semsig_gis.evaluation.file import save_evaluation
-    from semsig_gis.evaluation.scoring import evaluate as run
+    from semsig_gis.database import build_database, save_database
+    from semsig_gis.evaluation import evaluate as run
+    from semsig_gis.evaluation import save_evaluation
     from semsig_gis.exports import export_database
-    from semsig_gis.maps.evaluation import evaluation_map
-    from semsig_gis.maps.objects import objects_map
-    from semsig_gis.maps.page import save_map
-    from semsig_gis.objects.load import build_objects
-    from semsig_gis.objects.table import save_objects
-    from semsig_gis.reports.evaluation import evaluation_tables
-    from semsig_gis.sources.catalog import paper_taxonomy
-    from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+    from semsig_gis.maps import evaluation_map, objects_map, save_map
+    from semsig_gis.objects import build_objects, save_objects
+    from semsig_gis.reports import evaluation_tables
+    from semsig_gis.sources import CitySpec, paper_taxonomy, synthetic_city
 
     layers = synthetic_city(CitySpec(seed=seed))
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)
@@ -91,13 +86,11 @@ def synthesize(
     ] = 0,
 ) -> None:
     """Make up a city: street objects, buildings and streets."""
-    from semsig_gis.objects.load import build_objects
-    from semsig_gis.objects.surroundings import save_surroundings
-    from semsig_gis.objects.table import save_objects
-    from semsig_gis.sources.catalog import paper_taxonomy
-    from semsig_gis.sources.synthetic.city import (
+    from semsig_gis.objects import build_objects, save_objects, save_surroundings
+    from semsig_gis.sources import (
         PARIS_LIKE,
         CitySpec,
+        paper_taxonomy,
         synthetic_city,
         synthetic_surroundings,
     )

@@ -40,8 +40,7 @@ from semsig_gis.cli.options import (
     OnGrid,
     read_noise,
 )
-from semsig_gis.core.defaults import LIKELIHOOD
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import LIKELIHOOD, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -105,18 +104,14 @@ def evaluate(
             )
     import dataclasses
 
-    from semsig_gis.database.city import open_city
-    from semsig_gis.evaluation.file import save_evaluation
-    from semsig_gis.evaluation.queries.distortion_text import parse_chain
-    from semsig_gis.evaluation.queries.distortions import Distortion
-    from semsig_gis.evaluation.scoring import evaluate as run
-    from semsig_gis.localization.distance.method import Method
-    from semsig_gis.localization.likelihood.index import build_index
-    from semsig_gis.reports.evaluation import evaluation_headline, evaluation_tables
+    from semsig_gis.database import open_city
+    from semsig_gis.evaluation import Distortion, parse_chain, save_evaluation
+    from semsig_gis.evaluation import evaluate as run
+    from semsig_gis.localization import Method, build_index
+    from semsig_gis.reports import evaluation_headline, evaluation_tables
 
     if report is not None:  # what draws, and is missed before the work rather than after it
-        from semsig_gis.reports.evaluation_page import evaluation_page
-        from semsig_gis.reports.page import write_page
+        from semsig_gis.reports import evaluation_page, write_page
     chain = [
         dataclasses.replace(
             one,
@@ -178,9 +173,7 @@ def experiment(
     as_json: AsJson = False,
 ) -> None:
     """Run the evaluations of an experiment, or resume them."""
-    from semsig_gis.evaluation.experiments.run import run_experiment
-    from semsig_gis.evaluation.experiments.tables import experiment_tables
-    from semsig_gis.evaluation.spec import open_experiment_spec
+    from semsig_gis.evaluation import experiment_tables, open_experiment_spec, run_experiment
 
     opened = open_experiment_spec(spec)
     with progress("answering") as advance:
@@ -202,14 +195,14 @@ def experiment(
 @app.command()
 def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None:
     """Compare two results of queries from the same places."""
-    from semsig_gis.evaluation.compare import (
+    from semsig_gis.evaluation import (
         changed_successes,
         common_cases,
         compare_evaluations,
+        open_results,
+        plain_records,
     )
-    from semsig_gis.evaluation.experiments.run import open_results
-    from semsig_gis.evaluation.figures import plain_records
-    from semsig_gis.reports.evaluation import comparison_sentence, comparison_table
+    from semsig_gis.reports import comparison_sentence, comparison_table
 
     pairs = common_cases(open_results(first), open_results(second))
     tables = {name: compare_evaluations(*pair) for name, pair in pairs.items()}
@@ -259,9 +252,8 @@ def reproduce(
     """Repeat the paper's experiments and compare the results."""
     import contextlib
 
-    from semsig_gis.evaluation.paper.reproduction import reproduce as run
-    from semsig_gis.reports.page import write_report
-    from semsig_gis.reports.paper.report import reproduction_report
+    from semsig_gis.evaluation import reproduce as run
+    from semsig_gis.reports import reproduction_report, write_report
 
     if workers is None:
         workers = (os.cpu_count() or 1) if size == "full" else 0
@@ -360,17 +352,11 @@ def identify(
 
     Adds columns to the database, which `semsig info`, `map` and `export` show.
     """
-    from semsig_gis.database.city import open_city
-    from semsig_gis.evaluation.identifiability.analysis import identify as run
-    from semsig_gis.evaluation.identifiability.check import check_identifiability
-    from semsig_gis.evaluation.identifiability.result import save_identifiability
-    from semsig_gis.localization.likelihood.index import build_index
-    from semsig_gis.localization.noise.model import cell_noise
-    from semsig_gis.reports.identifiability import (
-        check_tables,
-        identifiability_page,
-        identifiability_tables,
-    )
+    from semsig_gis.database import open_city
+    from semsig_gis.evaluation import check_identifiability, save_identifiability
+    from semsig_gis.evaluation import identify as run
+    from semsig_gis.localization import build_index, cell_noise
+    from semsig_gis.reports import check_tables, identifiability_page, identifiability_tables
 
     _require_check(check, out)
     city = open_city(database)
@@ -401,7 +387,7 @@ def identify(
                 columns, index, queries=check, threads=workers, progress=advance
             )
     if out is not None and verification is not None:
-        from semsig_gis.reports.page import write_report  # it loads what draws
+        from semsig_gis.reports import write_report  # it loads what draws
 
         page = identifiability_page(
             columns,

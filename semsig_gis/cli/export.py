@@ -18,7 +18,7 @@ from semsig_gis.cli.console import (
     say,
 )
 from semsig_gis.cli.options import Smooth
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 
 @app.command()
@@ -66,9 +66,9 @@ def export(
     ] = None,
 ) -> None:
     """Export cells, objects and queries for QGIS and other programs."""
-    from semsig_gis.database.city import open_city
+    from semsig_gis.database import open_city
     from semsig_gis.exports import ITEM, export_database, export_item
-    from semsig_gis.objects.table import open_objects
+    from semsig_gis.objects import open_objects
 
     keep_inputs(out, read=(database, objects))
     if out.suffix.lower() == ITEM:
@@ -82,7 +82,7 @@ def export(
     city = open_city(database)
     queries = None
     if evaluation is not None:
-        from semsig_gis.evaluation.file import open_evaluation
+        from semsig_gis.evaluation import open_evaluation
 
         queries = open_evaluation(evaluation)
     # Hexagons count the objects that the database was built from, where they lie beside it.
@@ -113,10 +113,10 @@ def import_(
     ] = None,
 ) -> None:
     """Restore a database from an exported GeoPackage."""
-    from semsig_gis.database.file import save_database
-    from semsig_gis.evaluation.identifiability.result import save_identifiability
-    from semsig_gis.exports.geopackage import read_geopackage
-    from semsig_gis.objects.table import save_objects
+    from semsig_gis.database import save_database
+    from semsig_gis.evaluation import save_identifiability
+    from semsig_gis.exports import read_geopackage
+    from semsig_gis.objects import save_objects
 
     keep_inputs(out, objects, read=(geopackage,))
     require_suffix(".parquet", out, objects)

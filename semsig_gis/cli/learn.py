@@ -30,7 +30,7 @@ from semsig_gis.cli.options import (
     object_store,
     read_drift,
 )
-from semsig_gis.core.text import percent
+from semsig_gis.core import percent
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -38,9 +38,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from semsig_gis.database.city import City
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.learn import NoiseEstimate, Sample
+    from semsig_gis.database import City, SignatureDatabase
+    from semsig_gis.localization import NoiseEstimate, Sample
 
 Samples = Annotated[
     Path,
@@ -68,10 +67,8 @@ def learn(
     """
     from dataclasses import replace
 
-    from semsig_gis.database.city import open_city
-    from semsig_gis.localization.noise.age import check_map_age, fresh_noise
-    from semsig_gis.localization.noise.learn import read_samples
-    from semsig_gis.localization.noise.model import save_noise
+    from semsig_gis.database import open_city
+    from semsig_gis.localization import check_map_age, fresh_noise, read_samples, save_noise
 
     keep_inputs(out, read=(database, samples, objects, drift_report))
     check_map_age(map_age)
@@ -109,7 +106,7 @@ def learn(
 def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
     import numpy as np
 
-    from semsig_gis.localization.noise.learn import Sample, learn_noise
+    from semsig_gis.localization import Sample, learn_noise
 
     database = city.database
     places = _places(database, samples)
@@ -131,7 +128,7 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
     """Return the true places in metres, shape (samples, 2)."""
     import numpy as np
 
-    from semsig_gis.core.geometry import split_ids
+    from semsig_gis.core import split_ids
 
     places = [
         sample.xy
@@ -144,7 +141,7 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
 
 def _rates(rates: pd.DataFrame) -> list[list[str]]:
     """Return rates as rows of a table; those of classes far away are in the file alone."""
-    from semsig_gis.localization.noise.fit import ALL
+    from semsig_gis.localization import ALL
 
     told = rates[(rates["quantity"] != "fading") | (rates["class"] == ALL)]
     return [_rate(row) for row in told.to_dict("records")]
@@ -187,9 +184,9 @@ def calibrate(
 
     import numpy as np
 
-    from semsig_gis.database.city import open_city
+    from semsig_gis.database import open_city
+    from semsig_gis.localization import read_samples
     from semsig_gis.localization.likelihood import answer_rule as abstention
-    from semsig_gis.localization.noise.learn import read_samples
 
     keep_inputs(out, read=(database, samples, noise, drift_report, objects))
     city = open_city(database)

@@ -22,18 +22,16 @@ from semsig_gis.cli.console import (
     require_suffix,
     say,
 )
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
-    from semsig_gis.objects.load import Loaded, Selection
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.filters import Rules
-    from semsig_gis.sources.layer_spec import LayerSpec
+    from semsig_gis.objects import Loaded, Selection
+    from semsig_gis.sources import Catalog, LayerSpec, Rules
 
 
 def _catalogs(incomplete: str) -> list[str]:
     """Return the catalogues whose names begin so, for a shell that completes a line."""
-    from semsig_gis.sources.catalog import catalog_names
+    from semsig_gis.sources import catalog_names
 
     return [name for name in catalog_names() if name.startswith(incomplete)]
 
@@ -118,11 +116,15 @@ def load(
     as_json: AsJson = False,
 ) -> None:
     """Read files of open data into street objects."""
-    from semsig_gis.objects.load import assemble, choose_layers, read_files
-    from semsig_gis.objects.skipped_layers import passed_by, read_small
-    from semsig_gis.sources.catalog import combine_catalogs, load_catalog
-    from semsig_gis.sources.clip import BOX, clip_layers, parse_area
-    from semsig_gis.sources.detect import detect_catalogs
+    from semsig_gis.objects import assemble, choose_layers, passed_by, read_files, read_small
+    from semsig_gis.sources import (
+        BOX,
+        clip_layers,
+        combine_catalogs,
+        detect_catalogs,
+        load_catalog,
+        parse_area,
+    )
 
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
@@ -216,9 +218,8 @@ def fetch(
     as_json: AsJson = False,
 ) -> None:
     """Download the street objects of an area."""
-    from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
-    from semsig_gis.objects.load import assemble, choose_layers
-    from semsig_gis.sources.catalog import load_catalog
+    from semsig_gis.objects import assemble, choose_layers, fetch_layers, find_area, open_cache
+    from semsig_gis.sources import load_catalog
 
     keep_inputs(out, buildings, streets, read=(name, area))
     require_suffix(".parquet", out, buildings, streets)
@@ -272,9 +273,7 @@ def _selection(*, all_layers: bool, paper_classes: bool) -> Selection:
 def _save_loaded(
     loaded: Loaded, out: Path, buildings: Path | None, streets: Path | None, *, as_json: bool
 ) -> None:
-    from semsig_gis.objects.quality import quality_report
-    from semsig_gis.objects.surroundings import save_surroundings
-    from semsig_gis.objects.table import save_objects
+    from semsig_gis.objects import quality_report, save_objects, save_surroundings
 
     notes = list(loaded.notes)
     save_objects(loaded.objects, out)
@@ -290,7 +289,7 @@ def _save_loaded(
     if as_json:
         print_json(report.to_dict())
     else:
-        from semsig_gis.reports.quality import quality_tables
+        from semsig_gis.reports import quality_tables
 
         # The notes are said below the tables, where they are seen, and not twice.
         print_tables(quality_tables(replace(report, notes=())))
@@ -309,7 +308,7 @@ def draft(
     ] = None,
 ) -> None:
     """Draft a catalogue for a vector file, for you to edit."""
-    from semsig_gis.objects.draft import draft_catalog
+    from semsig_gis.objects import draft_catalog
 
     say(draft_catalog(file, crs=crs), end="")
 
@@ -328,9 +327,8 @@ def sources(
     """List the catalogues, or the layers of one."""
     import dataclasses
 
-    from semsig_gis.core.plugins import installed_readers
-    from semsig_gis.sources import READERS
-    from semsig_gis.sources.catalog import catalog_names, load_catalog
+    from semsig_gis.core import installed_readers
+    from semsig_gis.sources import READERS, catalog_names, load_catalog
 
     if name is None:
         catalogs = [load_catalog(known) for known in catalog_names()]

@@ -35,22 +35,14 @@ from semsig_gis.cli.options import (
     command,
     seen_north,
 )
-from semsig_gis.core.defaults import LIKELIHOOD
-from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
-from semsig_gis.core.text import percent
+from semsig_gis.core import LIKELIHOOD, EmptyResultError, InputError, UnknownNameError, percent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.database.city import City
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import PartitionedDatabase
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.localization.distance.method import Method
-    from semsig_gis.localization.locator import Locator
-    from semsig_gis.observation.files import QueryLine
-    from semsig_gis.observation.north import North
-    from semsig_gis.observation.view import View
+    from semsig_gis.database import City, PartitionedDatabase, SignatureDatabase
+    from semsig_gis.localization import Answer, Locator, Method
+    from semsig_gis.observation import North, QueryLine, View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +71,7 @@ class RankedOptions(QueryOptions):
 
     def read_queries(self, dataset: SignatureDatabase | PartitionedDatabase) -> Iterator[QueryLine]:
         """Return the queries of --queries, each when it is needed."""
-        from semsig_gis.observation.files import parse_queries, read_queries
+        from semsig_gis.observation import parse_queries, read_queries
 
         city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
         if self.queries == "-":
@@ -167,11 +159,11 @@ def localize(options: LocalizeOptions) -> None:
     --explain, --share and the options from --noise to --objects work only with the likelihood
     method.
     """
-    from semsig_gis.database.city import open_city
+    from semsig_gis.database import open_city
 
     method = None
     if options.ranking != LIKELIHOOD:
-        from semsig_gis.localization.distance.method import Method
+        from semsig_gis.localization import Method
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
@@ -209,7 +201,7 @@ def _beside(
             f"the query has {what}, which the method {ranking!r} cannot take; give directions to "
             "all objects or to none, or leave out the method."
         )
-    from semsig_gis.localization.suggest import with_unplaced
+    from semsig_gis.localization import with_unplaced
 
     likelihood: Any = locator
     return with_unplaced(likelihood, query, unplaced, absent=absent)
@@ -223,8 +215,7 @@ def _locator(
     if method is None:
         usual = options.usual_noise(taxonomy)
         return options.locator(city, north, usual_noise=usual, top=top, explain=options.explain)
-    from semsig_gis.localization.locator import make_locator
-    from semsig_gis.localization.requirement import Requirement
+    from semsig_gis.localization import Requirement, make_locator
 
     require = options.require
     requirement = None if require is None else Requirement.parse(require, taxonomy)
@@ -238,7 +229,7 @@ def _answer_lines(
 
     Lines of a file are answered side by side, those of standard input one by one as they come.
     """
-    from semsig_gis.core.threads import each_in_order
+    from semsig_gis.core import each_in_order
 
     source, first_error, answered, failed = options.source, "", 0, 0
 
@@ -273,8 +264,7 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
     with progress("answering"):
         answer = locator.locate(query)
     if options.map_ is not None:
-        from semsig_gis.maps.location import localization_map, location_map
-        from semsig_gis.maps.page import save_map
+        from semsig_gis.maps import localization_map, location_map, save_map
 
         with progress("drawing the map"):
             if options.ranking == LIKELIHOOD:
@@ -308,7 +298,7 @@ def _write(
 ) -> dict[str, Any]:
     """Write the regions to search, or all chances, and return what there is to say of regions."""
     from semsig_gis.exports import export_answer
-    from semsig_gis.localization.answers import REGION_SHARE
+    from semsig_gis.localization import REGION_SHARE
 
     if answer.tied_beyond:
         # No cell is left out of the search that is as good as the last candidate.

@@ -21,12 +21,12 @@ from semsig_gis.cli.console import (
     tell_if_online,
 )
 from semsig_gis.cli.options import Smooth
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
+from semsig_gis.core import DatabaseError, EmptyResultError, InputError
 
 if TYPE_CHECKING:
     import folium
 
-    from semsig_gis.database.city import City
+    from semsig_gis.database import City
 
 
 AROUND_M = 100.0
@@ -36,8 +36,8 @@ def draw_ground(
     drawn: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
 ) -> None:
     """Add streets and buildings to a map: those of files, else of the store of the database."""
-    from semsig_gis.maps.objects import ground_map
-    from semsig_gis.objects.surroundings import read_surroundings
+    from semsig_gis.maps import ground_map
+    from semsig_gis.objects import read_surroundings
 
     crs = city.database.crs
     houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
@@ -133,14 +133,11 @@ def map_(
     """Draw cells, evaluations, changes, answers or objects on a map."""
     import shapely
 
-    from semsig_gis.database.city import open_city
-    from semsig_gis.database.database import require_same_place
-    from semsig_gis.evaluation.file import open_evaluation
-    from semsig_gis.localization.likelihood.posterior import open_posterior
-    from semsig_gis.maps.answer import RASTERS
-    from semsig_gis.maps.city import city_map
-    from semsig_gis.maps.page import save_map
-    from semsig_gis.objects.table import open_objects
+    from semsig_gis.database import open_city, require_same_place
+    from semsig_gis.evaluation import open_evaluation
+    from semsig_gis.localization import open_posterior
+    from semsig_gis.maps import RASTERS, city_map, save_map
+    from semsig_gis.objects import open_objects
 
     others = (drift, location, objects)
     cells = identifiability or ambiguity

@@ -11,23 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 import typer
 
 from semsig_gis.cli.console import Database, app, numbers, remark
-from semsig_gis.core.errors import CrsError, DatabaseError, InputError
+from semsig_gis.core import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.city import City
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import PartitionedDatabase
-    from semsig_gis.database.store import ObjectStore
-    from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-    from semsig_gis.localization.noise.age import Drift
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.observation.north import North
-    from semsig_gis.observation.view import View
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import City, ObjectStore, PartitionedDatabase, SignatureDatabase
+    from semsig_gis.localization import Drift, LikelihoodLocator, Noise
+    from semsig_gis.observation import North, View
 
 EXPLAINED = 3  # candidates
 MOST_TOP = 10_000
@@ -150,7 +144,7 @@ def seen_north(city: City, north: NorthText, date: str | None) -> North:
     """Return what the bearings of a query count from."""
     import datetime as dt
 
-    from semsig_gis.observation.north import GRID_NORTH, North
+    from semsig_gis.observation import GRID_NORTH, North
 
     try:
         day = None if date is None else dt.date.fromisoformat(date)
@@ -211,7 +205,7 @@ class QueryOptions:
 
     def query(self, dataset: SignatureDatabase | PartitionedDatabase, *, others: str = "") -> View:
         """Return the query of the options; `others` says what else may be given."""
-        from semsig_gis.observation.sentences import parse_view, said_row
+        from semsig_gis.observation import parse_view, said_row
 
         taxonomy = dataset.taxonomy
         told: dict[str, Any] = {
@@ -238,7 +232,7 @@ class QueryOptions:
 
     def usual_noise(self, taxonomy: Taxonomy) -> str:
         """Return the noise of what was seen: a person who says it in words leaves much out."""
-        from semsig_gis.observation.sentences import said_row
+        from semsig_gis.observation import said_row
 
         sentence = self._parts[0]
         return "by-hand" if sentence and "see" in said_row(sentence, taxonomy) else "generic"
@@ -247,7 +241,7 @@ class QueryOptions:
         self, dataset: SignatureDatabase | PartitionedDatabase
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Return the class codes of what was seen in no known direction, and was not seen."""
-        from semsig_gis.observation.sentences import unplaced_codes
+        from semsig_gis.observation import unplaced_codes
 
         _, seen, absent = unplaced_codes(self.seen or "", dataset.taxonomy)
         return seen, absent
@@ -255,7 +249,7 @@ class QueryOptions:
     @property
     def _parts(self) -> tuple[str, list[str], list[str]]:
         """The sentence of what was seen, what else was seen, and what was not."""
-        from semsig_gis.observation.sentences import unplaced_parts
+        from semsig_gis.observation import unplaced_parts
 
         return unplaced_parts(self.seen or "")
 
@@ -324,10 +318,8 @@ class SearchOptions:
 
         The noise is the `usual_noise` unless another one was asked for.
         """
-        from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE, open_rule
-        from semsig_gis.localization.likelihood.method import LikelihoodMethod
-        from semsig_gis.localization.locator import make_locator
-        from semsig_gis.observation.north import GRID_NORTH
+        from semsig_gis.localization import DEFAULT_RULE, LikelihoodMethod, make_locator, open_rule
+        from semsig_gis.observation import GRID_NORTH
 
         if self.on_grid and self.refine:
             raise InputError(
@@ -373,26 +365,25 @@ class SearchOptions:
         """Return what is known of the place, by cell and in plain values; None if nothing is."""
         parts, known = [], {}
         if self.near is not None:
-            from semsig_gis.localization.likelihood.priors import KnownPosition, position_prior
+            from semsig_gis.localization import KnownPosition, position_prior
 
             place = KnownPosition.parse(self.near, database)
             parts.append(position_prior(database, (place.x, place.y), sigma=place.sigma))
             known["near"] = place.to_dict()
         if self.area is not None:
-            from semsig_gis.localization.likelihood.priors import area_prior
-            from semsig_gis.objects.surroundings import read_area
+            from semsig_gis.localization import area_prior
+            from semsig_gis.objects import read_area
 
             parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
             inside = int((parts[-1] > -math.inf).sum())
             known["area"] = {"file": str(self.area), "cells": inside}
         if self.popularity is not None:
-            from semsig_gis.localization.likelihood.priors import raster_prior
+            from semsig_gis.localization import raster_prior
 
             parts.append(raster_prior(database, self.popularity))
             known["popularity"] = {"file": str(self.popularity)}
         if self.require is not None:
-            from semsig_gis.localization.likelihood.priors import weight_prior
-            from semsig_gis.localization.requirement import Requirement
+            from semsig_gis.localization import Requirement, weight_prior
 
             requirement = Requirement.parse(self.require, database.taxonomy)
             met = requirement.met(database.type_sequences)
@@ -409,13 +400,13 @@ def read_noise(
     drift_report: Path | None = None,
 ) -> Noise:
     """Return a noise model by its name or file, for a map of some age."""
-    from semsig_gis.localization.noise.model import NOISES, named_noise, open_noise
+    from semsig_gis.localization import NOISES, named_noise, open_noise
 
     by_file = noise not in NOISES and Path(noise).suffix
     model = open_noise(noise) if by_file else named_noise(noise)
     if map_age == 0 and drift_report is None:
         return model
-    from semsig_gis.localization.noise.age import aged_noise  # what loads slowly
+    from semsig_gis.localization import aged_noise  # what loads slowly
 
     return aged_noise(model, map_age, database=database, drift=read_drift(drift_report, map_age))
 
@@ -428,17 +419,17 @@ def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
         raise InputError(
             "--drift-report was given without --map-age; give the age of the map in years as well."
         )
-    from semsig_gis.localization.noise.age import open_drift
+    from semsig_gis.localization import open_drift
 
     return open_drift(drift_report)
 
 
 def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:
     """Return the street objects of a database; None where there are none, unless needed."""
-    from semsig_gis.database.store import ObjectStore, open_store
+    from semsig_gis.database import ObjectStore, open_store
 
     if objects is not None and not objects.is_dir():
-        from semsig_gis.objects.table import open_objects
+        from semsig_gis.objects import open_objects
 
         store = ObjectStore.of(open_objects(objects))
         if store.objects.crs != city.database.crs:

@@ -20,12 +20,11 @@ from semsig_gis.cli.options import (
     command,
     seen_north,
 )
-from semsig_gis.core.text import percent
+from semsig_gis.core import percent
 
 if TYPE_CHECKING:
-    from semsig_gis.database.city import City
-    from semsig_gis.observation.files import Route
-    from semsig_gis.observation.north import North
+    from semsig_gis.database import City
+    from semsig_gis.observation import North, Route
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +52,7 @@ class ViewOptions:
 
     def read(self, city: City, north: North) -> Route:
         """Return the views with their names, and the legs between them."""
-        from semsig_gis.observation.files import parse_route, read_route
-        from semsig_gis.observation.track import read_track
+        from semsig_gis.observation import parse_route, read_route, read_track
 
         dataset = city.dataset
         way: dict[str, Any] = {
@@ -80,7 +78,7 @@ class RouteOptions(SearchOptions, ViewOptions):
 @command(RouteOptions)
 def route(options: RouteOptions) -> None:
     """Find where the views of a route were seen from."""
-    from semsig_gis.database.city import open_city
+    from semsig_gis.database import open_city
 
     city = open_city(options.database)
     north = seen_north(city, options.north, options.date)

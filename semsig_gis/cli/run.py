@@ -9,7 +9,7 @@ from typing import Any
 import typer
 
 from semsig_gis.cli.console import app
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 __all__ = ["run"]
 

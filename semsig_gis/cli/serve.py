@@ -10,7 +10,7 @@ import typer
 
 from semsig_gis.cli.console import Database, app, remark, say
 from semsig_gis.cli.options import NoiseName, Objects, object_store, read_noise
-from semsig_gis.core.errors import extra
+from semsig_gis.core import extra
 
 MOST_PORT = 65535
 
@@ -34,9 +34,9 @@ def serve(
     """
     with extra("serve", "the workbench"):
         from semsig_gis.serve import server
-    from semsig_gis.database.city import open_city
-    from semsig_gis.localization.noise.model import NOISES
-    from semsig_gis.serve.workbench import Workbench
+    from semsig_gis.database import open_city
+    from semsig_gis.localization import NOISES
+    from semsig_gis.serve import Workbench
 
     city = open_city(database)
     model = read_noise(noise, city.database)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from semsig_gis.cli.console import AsJson, print_json, print_rows, progress, say
 from semsig_gis.cli.localize import print_place, print_query
 from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north
-from semsig_gis.core.text import percent
+from semsig_gis.core import percent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,8 +20,8 @@ class SuggestOptions(SearchOptions, QueryOptions):
 @command(SuggestOptions)
 def suggest(options: SuggestOptions) -> None:
     """Suggest what to look for next, most useful first."""
-    from semsig_gis.database.city import open_city
-    from semsig_gis.localization.suggest import next_questions, with_unplaced
+    from semsig_gis.database import open_city
+    from semsig_gis.localization import next_questions, with_unplaced
 
     city = open_city(options.database)
     north = seen_north(city, options.north, options.date)

@@ -18,13 +18,13 @@ from semsig_gis.cli.console import (
     require_suffix,
     say,
 )
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from collections import Counter
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.observation.detectors.views import Tally
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.observation import Tally
 
 MOST_NAMES = 8
 
@@ -118,11 +118,15 @@ def view(
     as_json: AsJson = False,
 ) -> None:
     """Turn the boxes of an object detector into views for semsig localize."""
-    from semsig_gis.observation.detectors.formats import read_pictures
-    from semsig_gis.observation.detectors.labels import LabelMap
-    from semsig_gis.observation.detectors.pictures import Shot
-    from semsig_gis.observation.detectors.views import Detector, north_sigma, read_shots
-    from semsig_gis.storage.whole import write_whole
+    from semsig_gis.observation import (
+        Detector,
+        LabelMap,
+        Shot,
+        north_sigma,
+        read_pictures,
+        read_shots,
+    )
+    from semsig_gis.storage import write_whole
 
     keep_inputs(out, read=(*files, *(labels or ()), database, photos))
     require_suffix(".jsonl", out)
@@ -173,11 +177,11 @@ def view(
 def _taxonomy(database: Path | None) -> Taxonomy:
     """Return the classes that are meant; built-in ones are as tall as elsewhere, if not said."""
     if database is None:
-        from semsig_gis.sources.catalog import built_in_taxonomy
+        from semsig_gis.sources import built_in_taxonomy
 
         return built_in_taxonomy()
-    from semsig_gis.database.city import open_city
-    from semsig_gis.observation.detectors.views import with_heights
+    from semsig_gis.database import open_city
+    from semsig_gis.observation import with_heights
 
     return with_heights(open_city(database).database.taxonomy)
 

@@ -1,1 +1,5 @@
 """Words that every step shares: errors, geometry, grid, taxonomy, signatures, R-trees."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

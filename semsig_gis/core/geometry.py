@@ -244,7 +244,9 @@ def _geodesic_step(
     """Return the true azimuth, and the length on the ellipsoid, of a step in the plane."""
     plane, ellipsoid = Proj(crs), crs.get_geod() or Geod(ellps="WGS84")
     start = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-    first, last = (plane(*points.T, inverse=True) for points in (start, start + step))
+    end = start + step
+    first = plane(start[:, 0], start[:, 1], inverse=True)
+    last = plane(end[:, 0], end[:, 1], inverse=True)
     azimuth, _, metres = ellipsoid.inv(*first, *last)
     return np.where(np.isfinite(metres), azimuth, np.nan), np.asarray(metres)
 

@@ -8,11 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cell_ids, cells_near, consecutive, split_ids
-from semsig_gis.core.resources import announce, require_memory
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec, distance_units_of
+from semsig_gis.core import (
+    BEARING_UNITS,
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    PackedIndex,
+    SignatureSpec,
+    announce,
+    cell_ids,
+    cells_near,
+    consecutive,
+    distance_units_of,
+    require_memory,
+    split_ids,
+)
 from semsig_gis.database.database import SignatureDatabase
 from semsig_gis.database.occlusion import TOLERANCE_M, Footprints
 from semsig_gis.database.sightings import clockwise_order, measure_sightings
@@ -22,7 +32,7 @@ from semsig_gis.database.viewpoints import (
     reproject,
     select_elements,
 )
-from semsig_gis.objects.table import StreetObjects, licenses_of
+from semsig_gis.objects import StreetObjects, licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -104,7 +114,7 @@ def build_database(
     np.True_
     """
     if not isinstance(objects, StreetObjects):
-        from semsig_gis.objects.from_geodataframe import objects_from_frame  # noqa: PLC0415 - it takes 1 s to load
+        from semsig_gis.objects import objects_from_frame  # noqa: PLC0415 - it takes 1 s to load
 
         objects = objects_from_frame(objects)
     footprints = select_elements(footprints, "buildings")

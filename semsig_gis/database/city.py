@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError
+from semsig_gis.core import DatabaseError, Displayed
 from semsig_gis.database.file import (
     INPUTS,
     KIND,
@@ -34,8 +33,7 @@ from semsig_gis.database.store import (
     file_state,
     open_store,
 )
-from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
-from semsig_gis.storage.whole import whole_folder
+from semsig_gis.storage import read_geoparquet, whole_folder, write_geoparquet
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,7 +43,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.file import PartitionedDatabase
     from semsig_gis.database.store import ObjectStore
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 ADDED = "added"

@@ -18,11 +18,24 @@ import pyarrow as pa
 from pyproj import CRS
 
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed, bounds_text
-from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import LICENSES, cell_ids, consecutive, crs_label
-from semsig_gis.core.presentation import map_with, plot_with
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature, quantize
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    LICENSES,
+    DatabaseError,
+    Displayed,
+    InputError,
+    Signature,
+    UnknownNameError,
+    bounds_text,
+    cell_ids,
+    consecutive,
+    crs_label,
+    map_with,
+    nearest_name,
+    plot_with,
+    quantize,
+)
 from semsig_gis.database.sequences import SequenceTable, read_only
 from semsig_gis.database.sightings import VisibleObjects
 from semsig_gis.database.viewpoints import ViewpointSpec
@@ -34,10 +47,7 @@ if TYPE_CHECKING:
     import shapely
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.core.geometry import GridSpec
-    from semsig_gis.core.signature import SignatureSpec
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Axes, GridSpec, MapFrame, SignatureSpec, Taxonomy
 else:
     gpd = lazy_loader.load("geopandas")
     shapely = lazy_loader.load("shapely")

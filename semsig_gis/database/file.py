@@ -13,23 +13,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, SemsigError
-from semsig_gis.core.geometry import NOTES, GridSpec, split_ids
-from semsig_gis.core.signature import BEARING_UNITS, SignatureSpec
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.core.temporary import remove_abandoned
+from semsig_gis.core import (
+    BEARING_UNITS,
+    NOTES,
+    DatabaseError,
+    Displayed,
+    GridSpec,
+    SemsigError,
+    SignatureSpec,
+    Taxonomy,
+    remove_abandoned,
+    split_ids,
+)
 from semsig_gis.database.database import SignatureDatabase, join_databases, require_same
 from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.storage import (
     geo_metadata,
+    parse_json,
     points_to_wkb,
     read_geoparquet,
+    read_whole,
     whole_numbers,
     write_geoparquet,
+    write_whole,
 )
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

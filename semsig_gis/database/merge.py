@@ -11,16 +11,21 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.geometry import CLASS_CODE, HALF_WIDTH, LICENSES, MERGED, cells_near
+from semsig_gis.core import (
+    CLASS_CODE,
+    HALF_WIDTH,
+    LICENSES,
+    MERGED,
+    DatabaseError,
+    Displayed,
+    cells_near,
+)
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import join_databases, require_same
 from semsig_gis.database.occlusion import MARGIN_M, footprints_around
 from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.changes import compare_objects
-from semsig_gis.objects.table import StreetObjects, join_licences, licenses_of
+from semsig_gis.objects import StreetObjects, compare_objects, join_licences, licenses_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import lazy_loader
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import Displayed, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.geoparquet import whole_numbers
+from semsig_gis.core import InputError
+from semsig_gis.storage import whole_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core import FULL_TURN
 from semsig_gis.database.occlusion import hidden
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 BEARING_DECIMALS = 9

@@ -18,9 +18,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import lazy_loader
 
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import HALF_WIDTH, LICENSES, NAME, crs_label
+from semsig_gis.core import (
+    HALF_WIDTH,
+    LICENSES,
+    NAME,
+    DatabaseError,
+    Displayed,
+    InputError,
+    crs_label,
+)
 from semsig_gis.database.file import (
     INPUTS,
     damaged_files,
@@ -33,10 +39,16 @@ from semsig_gis.database.file import (
 )
 from semsig_gis.database.occlusion import Footprints, buildings_near
 from semsig_gis.database.viewpoints import reproject, select_elements
-from semsig_gis.objects.table import licenses_of, open_objects, save_objects
-from semsig_gis.storage.geoparquet import UNREADABLE
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import alone_in, move_folder, whole_file, whole_folder
+from semsig_gis.objects import licenses_of, open_objects, save_objects
+from semsig_gis.storage import (
+    UNREADABLE,
+    folder_locked,
+    move_folder,
+    parse_json,
+    read_whole,
+    whole_file,
+    whole_folder,
+)
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -45,9 +57,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.rtree import ObjectIndex
+    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 else:
     gpd = lazy_loader.load("geopandas")
     shapely = lazy_loader.load("shapely")
@@ -117,7 +129,7 @@ class ObjectStore(Displayed):
     @cached_property
     def index(self) -> ObjectIndex:
         """R-tree over the objects, in their order, built at the first access."""
-        from semsig_gis.core.rtree import ObjectIndex  # noqa: PLC0415 - it takes 110 ms to load
+        from semsig_gis.core import ObjectIndex  # noqa: PLC0415 - it takes 110 ms to load
 
         return ObjectIndex(self.objects.xy)
 
@@ -188,7 +200,7 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
                 raise InputError(str(error).replace(str(partial), str(path))) from error
             new = partial.with_name(final.name)
             _write(store, new, fingerprint=digest(partial))
-            stack.enter_context(alone_in(final.parent))
+            stack.enter_context(folder_locked(final.parent))
             # Until the new database is in place, the old one may need a store that still waits.
             _settle(Path(path))
             move_folder(new, _waiting(final))
@@ -338,7 +350,7 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    from semsig_gis.objects.surroundings import read_surroundings  # noqa: PLC0415 - it takes 1 s
+    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 1 s to load
 
     files = stored_inputs(folder)
     objects = open_objects(files["objects"])
@@ -380,7 +392,7 @@ def current_store(database: Path) -> Path:
     final = store_path(database)
     if not _awaited(database):
         return final
-    with contextlib.suppress(InputError), alone_in(final.parent) as alone:
+    with contextlib.suppress(InputError), folder_locked(final.parent) as alone:
         if alone:
             _settle(database)
     return _waiting(final) if _awaited(database) else final

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.geometry import degree_bounds, plane_distortion
+from semsig_gis.core import degree_bounds, plane_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import ObjectClass
+    from semsig_gis.core import ObjectClass
     from semsig_gis.database.database import SignatureDatabase
 
 

@@ -15,14 +15,10 @@ import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.core.geometry import HALF_WIDTH
-from semsig_gis.core.temporary import temporary_folder
+from semsig_gis.core import HALF_WIDTH, SourceError, temporary_folder
 from semsig_gis.database.file import INPUTS, digest
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, NOWHERE
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.objects import open_objects, read_surroundings, save_objects, save_surroundings
+from semsig_gis.storage import EMPTY_BOX, VERIFY_CHECKSUMS, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -47,7 +43,7 @@ def input_files(
     if not in_memory:
         yield files
         return
-    crs = open_objects(objects, box=NOWHERE).crs
+    crs = open_objects(objects, box=EMPTY_BOX).crs
     with working_folder(out) as folder:
         for name, table in in_memory.items():
             files[name] = folder / f"{name}.parquet"
@@ -111,6 +107,6 @@ def widest_street(streets: Path) -> float:
     """Return the largest half-width of the streets in metres, 0 if the file has none."""
     if HALF_WIDTH not in pq.read_schema(streets).names:
         return 0.0
-    widths = pq.read_table(streets, columns=[HALF_WIDTH], **CHECKING_PAGES)[HALF_WIDTH].to_numpy()
+    widths = pq.read_table(streets, columns=[HALF_WIDTH], **VERIFY_CHECKSUMS)[HALF_WIDTH].to_numpy()
     finite = widths[np.isfinite(widths.astype(np.float64))]
     return float(finite.max(initial=0.0))

@@ -18,20 +18,24 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from semsig_gis import __version__
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
+    MOST_METRES,
+    TEMPORARY_PREFIX,
+    DatabaseError,
+    EmptyResultError,
     GridSpec,
+    InputError,
+    SignatureSpec,
+    announce,
     cell_ids,
     cells_near,
+    check_workers,
     consecutive,
+    finish_tasks,
+    require_number,
     require_step,
     split_ids,
 )
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.resources import announce
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.temporary import TEMPORARY_PREFIX
 from semsig_gis.database.build import (
     HIDDEN_PAIR_S,
     PAIR_S,
@@ -58,12 +62,12 @@ from semsig_gis.database.tile_inputs import (
     widest_street,
 )
 from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
-from semsig_gis.objects.surroundings import read_surroundings
-from semsig_gis.objects.table import open_objects
-from semsig_gis.storage.geoparquet import NOWHERE, each_bounds
-from semsig_gis.storage.runs import (
+from semsig_gis.objects import open_objects, read_surroundings
+from semsig_gis.storage import (
+    EMPTY_BOX,
     PARTIAL,
     RunKind,
+    bounds_by_group,
     finish,
     partial_folder,
     read_json,
@@ -227,7 +231,7 @@ def build_tiles(
             progress=progress,
             tell=tell,
         )
-        return publish(plan.folder, parts)
+        return publish_tiles(plan.folder, parts)
 
 
 def build_parts(
@@ -371,7 +375,7 @@ def plan_tiles(
         "streets": streets if viewpoints.mode == "streets" else None,
     }
     paths = {name: Path(path).absolute() for name, path in inputs.items() if path is not None}
-    empty = open_objects(paths["objects"], box=NOWHERE)
+    empty = open_objects(paths["objects"], box=EMPTY_BOX)
     reach = float(empty.taxonomy.ranges(spec.radius).max())
     require_step(grid, reach)
     require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
@@ -384,7 +388,7 @@ def plan_tiles(
         "tile": {"cells": tile.cells(grid)},
         "inputs": {name: fingerprint(path) for name, path in paths.items()} | dict(digests or {}),
     }
-    folder = begin(out, recipe)
+    folder = begin_run(out, recipe)
     try:
         files = {
             name: copy_with_bounds(name, path, empty.crs, folder, tell)
@@ -421,7 +425,7 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
             f"at least {reach / MOST_TILES_IN_RANGE:g} m."
         )
     objects_in: Counter[int] = Counter()
-    for bounds in each_bounds(path):
+    for bounds in bounds_by_group(path):
         widened = bounds + np.array([-reach, -reach, reach, reach])
         # Objects with the same box of tiles are counted together, then added to each of its tiles.
         corners = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
@@ -502,7 +506,7 @@ def save_tile(plan: TilePlan, tile: Tile, database: SignatureDatabase | None) ->
     return describe_part(tile, database, path)
 
 
-def begin(out: str | Path, recipe: dict[str, Any]) -> Path:
+def begin_run(out: str | Path, recipe: dict[str, Any]) -> Path:
     """Begin a run or resume an unfinished one, and return its folder: `out` with ``.partial``.
 
     Raise InputError if `out` may not be replaced, or the folder has tiles of an unfinished run with
@@ -557,7 +561,7 @@ def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, PartFile |
     return parts
 
 
-def publish(folder: Path, parts: Sequence[PartFile]) -> Manifest:
+def publish_tiles(folder: Path, parts: Sequence[PartFile]) -> Manifest:
     """Move a finished database to its final folder and replace it; parts are ordered by tile."""
     manifest = Manifest(read_json(folder / RECIPE), tuple(parts))
     _require_replaceable(folder.with_name(folder.name.removesuffix(PARTIAL)))

@@ -12,13 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis import __version__
-from semsig_gis.core.checks import MOST_METRES
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import ROW_SPAN, SOURCE, cell_ids, cells_near, split_ids
-from semsig_gis.core.parallel import check_workers
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.text import percent
+from semsig_gis.core import (
+    MOST_METRES,
+    ROW_SPAN,
+    SOURCE,
+    DatabaseError,
+    Displayed,
+    EmptyResultError,
+    InputError,
+    PackedIndex,
+    cell_ids,
+    cells_near,
+    check_workers,
+    percent,
+    split_ids,
+)
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import ENTRY_ARRAYS, join_databases, require_same
@@ -38,13 +46,18 @@ from semsig_gis.database.tiles import (
     TileSpec,
     build_parts,
     plan_tiles,
-    publish,
+    publish_tiles,
     save_tile,
     tile_cells,
 )
-from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import licenses_of, open_objects, save_objects
-from semsig_gis.storage.runs import read_json, write_json
+from semsig_gis.objects import (
+    compare_objects,
+    licenses_of,
+    open_objects,
+    replace_layers,
+    save_objects,
+)
+from semsig_gis.storage import read_json, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -55,8 +68,7 @@ if TYPE_CHECKING:
     from semsig_gis.database.file import PartFile
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.database.tiles import Tile, TilePlan
-    from semsig_gis.objects.changes import ClassChange
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import ClassChange, StreetObjects
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
@@ -396,7 +408,7 @@ def update_tiles(
         )
         drift = _total_drift(plan, old_tiles, stale)
         old_tiles.stale.unlink()
-        publish(plan.folder, parts)
+        publish_tiles(plan.folder, parts)
     return change.report(
         kept_layers,
         notes,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import lazy_loader
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import CrsError, InputError, nearest_name
+from semsig_gis.core import CrsError, InputError, nearest_name, require_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.geometry import GridSpec
+    from semsig_gis.core import GridSpec
     from semsig_gis.database.occlusion import Footprints
 else:
     shapely = lazy_loader.load("shapely")
@@ -147,7 +146,7 @@ def select_elements(
     """Return the buildings or streets of a table, which may have OpenStreetMap elements."""
     if table is None:
         return None
-    from semsig_gis.objects.surroundings import elements_in  # noqa: PLC0415 - it takes 1 s to load
+    from semsig_gis.objects import elements_in  # noqa: PLC0415 - it takes 1 s to load
 
     return elements_in(table, role)
 

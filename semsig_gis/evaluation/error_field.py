@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.text import percent
+from semsig_gis.core import Displayed, GridSpec, InputError, percent
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
 
 RADII = (250.0, 500.0, 1000.0, 2500.0, 5000.0)  # metres, of which the data decide

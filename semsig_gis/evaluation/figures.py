@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.statistics import quantile_ranks, wilson_interval
-from semsig_gis.core.symbology import ERROR_BREAKS
-from semsig_gis.localization.distance.ties import NEAR_PLACES, expected_recall
-from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
+from semsig_gis.core import ERROR_BREAKS, InputError, quantile_ranks, wilson_interval
+from semsig_gis.localization import DEFAULT_RULE, NEAR_PLACES, expected_recall
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -11,23 +11,26 @@ import geopandas as gpd
 import pandas as pd
 import pyarrow as pa
 
-from semsig_gis.core.errors import DatabaseError, InputError
+from semsig_gis.core import DatabaseError, InputError
 from semsig_gis.evaluation.queries.distortion_text import chain_text, parse_chain
 from semsig_gis.evaluation.queries.distortions import Detector
 from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
-from semsig_gis.localization.locator import parse_method
-from semsig_gis.localization.noise.model import noise_from_dict
-from semsig_gis.storage.geoparquet import geo_metadata, read_geoparquet, write_geoparquet
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import write_whole
+from semsig_gis.localization import noise_from_dict, parse_method
+from semsig_gis.storage import (
+    geo_metadata,
+    parse_json,
+    read_geoparquet,
+    read_whole,
+    write_geoparquet,
+    write_whole,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
-    from semsig_gis.localization.locator import AnyMethod
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization import AnyMethod, Noise
 
 KIND = "localization evaluation"
 QUERIES, SUMMARY, TIMING = "queries.parquet", "evaluation.json", "timing.json"

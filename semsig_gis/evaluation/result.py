@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.presentation import map_with, plot_with
-from semsig_gis.core.text import percent
-from semsig_gis.database.database import rows_of_result
+from semsig_gis.core import Displayed, InputError, map_with, percent, plot_with
+from semsig_gis.database import rows_of_result
 from semsig_gis.evaluation.figures import (
     AMBIGUITIES,
     ELSEWHERE,
@@ -33,7 +30,7 @@ from semsig_gis.evaluation.figures import (
     range_labels,
 )
 from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS, expected_recall
+from semsig_gis.localization import NEAR_PLACES, THRESHOLDS, expected_recall
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,10 +39,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Axes, MapFrame
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import QuerySpec
-    from semsig_gis.localization.locator import AnyMethod
+    from semsig_gis.localization import AnyMethod
 
 QUERY_COLUMNS = (
     *("seed", "number", "cell", "cell_id", "types", "length", "type_group", "angle_group"),

@@ -17,39 +17,48 @@ import numpy as np
 import pandas as pd
 
 from semsig_gis import __version__
-from semsig_gis.core.defaults import DEFAULT_METHOD
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import angular_distance, cell_ids, wrap_degrees
-from semsig_gis.core.resources import announce
+from semsig_gis.core import (
+    DEFAULT_METHOD,
+    InputError,
+    angular_distance,
+    announce,
+    cell_ids,
+    wrap_degrees,
+)
 from semsig_gis.evaluation.queries.distortion_text import QueryDistortion, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count, draw_queries
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.ties import (
+from semsig_gis.localization import (
     NEAR_METRES,
     NEAR_PLACES,
     THRESHOLDS,
+    LikelihoodMethod,
+    Method,
     best_cells,
     chance_within,
     expected_best,
+    make_locator,
+    parse_method,
     rank_range,
     top_candidates,
 )
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import make_locator, parse_method
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import Query
-    from semsig_gis.localization.answers import Answer, Ranking
-    from semsig_gis.localization.distance.memo import DistanceMemo
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.locator import AnyMethod, Locator
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.localization import (
+        Answer,
+        AnyMethod,
+        DistanceMemo,
+        LikelihoodIndex,
+        Locator,
+        Ranking,
+    )
+    from semsig_gis.observation import Photo
 
 # Seconds that a query, and a cell of a query, takes: only for telling how long the work is.
 QUERY_S, PAIR_S = 5e-3, 1e-7

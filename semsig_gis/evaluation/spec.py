@@ -7,22 +7,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import CatalogError, InputError
+from semsig_gis.core import CatalogError, InputError
 from semsig_gis.evaluation.file import used_noises
 from semsig_gis.evaluation.queries.distortion_text import chain_text, parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec
-from semsig_gis.localization.locator import parse_method
-from semsig_gis.localization.noise.model import NOISES, noise_from_dict, open_noise
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import check_keys, parse_toml, toml_text
+from semsig_gis.localization import NOISES, noise_from_dict, open_noise, parse_method
+from semsig_gis.storage import check_keys, parse_toml, read_text, toml_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
     from semsig_gis.evaluation.queries.draw import SeenFrom
-    from semsig_gis.localization.locator import AnyMethod
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization import AnyMethod, Noise
 
 KEYS = {
     "database": str,

@@ -11,12 +11,10 @@ import pyarrow as pa
 import pyogrio
 import shapely
 
-from semsig_gis.core.geometry import GEOMETRY
-from semsig_gis.core.symbology import ANSWERS
-from semsig_gis.core.text import one_line
+from semsig_gis.core import ANSWERS, GEOMETRY, one_line
 from semsig_gis.exports.files import geojson_options, whole_by_gdal
 from semsig_gis.exports.styles import RANKS
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterable, Mapping, Sequence

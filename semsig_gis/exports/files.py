@@ -20,17 +20,16 @@ import shapely
 from pyarrow import csv
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import GEOMETRY
+from semsig_gis.core import GEOMETRY, InputError
 from semsig_gis.exports.layers import GEOMETRY_TYPES
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.storage import (
     BBOX,
     COVERING,
     bounds_column,
     geo_metadata,
+    whole_file,
     write_geoparquet_blocks,
 )
-from semsig_gis.storage.whole import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping

@@ -19,36 +19,38 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
+    BEARING_UNITS,
     CLASS_CODE,
     COUNT,
+    DISTANCE_UNITS,
     GEOMETRY,
     MERGED,
     SOURCE,
     SOURCE_ID,
+    DatabaseError,
+    Displayed,
+    InputError,
+    Taxonomy,
     crs_label,
 )
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.file import database_of
+from semsig_gis.database import database_of
+from semsig_gis.evaluation import identifiability_of
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.exports.project import layer_style, project_archive, shown_layers
 from semsig_gis.exports.styles import Style
-from semsig_gis.objects.table import objects_of
-from semsig_gis.storage.text import parse_json
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.objects import objects_of
+from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import DTypeLike
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Identifiability
     from semsig_gis.exports.layers import Layer
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 CELLS, OBJECTS = "cells", "objects"
@@ -202,10 +204,6 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         database = database_of(signatures, specs, crs, path=path)
         identifiability = None
         if specs["identifiability"]:
-            from semsig_gis.evaluation.identifiability.result import (  # noqa: PLC0415 - where it is used
-                identifiability_of,
-            )
-
             try:
                 identifiability = identifiability_of(
                     database, cells.select(more), specs["identifiability"], path

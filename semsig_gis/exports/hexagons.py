@@ -10,19 +10,18 @@ import numpy as np
 import shapely
 from pyproj import Transformer
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.file import database_specs
+from semsig_gis.core import InputError
+from semsig_gis.database import database_specs
 from semsig_gis.exports.layers import table_layer
 from semsig_gis.exports.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.exports.layers import Layer
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 FINEST = 15

@@ -14,18 +14,17 @@ import pyarrow as pa
 import shapely
 
 from semsig_gis import __version__
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
     CLASS_CODE,
     CLASS_NAME,
     COUNT,
     GEOMETRY,
     MERGED,
+    OUTCOMES,
     SOURCE,
     SOURCE_ID,
 )
-from semsig_gis.core.symbology import OUTCOMES
-from semsig_gis.database.database import CellTable
-from semsig_gis.database.file import database_specs
+from semsig_gis.database import CellTable, database_specs
 from semsig_gis.exports.styles import (
     AMBIGUITY,
     IDENTIFIABILITY,
@@ -35,21 +34,19 @@ from semsig_gis.exports.styles import (
     by_outcome,
     by_rank,
 )
-from semsig_gis.objects.table import objects_specs
+from semsig_gis.objects import objects_specs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from pyproj import CRS
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import CellGeometry, SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import CellGeometry, SignatureDatabase
+    from semsig_gis.evaluation import Evaluation, Identifiability
     from semsig_gis.exports.styles import Style
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.localization.regions import SearchRegions
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.localization import Answer, SearchRegions
+    from semsig_gis.objects import StreetObjects
 
 
 ROWS_A_BLOCK = 1 << 16

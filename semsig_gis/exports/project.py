@@ -20,9 +20,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from semsig_gis import __version__
-from semsig_gis.core.geometry import GEOMETRY
-from semsig_gis.core.symbology import class_signs
-from semsig_gis.core.text import one_line
+from semsig_gis.core import GEOMETRY, class_signs, one_line
 from semsig_gis.exports.styles import SYMBOLS, shown_line
 
 if TYPE_CHECKING:

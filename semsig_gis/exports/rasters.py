@@ -10,20 +10,17 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.symbology import CELL_CHANCES, ERROR_BREAKS, FAILURES
-from semsig_gis.core.text import percent
+from semsig_gis.core import CELL_CHANCES, ERROR_BREAKS, FAILURES, InputError, percent
 from semsig_gis.exports.styles import AMBIGUITY, IDENTIFIABILITY
-from semsig_gis.storage.whole import write_whole
+from semsig_gis.storage import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.error_field import ErrorField
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import ErrorField, Evaluation
     from semsig_gis.exports.styles import Classes
 
 
@@ -116,7 +113,7 @@ def export_geotiff(
         raise InputError(
             f"{numbers.size} numbers were given for {len(database)} cells; give one for each."
         )
-    from semsig_gis.storage.raster import write_cells  # noqa: PLC0415 - an extra
+    from semsig_gis.storage import write_cells  # noqa: PLC0415 - an extra
 
     write_cells(
         path,
@@ -149,7 +146,7 @@ def export_field(field: ErrorField, database: SignatureDatabase, path: str | Pat
     columns, rows = np.nonzero(np.isfinite(field.failed.T))
     unit = {"failed": "", "error": "m", "queries": "queries"}
     bands = zip(unit, (field.failed, field.errors, field.speaking), strict=True)
-    from semsig_gis.storage.raster import write_cells  # noqa: PLC0415 - an extra
+    from semsig_gis.storage import write_cells  # noqa: PLC0415 - an extra
 
     write_cells(
         path,

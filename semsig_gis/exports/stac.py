@@ -14,15 +14,15 @@ from pystac.extensions.file import FileExtension
 from pystac.extensions.projection import ProjectionExtension
 from shapely.geometry import box, mapping
 
-from semsig_gis.core.geometry import to_degrees
-from semsig_gis.database.file import database_specs, digest
+from semsig_gis.core import to_degrees
+from semsig_gis.database import database_specs, digest
 from semsig_gis.exports.layers import cells_layer
-from semsig_gis.storage.whole import write_whole
+from semsig_gis.storage import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.database.city import City
+    from semsig_gis.database import City
 
 
 PARQUET = "application/vnd.apache.parquet"

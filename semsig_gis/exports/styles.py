@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree as ET
 
-from semsig_gis.core.symbology import (
+from semsig_gis.core import (
     ANSWERS,
     FOUND_RAMP,
     GROUP_COLOURS,
@@ -14,14 +14,13 @@ from semsig_gis.core.symbology import (
     RANK_RAMP,
     class_signs,
     group_labels,
+    one_line,
 )
-from semsig_gis.core.text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from semsig_gis.core.symbology import ClassSign, Mark
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import ClassSign, Mark, Taxonomy
 
 
 # What is said of the numbers between two, and their colour.

@@ -16,18 +16,18 @@ import shapely
 from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import Writer
 
-from semsig_gis.core.geometry import GEOMETRY, to_degrees
+from semsig_gis.core import GEOMETRY, to_degrees
 from semsig_gis.exports.files import feature_stream, whole_by_gdal
 from semsig_gis.exports.hexagons import summary
 from semsig_gis.exports.layers import cells_layer, table_layer
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.storage import whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Identifiability
     from semsig_gis.exports.layers import Layer
 
 

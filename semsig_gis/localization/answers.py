@@ -1,4 +1,4 @@
-"""What answers queries, and what it answers: the best cells listed, or all cells ranked."""
+"""Answers to queries: a list of the best cells, or a ranking of all cells."""
 
 from __future__ import annotations
 
@@ -11,12 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import LICENSES, to_degrees
-from semsig_gis.core.presentation import plot_with
-from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.view import View
+from semsig_gis.core import LICENSES, Displayed, InputError, plot_with, to_degrees
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,26 +22,24 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.display import Axes
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.observation.north import North
+    from semsig_gis.core import Axes, Signature, Taxonomy
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.observation import North
 
 
 REGION_SHARE = 0.9
-"""Of the chance, that the region of an answer holds."""
+"""Share of the probability in the region of an answer."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(Displayed):
-    """The best cells for a query, whatever ranked them.
+    """The best cells for a query, by any method.
 
-    `columns` tell of the cells by name, best first: the rank, ``cell`` (row in the database),
-    ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and
-    what the method tells of them; `candidates` is the table of them. `cells` counts the cells that
-    were searched, and `notes` are sentences on what of the query could not be used as it was given.
-    The bearings of `query` count from `north`.
+    `columns` describe the cells, best first: the rank, ``cell`` (row in the database), ``cell_id``,
+    ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and columns of
+    the method; `candidates` is a table of them. `cells` is the number of cells searched. `notes`
+    are sentences on parts of the query that were not used or look wrong. The bearings of `query`
+    are measured from `north`.
     """
 
     query: Signature
@@ -60,8 +54,8 @@ class Answer(Displayed):
 
     @cached_property
     def candidates(self) -> pd.DataFrame:
-        """The cells of `columns`, a row each."""
-        import pandas as pd  # noqa: PLC0415 - it loads slowly
+        """The cells of `columns`, one row per cell."""
+        import pandas as pd  # noqa: PLC0415 - it takes 0.25 s
 
         return pd.DataFrame(dict(self.columns))
 
@@ -72,24 +66,24 @@ class Answer(Displayed):
 
     @property
     def chances(self) -> NDArray[np.float64] | None:
-        """The chance of every cell; None where the method tells none."""
+        """The probability of every cell, shape (n,); None if the method gives no probabilities."""
         return None
 
     @abstractmethod
     def region_cells(self, database: SignatureDatabase, share: float) -> NDArray[np.int64]:
-        """Return the rows of the cells where to look, best first, in the database searched.
+        """Return the rows of the cells to search in the field, best first.
 
-        They hold a share of the chance, or are the candidates where there are no chances. Raises
+        They have a share of the probability; without probabilities, they are the candidates. Raises
         InputError if the answer is from another database.
         """
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return what was found as plain values that JSON can hold."""
+        """Return the answer as plain values for JSON."""
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
         """Return the candidates with their viewpoints as points in the CRS of the database."""
-        import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+        import geopandas as gpd  # noqa: PLC0415 - it takes 0.3 s
 
         points = gpd.points_from_xy(self.candidates["x"], self.candidates["y"])
         frame = gpd.GeoDataFrame(self.candidates.copy(), geometry=points, crs=self.crs)
@@ -97,11 +91,11 @@ class Answer(Displayed):
         return frame
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
-        """Draw where the query may have been seen (see `plot_answer`)."""
+        """Draw the possible places of the query (see `plot_answer`)."""
         return plot_with("plot_answer", self, ax=ax, legend=legend)
 
     def _candidate_records(self) -> list[dict[str, Any]]:
-        """Return the candidates as plain values, with ``lon`` and ``lat`` to a centimetre."""
+        """Return the candidates as plain values, with ``lon`` and ``lat`` rounded to 1 cm."""
         lon, lat = np.round(to_degrees(self.crs).transform(self.columns["x"], self.columns["y"]), 7)
         columns = {**self.columns, "lon": lon, "lat": lat}
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
@@ -111,7 +105,7 @@ class Answer(Displayed):
 def candidate_columns(
     database: SignatureDatabase, cells: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
-    """Return what `Answer.columns` tell of some cells, whatever ranked them."""
+    """Return the part of `Answer.columns` that all methods have."""
     listed = database.select(cells)
     symbols, ends = database.taxonomy.decode(listed.codes), listed.offsets.tolist()
     return {
@@ -126,14 +120,14 @@ def candidate_columns(
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class Ranking:
-    """How all cells rank for a query.
+    """The scores of all cells for a query.
 
-    `scores` (n,) has one value a cell, lower is better: distances, or negative log-likelihoods,
-    with the cells of the answer before all others; `best_score` is that of the answer. `place`
-    (metres) and `heading` (degrees to add to the bearings of the query) are None where they were
-    not looked for. `chance` is the method's own probability that the answer is within 50 m,
-    `chances` (n,) that of every cell and `region` the rows that hold 90 % of it: NaN and None where
-    it tells none. `seconds` is how long the answer took.
+    `scores` (n,) are distances or negative log-likelihoods, lower is better, lowest for the cells
+    of the answer; `best_score` is the score of the answer. `place` (metres) and `heading` (degrees
+    to add to the bearings of the query) are None if they were not estimated. `chance` is the
+    probability, by the method, that the answer is within 50 m, `chances` (n,) that of every cell
+    and `region` the rows with 90 % of it: NaN and None without probabilities. `seconds` is the
+    computing time.
     """
 
     scores: NDArray[np.float32]
@@ -147,16 +141,16 @@ class Ranking:
 
 
 def check_top(top: int) -> None:
-    """Refuse a list of no candidates."""
+    """Raise InputError if the number of candidates is below 1."""
     if top < 1:
         raise InputError(f"{top} candidates were asked for; give a whole number from 1.")
 
 
 def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tuple[str, ...]:
-    """Return what to say of a query to a database that sees the classes `present` alone."""
+    """Return notes on a query; `present` are the class codes that occur in the database."""
     if not len(query):
         return ("nothing was seen, which says little about the place.",)
-    notes = _outside_notes(query, taxonomy) if isinstance(query, View) else ()
+    notes = _sector_notes(query, taxonomy) if isinstance(query, View) else ()
     codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
     if not codes:
         return notes
@@ -166,14 +160,14 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     return (note, *notes)
 
 
-def _outside_notes(view: View, taxonomy: Taxonomy) -> tuple[str, ...]:
-    """Return what to say of objects where their photo did not look."""
+def _sector_notes(view: View, taxonomy: Taxonomy) -> tuple[str, ...]:
+    """Return a note on objects outside the sectors of their photo."""
     outside = view.outside().tolist()
     if not outside or view.bearings is None:
         return ()
     symbols = "?" * len(view) if view.codes is None else taxonomy.decode(view.codes)
     listed = ", ".join(f"{symbols[row]} at {view.bearings[row]:.1f}°" for row in outside)
-    verb = "stands" if len(outside) == 1 else "stand"
+    verb = "is" if len(outside) == 1 else "are"
     note = (
         f"{listed} {verb} outside the sectors that were looked at; the heading, the field of view "
         "or the bearing may be wrong."

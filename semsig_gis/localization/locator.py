@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, Unpack,
 
 import numpy as np
 
-from semsig_gis.core.defaults import DEFAULT_METHOD, LIKELIHOOD
-from semsig_gis.database.city import City
-from semsig_gis.database.database import join_databases
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD
+from semsig_gis.database import City, PartitionedDatabase, join_databases
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import NOISES, cell_noise
-from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.answers import Ranking
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.method import LikelihoodMethod
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.requirement import Requirement
-    from semsig_gis.observation.north import North
+    from semsig_gis.observation import North
 
     AnyMethod: TypeAlias = Method | LikelihoodMethod
     Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
@@ -44,22 +42,22 @@ _Answer_co = TypeVar("_Answer_co", bound=Answer, covariant=True)
 
 
 class Locator(Protocol[_Answer_co]):
-    """A method with the cells that it searches and all else that it needs."""
+    """A method with the cells that it searches, ready to answer queries."""
 
     def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
-        """Answer a query, with its own number of candidates or another one.
+        """Return the answer to a query; `top` replaces the number of candidates of the locator.
 
-        Objects of a class that no cell sees count as false detections, and the answer says so.
+        Objects of a class that no cell sees count as false detections, with a note in the answer.
         Raises InputError if the query lacks a part that the method needs.
         """
 
     def rankings(
         self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
     ) -> Iterator[Ranking]:
-        """Rank all cells for each query, in order; each query has at least one object.
+        """Yield the ranking of all cells for each query; each query has at least one object.
 
-        `memo` keeps distances of these queries that other methods have needed; the time it took to
-        measure them counts for each method.
+        `memo` shares the distances of these queries between methods; the time to compute them
+        counts for each method.
         """
 
 
@@ -69,7 +67,7 @@ def parse_method(text: str, *, noises: Mapping[str, Noise] = NOISES) -> AnyMetho
     Parameters
     ----------
     text : str
-        What `Method.parse` or `LikelihoodMethod.parse` reads.
+        Text for `Method.parse` or `LikelihoodMethod.parse`.
     noises : mapping of str to Noise, optional
         The noise models by name.
 
@@ -134,10 +132,10 @@ def make_locator(
 ) -> DistanceLocator | LikelihoodLocator:
     """Return the locator of a method.
 
-    `requirement` limits the cells that are candidates. `index` is the one of `method_index`, if it
-    exists already. `options` are those of `locate`: a distance uses ``top`` and ``north``, and by
-    likelihood the ``store`` is that of the city, and ``refined`` follows the method and the store,
-    where they are not given.
+    `requirement` limits the candidate cells. `index` is the result of `method_index`, if it exists
+    already. `options` are those of `locate`. A distance uses only ``top`` and ``north``. For the
+    likelihood method, the default ``store`` is that of the city, and ``refined`` depends by default
+    on the method and the store.
     """
     if method.noise is None:
         from semsig_gis.localization.distance.search import DistanceLocator  # noqa: PLC0415 - above
@@ -159,15 +157,15 @@ def make_locator(
     elif isinstance(database, PartitionedDatabase):
         database = join_databases(list(database.parts()))
     if requirement is not None:
-        # GeoPandas, which the module of priors imports, takes a second.
+        # The module imports GeoPandas, which takes 0.3 s.
         from semsig_gis.localization.likelihood.priors import weight_prior  # noqa: PLC0415
 
-        met = requirement.met(database.type_sequences)
-        prior = weight_prior(database, met.astype(np.float64))
+        mask = requirement.met(database.type_sequences)
+        prior = weight_prior(database, mask.astype(np.float64))
         other = options.get("log_prior")
         options["log_prior"] = prior if other is None else other + prior
     if "refined" not in options:
-        # None: where the query has bearings.
+        # None: refined if the query has bearings.
         between = options.get("store") is not None and not method.on_grid
         options["refined"] = method.refined or (None if between else False)
     options.setdefault("north_sigma", method.north_sigma)
@@ -175,7 +173,7 @@ def make_locator(
 
 
 def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
-    """Return the index of a database for queries from where the method expects them."""
+    """Return the index of a database for a method: from cell centres or from anywhere in a cell."""
     from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
 
     noise = method.noise if method.on_grid else cell_noise(method.noise, database.grid.step)
@@ -221,42 +219,42 @@ def localize(
     top: int = 10,
     north: North = GRID_NORTH,
 ) -> Location | Localization:
-    """Find where a query was seen from, as `semsig localize` does.
+    """Return the places from which a query may have been seen, as `semsig localize` does.
 
     Parameters
     ----------
     database : SignatureDatabase, PartitionedDatabase or City
-        The cells. By a distance, only one part of a database in parts is in memory at a time. By
-        likelihood, a city with a store of street objects is also searched between the centres of
-        its cells.
+        The cells. A distance reads a partitioned database one part at a time. The likelihood
+        method also searches between the centres of cells if a city has a store of street objects.
     query : Signature
-        What a person or a detector saw, perhaps nothing; types or bearings may be unknown. Objects
-        of a class that no cell sees are false detections, and the answer says so.
+        The objects that a person or a detector saw, possibly none; types or bearings may be
+        unknown. Objects of a class that no cell sees are false detections, with a note in the
+        answer.
     method : str, Method or LikelihoodMethod, default "likelihood"
         How the cells are ranked, or its text (see `parse_method`), such as ``"edit+edit:5%"``. A
-        fusion uses the part that the query has.
+        fusion uses one part if the query has only this one.
     requirement : Requirement, optional
-        What a cell must see to be a candidate; nothing by default.
+        The objects that a candidate cell must see; none by default.
     top : int, default 10
-        How many cells to list, at least 1.
+        Number of cells to list, at least 1.
     north : North, optional
-        What the bearings of the query count from; grid north by default.
+        The north from which the bearings of the query are measured; grid north by default.
 
     Returns
     -------
     Location or Localization
-        The answer of the likelihood, with chances (see `locate` for what else it may know), or
-        that of a distance, with its ties.
+        The answer by likelihood, with probabilities (`locate` has more options), or by distance,
+        with ties.
 
     Raises
     ------
     InputError
-        If the query has no part that the method compares, the method needs street objects that are
-        not there, no cell meets the requirement, or `top` is below 1.
+        If the query has no part that the method compares, the method needs street objects but the
+        city has none, no cell meets the requirement, or `top` is below 1.
     UnknownNameError
-        If the text of the method has a name that is not known.
+        If the text of the method has an unknown name.
     EmptyResultError
-        The same, if no cell meets the requirement of a query by distance.
+        If no cell meets the requirement and the method is a distance.
 
     Examples
     --------
@@ -269,6 +267,7 @@ def localize(
     >>> answer.used, answer.candidates["distance"][0]
     ('types+angles', np.float64(0.0))
     """
-    used = parse_method(method) if isinstance(method, str) else method
-    locator = make_locator(database, used, requirement=requirement, top=top, north=north)
+    if isinstance(method, str):
+        method = parse_method(method)
+    locator = make_locator(database, method, requirement=requirement, top=top, north=north)
     return locator.locate(query)

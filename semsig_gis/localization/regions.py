@@ -1,4 +1,4 @@
-"""What of a city must be searched after a query: polygons, by rank, for whoever looks closer."""
+"""Regions of a city to search in the field after a query, as ranked polygons."""
 
 from __future__ import annotations
 
@@ -10,19 +10,17 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.text import percent
+from semsig_gis.core import Displayed, InputError, percent
 from semsig_gis.localization.answers import REGION_SHARE
 from semsig_gis.localization.likelihood.posterior import Posterior
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.answers import Answer
 
-CHANCES = ["chance", "searched_chance"]  # which the likelihood method alone tells
+CHANCES = ["chance", "searched_chance"]  # columns of the likelihood method only
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,11 +30,11 @@ class SearchRegions(Displayed):
     Parameters
     ----------
     table : GeoDataFrame
-        One row a region, best first, in the CRS of the database: ``rank`` (from 1), ``chance``
-        (of the place being in it; of the likelihood method only), ``cells``, ``km2``,
-        ``best_cell_id``, ``best_x`` and ``best_y`` (its best cell, and the viewpoint of that);
-        ``searched_chance``, ``searched_km2`` and ``searched_percent`` (of the city) with all
-        regions before it; ``geometry`` (polygon of whole cells that share sides).
+        One row per region, best first, in the CRS of the database: ``rank`` (from 1), ``chance``
+        (probability that the place is in it; likelihood method only), ``cells``, ``km2``,
+        ``best_cell_id``, ``best_x`` and ``best_y`` (its best cell and the viewpoint);
+        ``searched_chance``, ``searched_km2`` and ``searched_percent`` (of the city), cumulative
+        over the regions up to this one; ``geometry`` (polygon of cells that share sides).
 
     Examples
     --------
@@ -50,13 +48,13 @@ class SearchRegions(Displayed):
     table: gpd.GeoDataFrame
 
     def _facts(self) -> dict[str, object]:
-        told = self.to_dict()
-        chance = {"chance": percent(told["chance"])} if "chance" in told else {}
-        area = f"{told['km2']:.3f} km² ({told['percent']:.2g} %)"
-        return {"regions": told["regions"], "cells": told["cells"], "area": area, **chance}
+        total = self.to_dict()
+        chance = {"chance": percent(total["chance"])} if "chance" in total else {}
+        area = f"{total['km2']:.3f} km² ({total['percent']:.2g} %)"
+        return {"regions": total["regions"], "cells": total["cells"], "area": area, **chance}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is to be searched in all; ``percent`` is of the area of all cells."""
+        """Return the totals of all regions; ``percent`` is of the area of all cells."""
         last = self.table.iloc[-1]
         summary = {
             "regions": len(self.table),
@@ -81,20 +79,20 @@ def search_regions(
     Parameters
     ----------
     answer : Location or Localization
-        The answer to the query. Of the likelihood method, the regions hold the fewest cells that
-        have a share of the chance; of other methods, the candidates.
+        The answer to the query. With the likelihood method, the regions contain the smallest set of
+        cells with the `share` of the probability; with a distance, the candidates.
     database : SignatureDatabase
         The database that was searched.
     share : float, default 0.9
-        Of the chance, above 0 and at most 1.
+        Share of the probability, above 0 and at most 1.
     within : float, default 0
-        Cells whose viewpoint is at most so many metres from one of those belong to the regions
-        too, for places between the viewpoints and for what is not known of the city.
+        Margin in metres: other cells are added if their viewpoint is this close to one of these
+        cells, for places between viewpoints and for errors of the map.
 
     Returns
     -------
     SearchRegions
-        Merged polygons, by falling chance or by their best candidate.
+        Merged polygons, by descending probability, or by the rank of their best candidate.
 
     Raises
     ------
@@ -116,28 +114,31 @@ def search_regions(
         raise InputError(f"a margin of {within} m was given for regions; give metres, 0 or more.")
     chances, cells = answer.chances, answer.region_cells(database, share)
     if within > 0:
-        cells = np.concatenate([cells, _around(database, cells, within)])
-    shapes = shapely.get_parts(shapely.union_all(_runs(database, np.sort(cells))))
+        marks = np.zeros(len(database))
+        marks[cells] = 1.0
+        near = Posterior(database=database, chances=marks).mass_within(within) > 0
+        cells = np.concatenate([cells, np.flatnonzero(near & (marks == 0))])
+    shapes = shapely.get_parts(shapely.union_all(_column_runs(database, np.sort(cells))))
     points = np.asarray(shapely.points(database.xy[cells]))
     shape, inside = shapely.STRtree(points).query(shapes, predicate="contains")
-    # In the order of the cells, so that the first of each region is its best.
+    # Sorted by cell rank: the first cell of each region is its best.
     region = shape[np.argsort(inside)]
     first = np.unique(region, return_index=True)[1]
     counts = np.bincount(region)
-    held = np.bincount(region, None if chances is None else chances[cells])
-    order = np.argsort(first if chances is None else -held, kind="stable")
+    mass = np.bincount(region, None if chances is None else chances[cells])
+    order = np.argsort(first if chances is None else -mass, kind="stable")
     best = cells[first[order]]
     km2 = counts[order] * database.grid.step**2 / 1e6
     table = gpd.GeoDataFrame(
         {
             "rank": np.arange(1, len(order) + 1),
-            "chance": held[order],
+            "chance": mass[order],
             "cells": counts[order],
             "km2": km2,
             "best_cell_id": database.cell_ids[best],
             "best_x": database.xy[best, 0],
             "best_y": database.xy[best, 1],
-            "searched_chance": np.minimum(np.cumsum(held[order]), 1.0),
+            "searched_chance": np.minimum(np.cumsum(mass[order]), 1.0),
             "searched_km2": np.cumsum(km2),
             "searched_percent": 100.0 * np.cumsum(counts[order]) / len(database),
         },
@@ -147,21 +148,11 @@ def search_regions(
     return SearchRegions(table if chances is not None else table.drop(columns=CHANCES))
 
 
-def _runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.object_]:
-    """Return cells as rectangles, one for all that follow each other in a column."""
+def _column_runs(database: SignatureDatabase, cells: NDArray[np.int64]) -> NDArray[np.object_]:
+    """Return cells as rectangles, one for each run of adjacent cells in a grid column."""
     step, (west, south) = database.grid.step, database.grid.origin
     breaks = np.diff(database.cell_ids[cells]) != 1
     first, last = cells[np.append(True, breaks)], cells[np.append(breaks, True)]
     columns, bottom, top = database.columns[first], database.rows[first], database.rows[last]
     left, right = west + columns * step, west + (columns + 1) * step
     return np.asarray(shapely.box(left, south + bottom * step, right, south + (top + 1) * step))
-
-
-def _around(
-    database: SignatureDatabase, cells: NDArray[np.int64], within: float
-) -> NDArray[np.int64]:
-    """Return the other cells that are near to some."""
-    marks = np.zeros(len(database))
-    marks[cells] = 1.0
-    near = Posterior(database=database, chances=marks).mass_within(within) > 0
-    return np.flatnonzero(near & (marks == 0))

@@ -1,4 +1,4 @@
-"""What to look for next: the question whose answer is expected to help most."""
+"""Suggest objects to look for next: the questions with the largest expected information gain."""
 
 from __future__ import annotations
 
@@ -16,32 +16,31 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import ObjectClass
+    from semsig_gis.core import ObjectClass, Signature
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.locate import LikelihoodLocator, Location
 
 
 LOOKED_FOR = 0.95
-"""Least chance that somebody who is asked for an object sees it."""
+"""Minimum probability that a person who looks for an object detects it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassQuestion:
-    """Whether an object of a class is seen, beside those that were.
+    """A question whether an object of a class is in sight, in addition to those of the query.
 
     Parameters
     ----------
     item : ObjectClass
         The class.
     metres : float
-        How far it is seen.
+        Visibility range of the class.
     more : bool
-        Whether one of it was seen already, so that another one is asked for.
+        Whether the query has an object of the class already: the question is about another one.
     chance : float
-        That the answer will be yes.
+        Probability that the answer is yes.
     gain : float
-        What the answer is expected to tell of the place, in bits; 0 to 1.
+        Expected information gain of the answer about the place, in bits; 0 to 1.
 
     Examples
     --------
@@ -66,7 +65,7 @@ class ClassQuestion:
         return f"Is there {article} {title} within {self.metres:g} m?"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values that JSON can hold."""
+        """Return plain values for JSON."""
         return {
             "class": self.item.name,
             "title": self.item.title,
@@ -84,60 +83,60 @@ def next_questions(
     unplaced: Sequence[int] = (),
     absent: Sequence[int] = (),
 ) -> tuple[ClassQuestion, ...]:
-    """Return what to look for next, beginning with what is expected to help most.
+    """Return questions about objects to look for next, in descending order of expected gain.
 
     Parameters
     ----------
     index : LikelihoodIndex
-        What the answer was found with.
+        The index that gave the answer.
     location : Location
         The answer so far.
     unplaced : sequence of int, optional
-        Class codes of objects that were seen beside the query (see `unplaced_prior`).
+        Class codes of objects that were seen in an unknown direction (see `unplaced_prior`).
     absent : sequence of int, optional
-        Class codes of what was looked for already, and is not there.
+        Class codes of objects that were looked for already and are not in sight.
 
     Returns
     -------
     tuple of ClassQuestion
-        One for each class that some cell sees, and that was not looked for.
+        One for each class that some cell sees and that is not in `absent`.
 
     Notes
     -----
     The gain is the mutual information of the answer, yes or no, and the cell: the entropy of the
-    answer, less its mean entropy where the cell is known. That a detector misses what is there, and
-    sees what is not, makes it smaller.
+    answer, minus its mean entropy if the cell is known. Missed and false detections reduce it.
 
     Examples
     --------
     >>> from semsig_gis import build_index, locate, named_noise
     >>> index = build_index(demo_database, named_noise("generic"))
     >>> location = locate(index, demo_database.signature(0))
-    >>> gains = [one.gain for one in next_questions(index, location)]
+    >>> gains = [question.gain for question in next_questions(index, location)]
     >>> gains == sorted(gains, reverse=True), 0 <= gains[-1] <= gains[0] <= 1
     (True, True)
     """
     database, table = index.database, index.table
     types = database.type_sequences
+    # Cells with one type sequence give the same answer.
     weights = np.bincount(types.inverse, location.chances, minlength=len(types))
-    seen = _counts(location.query, unplaced)
-    found = []
+    counts = _class_counts(location.query, unplaced)
+    questions = []
     for code in table.codes.tolist():
         if code in absent:
             continue
-        yes = _yes(index, code, seen[code], least=LOOKED_FOR)
+        yes = _yes_chances(index, code, counts[code], least=LOOKED_FOR)
         chance = float(weights @ yes)
         item = database.taxonomy.by_code(code)
-        found.append(
+        questions.append(
             ClassQuestion(
                 item=item,
                 metres=database.spec.radius if item.range_m is None else item.range_m,
-                more=bool(seen[code]),
+                more=bool(counts[code]),
                 chance=chance,
-                gain=max(float(_bits(chance)) - float(weights @ _bits(yes)), 0.0),
+                gain=max(float(_entropy(chance)) - float(weights @ _entropy(yes)), 0.0),
             )
         )
-    return tuple(sorted(found, key=lambda one: -one.gain))
+    return tuple(sorted(questions, key=lambda question: -question.gain))
 
 
 def unplaced_prior(
@@ -147,24 +146,24 @@ def unplaced_prior(
     *,
     absent: Sequence[int] = (),
 ) -> NDArray[np.float64]:
-    """Return a prior from objects that were seen in an unknown direction, or not at all.
+    """Return a prior from objects that were seen in an unknown direction, or are not in sight.
 
     Parameters
     ----------
     index : LikelihoodIndex
         The cells and the noise model.
     query : Signature
-        What was seen, and where.
+        The objects with known directions.
     unplaced : sequence of int
-        Class codes of what was seen beside it.
+        Class codes of objects that were seen in addition, in an unknown direction.
     absent : sequence of int, optional
-        Class codes of which none was seen beside all these, though it was looked for.
+        Class codes that were looked for: no more objects of these classes are in sight.
 
     Returns
     -------
     ndarray of float64, shape (n,)
-        Log-prior by cell: each is a question of `next_questions` that was answered with yes, or
-        with no.
+        Log-prior by cell. Each object is a question of `next_questions` with the answer yes (in
+        sight) or no (absent).
 
     Examples
     --------
@@ -175,15 +174,15 @@ def unplaced_prior(
     True
     """
     database = index.database
-    seen = _counts(query)
+    counts = _class_counts(query)
     weights = np.ones(len(database.type_sequences))
     for code in unplaced:
-        if code in index.table.codes:  # a class that no cell sees is false wherever it was seen
-            weights *= _yes(index, code, seen[code])
-        seen[code] += 1
+        if code in index.table.codes:  # other classes are false detections at every cell
+            weights *= _yes_chances(index, code, counts[code])
+        counts[code] += 1
     for code in absent:
         if code in index.table.codes:
-            weights *= 1.0 - _yes(index, code, seen[code], least=LOOKED_FOR)
+            weights *= 1.0 - _yes_chances(index, code, counts[code], least=LOOKED_FOR)
     return weight_prior(database, weights[database.type_sequences.inverse])
 
 
@@ -194,47 +193,44 @@ def with_unplaced(
     *,
     absent: Sequence[int] = (),
 ) -> LikelihoodLocator:
-    """Return the locator with the prior of `unplaced_prior` for what else was seen or not."""
+    """Return the locator with the prior of `unplaced_prior` added to its own."""
     if not unplaced and not absent:
         return locator
     by_code = locator.index.database.taxonomy.by_code
-    told = {"seen": unplaced, "absent": absent}
     prior = unplaced_prior(locator.index, query, unplaced, absent=absent)
+    titles = {
+        name: [by_code(code).title.lower() for code in codes]
+        for name, codes in (("seen", unplaced), ("absent", absent))
+        if codes
+    }
     return replace(
         locator,
         log_prior=prior if locator.log_prior is None else locator.log_prior + prior,
-        known={
-            **locator.known,
-            **{
-                name: [by_code(code).title.lower() for code in codes]
-                for name, codes in told.items()
-                if codes
-            },
-        },
+        known={**locator.known, **titles},
     )
 
 
-def _counts(query: Signature, unplaced: Sequence[int] = ()) -> Counter[int]:
-    """Return how many objects of each class were seen."""
+def _class_counts(query: Signature, unplaced: Sequence[int] = ()) -> Counter[int]:
+    """Return the number of objects of each class in a query."""
     return Counter([*([] if query.codes is None else query.codes.tolist()), *unplaced])
 
 
-def _yes(
-    index: LikelihoodIndex, code: int, seen: int, *, least: float = 0.0
+def _yes_chances(
+    index: LikelihoodIndex, code: int, count: int, *, least: float = 0.0
 ) -> NDArray[np.float64]:
-    """Return the chance by type sequence that one more than so many of a class are seen.
+    """Return the probability, by type sequence, that more than `count` of a class are detected.
 
-    What is there is detected with a chance of at least so much.
+    `least` is the minimum probability to detect an object in sight.
     """
     table, types = index.table, index.database.type_sequences
     row = int(np.flatnonzero(table.codes == code)[0])
     false = 1.0 - math.exp(-float(table.clutter[row]))
     detected = np.maximum(table.detected[table.length_rows(types.lengths), row], least)
     detected = 1.0 - (1.0 - detected) * (1.0 - false)
-    return np.where(types.histogram[:, code] > seen, detected, false)
+    return np.where(types.histogram[:, code] > count, detected, false)
 
 
-def _bits(chance: Any) -> Any:  # noqa: ANN401 - a number, or an array of them
-    """Return the entropy of a question that is answered with yes by chance."""
-    sure = np.clip(chance, 1e-12, 1.0 - 1e-12)
-    return -(sure * np.log2(sure) + (1.0 - sure) * np.log2(1.0 - sure))
+def _entropy(chance: Any) -> Any:  # noqa: ANN401 - a number or an array
+    """Return the entropy in bits of a yes-no answer with a probability of yes."""
+    yes = np.clip(chance, 1e-12, 1.0 - 1e-12)
+    return -(yes * np.log2(yes) + (1.0 - yes) * np.log2(1.0 - yes))

@@ -10,10 +10,8 @@ import pandas as pd
 import pyogrio
 import shapely
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.symbology import CHANCES
-from semsig_gis.core.text import percent
-from semsig_gis.database.database import require_same_place
+from semsig_gis.core import CHANCES, InputError, percent
+from semsig_gis.database import require_same_place
 from semsig_gis.maps.location import CANDIDATE
 from semsig_gis.maps.page_elements import (
     add_city,
@@ -30,7 +28,7 @@ from semsig_gis.maps.page_elements import (
 if TYPE_CHECKING:
     import folium
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 RASTERS = frozenset({".tif", ".tiff"})
 """Suffixes of the files that hold the chance of every cell instead (see `open_posterior`)."""

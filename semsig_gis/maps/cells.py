@@ -10,17 +10,17 @@ import numpy as np
 import pandas as pd
 from folium.template import Template
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import BEARING_UNITS
-from semsig_gis.core.symbology import (
+from semsig_gis.core import (
+    BEARING_UNITS,
     FOUND_RAMP,
+    FULL_TURN,
     GROUP_COLOURS,
     SAME_LEVELS,
     SAME_TYPES,
+    InputError,
     group_labels,
+    percent,
 )
-from semsig_gis.core.text import percent
 from semsig_gis.maps.image import (
     QUANTUM_M,
     CellPixels,
@@ -58,8 +58,8 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Identifiability
 
 
 BESIDE_M = 50.0  # from a cell, where a click tells of it

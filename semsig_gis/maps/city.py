@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.maps.answer import answer_map
 from semsig_gis.maps.cells import ambiguity_map, identifiability_map
 from semsig_gis.maps.drift import drift_map
@@ -20,11 +20,10 @@ if TYPE_CHECKING:
 
     import folium
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.localization.likelihood.posterior import Posterior
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation, Identifiability
+    from semsig_gis.localization import Posterior
+    from semsig_gis.objects import StreetObjects
 
 
 def city_map(

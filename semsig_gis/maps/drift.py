@@ -8,12 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.errors import CrsError
-from semsig_gis.core.geometry import SOURCE, SOURCE_ID
-from semsig_gis.core.symbology import DRIFT_COLOURS, OBJECT_COLOURS
-from semsig_gis.core.text import percent
-from semsig_gis.database.database import join_databases, require_same_place
-from semsig_gis.database.update import compare_cells
+from semsig_gis.core import DRIFT_COLOURS, OBJECT_COLOURS, SOURCE, SOURCE_ID, CrsError, percent
+from semsig_gis.database import compare_cells, join_databases, require_same_place
 from semsig_gis.maps.cells import CellFacts, Cells, city_view, packed_signatures
 from semsig_gis.maps.image import level_image, packed
 from semsig_gis.maps.page_elements import (
@@ -32,7 +28,7 @@ from semsig_gis.maps.page_elements import (
     swatch,
     to_latlon,
 )
-from semsig_gis.objects.changes import compare_objects, joined_taxonomy
+from semsig_gis.objects import compare_objects, joined_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -40,11 +36,9 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.update import CellChanges
-    from semsig_gis.objects.changes import ObjectChanges
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import CellChanges, SignatureDatabase
+    from semsig_gis.objects import ObjectChanges, StreetObjects
 
 OBJECT_FIELDS = ("Class", "Class before", "Moved by", "Source", "Identifier")
 POPUP = ["title", "was", "by", SOURCE, SOURCE_ID]

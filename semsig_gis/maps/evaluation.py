@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.symbology import ERROR_BREAKS, FAILURES, OUTCOMES
-from semsig_gis.core.text import percent
-from semsig_gis.evaluation.error_field import ENOUGH, error_field
-from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.evaluation.result import Evaluation
+from semsig_gis.core import ERROR_BREAKS, FAILURES, OUTCOMES, percent
+from semsig_gis.evaluation import ENOUGH, Evaluation, chain_text
+from semsig_gis.evaluation.error_field import error_field
 from semsig_gis.maps.image import mercator_places, packed
 from semsig_gis.maps.page_elements import (
     OUTLINES,
@@ -44,7 +42,7 @@ from semsig_gis.maps.page_elements import (
     ties_text,
     to_latlon,
 )
-from semsig_gis.observation.sentences import parse_view
+from semsig_gis.observation import parse_view
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,9 +50,9 @@ if TYPE_CHECKING:
     import folium
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.error_field import ErrorField
-    from semsig_gis.observation.view import View
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import ErrorField
+    from semsig_gis.observation import View
 
 QUERY_FIELDS = (
     *(

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pyproj import CRS, Transformer
 
-from semsig_gis.core.geometry import across_180, cell_ids, to_degrees
+from semsig_gis.core import across_180, cell_ids, to_degrees
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 _BLOCKS = 2048

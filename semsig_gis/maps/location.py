@@ -7,18 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.symbology import (
-    ANSWERS,
-    CANDIDATE_RAMP,
-    CELL_CHANCES,
-    CHANCES,
-    VERDICTS,
-    mixed,
-)
-from semsig_gis.core.text import percent
-from semsig_gis.database.database import rows_of_result
-from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
-from semsig_gis.localization.likelihood.explain import VERDICTS as COUNTED
+from semsig_gis.core import ANSWERS, CANDIDATE_RAMP, CELL_CHANCES, CHANCES, VERDICTS, mixed, percent
+from semsig_gis.database import rows_of_result
+from semsig_gis.localization import DEFAULT_RULE
+from semsig_gis.localization import VERDICTS as COUNTED
 from semsig_gis.maps.image import level_image
 from semsig_gis.maps.page_elements import (
     FLIPPING,
@@ -48,19 +40,14 @@ from semsig_gis.maps.page_elements import (
     ties_text,
     to_latlon,
 )
-from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.view import View
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     import folium
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.explain import Explanation
-    from semsig_gis.localization.likelihood.locate import Location
-    from semsig_gis.localization.likelihood.posterior import Posterior
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Answer, Explanation, Localization, Location, Posterior
 
 
 Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners

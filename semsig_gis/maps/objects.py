@@ -8,9 +8,16 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.errors import CrsError, EmptyResultError
-from semsig_gis.core.geometry import COUNT, MERGED, NAME, SOURCE, SOURCE_ID
-from semsig_gis.core.symbology import class_signs
+from semsig_gis.core import (
+    COUNT,
+    MERGED,
+    NAME,
+    SOURCE,
+    SOURCE_ID,
+    CrsError,
+    EmptyResultError,
+    class_signs,
+)
 from semsig_gis.maps.image import mercator, packed, steps
 from semsig_gis.maps.page_elements import (
     Call,
@@ -26,8 +33,8 @@ from semsig_gis.maps.page_elements import (
     sources,
     to_latlon,
 )
-from semsig_gis.objects.table import licenses_of
-from semsig_gis.storage.geoparquet import hilbert_order
+from semsig_gis.objects import licenses_of
+from semsig_gis.storage import hilbert_order
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,8 +44,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 
 STREET_M = 6.0

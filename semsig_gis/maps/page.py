@@ -23,9 +23,9 @@ from urllib.parse import urlsplit
 import folium
 from folium.raster_layers import WmsTileLayer
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core import InputError, UnknownNameError, nearest_name
 from semsig_gis.maps.page_elements import layers_of
-from semsig_gis.storage.whole import write_whole
+from semsig_gis.storage import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -19,12 +19,19 @@ from folium.template import Template
 from folium.utilities import JsCode
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN, across_180, to_degrees
-from semsig_gis.core.symbology import SHADES, VERDICTS, class_signs
-from semsig_gis.database.database import SignatureDatabase
+from semsig_gis.core import (
+    FULL_TURN,
+    SHADES,
+    VERDICTS,
+    InputError,
+    across_180,
+    class_signs,
+    nearest_name,
+    to_degrees,
+)
+from semsig_gis.database import SignatureDatabase
 from semsig_gis.maps.image import city_image, script_json
-from semsig_gis.observation.view import View
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -33,11 +40,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.symbology import ClassSign, Mark
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.objects.table import StreetObjects
-    from semsig_gis.observation.view import Photo, Sector
+    from semsig_gis.core import ClassSign, Mark, Signature, Taxonomy
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.observation import Photo, Sector
 
 
 MAX_ZOOM = 20

@@ -1,1 +1,5 @@
-"""Raw layers become one clean table of street objects."""
+"""Load raw layers into one checked table of street objects."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.errors import CatalogError, CrsError, InputError
-from semsig_gis.core.geometry import CLASS_CODE, MERGED, SOURCE, SOURCE_ID
+from semsig_gis.core import (
+    CLASS_CODE,
+    MERGED,
+    SOURCE,
+    SOURCE_ID,
+    CatalogError,
+    CrsError,
+    InputError,
+)
 from semsig_gis.objects.table import Licence, StreetObjects, join_licences, layer_note
 
 if TYPE_CHECKING:
@@ -18,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+    from semsig_gis.core import ObjectClass, Taxonomy
 
 NAME = [SOURCE, SOURCE_ID]
 LOOKS = [CLASS_CODE, "x", "y"]

@@ -17,16 +17,17 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
+    MAX_CODE,
     CatalogError,
     CrsError,
     EmptyResultError,
+    ObjectClass,
     SemsigError,
     SourceError,
+    require_metric_crs,
+    temporary_folder,
 )
-from semsig_gis.core.geometry import require_metric_crs
-from semsig_gis.core.taxonomy import MAX_CODE, ObjectClass
-from semsig_gis.core.temporary import temporary_folder
 from semsig_gis.objects.guesses import (
     VECTOR,
     ClassGuess,
@@ -37,13 +38,20 @@ from semsig_gis.objects.guesses import (
     samples_of,
 )
 from semsig_gis.objects.load import assemble, read_files
-from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.filters import ANY_VALUE, BETWEEN_SLASHES, Condition
-from semsig_gis.sources.keywords import words_of
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.rows import WGS84, off_the_globe
+from semsig_gis.sources import (
+    ANY_VALUE,
+    BETWEEN_SLASHES,
+    NO_GEOMETRY,
+    WGS84,
+    Condition,
+    LayerSpec,
+    catalog_names,
+    load_catalog,
+    off_the_globe,
+    paper_taxonomy,
+    reader,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

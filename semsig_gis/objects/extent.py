@@ -16,10 +16,12 @@ import pandas as pd
 import shapely
 from pyproj import CRS, Transformer
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
     FULL_TURN,
     HALF_TURN,
+    CrsError,
+    EmptyResultError,
+    InputError,
     cell_ids,
     crs_label,
     plane_distortion,
@@ -28,14 +30,14 @@ from semsig_gis.core.geometry import (
     split_ids,
     wrap_degrees,
 )
-from semsig_gis.sources.rows import LATITUDE_LIMIT, WGS84, fits_the_globe
+from semsig_gis.sources import LATITUDE_LIMIT, WGS84, fits_the_globe
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.geometry import Bounds
+    from semsig_gis.core import Bounds
     from semsig_gis.sources import RawLayer
 
 MAX_DISTORTION = 6.0

@@ -8,14 +8,20 @@ from typing import TYPE_CHECKING
 
 from platformdirs import user_cache_path
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.sources import mapillary, overture
-from semsig_gis.sources.clip import clip_layer, names_place, parse_area
-from semsig_gis.sources.http.access_token import AccessToken
-from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpSpec
+from semsig_gis.core import InputError
+from semsig_gis.sources import (
+    DEFAULT_HTTP,
+    AccessToken,
+    Cache,
+    HttpSpec,
+    clip_layer,
+    find_place,
+    mapillary,
+    names_place,
+    overture,
+    parse_area,
+)
 from semsig_gis.sources.osm import overpass
-from semsig_gis.sources.osm.overpass import find_place
 from semsig_gis.sources.services import fetch as services
 
 if TYPE_CHECKING:
@@ -24,10 +30,7 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layer_spec import LayerSpec
+    from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer
 
 # Readers whose service sends an area in parts, each a file.
 TILED: Mapping[str, ModuleType] = {

@@ -8,21 +8,32 @@ from typing import TYPE_CHECKING
 
 import geopandas as gpd
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError, nearest_name
-from semsig_gis.core.geometry import LICENSES, SOURCE_ID
+from semsig_gis.core import (
+    LICENSES,
+    SOURCE_ID,
+    CrsError,
+    EmptyResultError,
+    InputError,
+    nearest_name,
+)
 from semsig_gis.objects.load import assemble, choose_layers
 from semsig_gis.objects.table import Licence
-from semsig_gis.sources import TAGS_READER
-from semsig_gis.sources.catalog import Catalog, built_in_taxonomy, load_catalog
-from semsig_gis.sources.filters import as_text
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
-from semsig_gis.sources.osm.features import (
+from semsig_gis.sources import (
+    TAGS_READER,
+    Catalog,
+    ClassBy,
+    LayerSpec,
+    RowRules,
+    Rows,
+    as_text,
+    built_in_taxonomy,
     frame_fields,
     frame_layers,
     has_element_columns,
     has_tag_columns,
+    load_catalog,
+    raw_layer,
 )
-from semsig_gis.sources.rows import RowRules, Rows, raw_layer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

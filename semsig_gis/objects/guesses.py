@@ -10,15 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 from shapely.geometry.base import BaseGeometry
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.sources.csv_layer import NO_GEOMETRY
-from semsig_gis.sources.keywords import keywords, words_of
-from semsig_gis.sources.numbers import decimal
-from semsig_gis.sources.osm.features import FORMATS
-from semsig_gis.sources.rows import LATITUDE_LIMIT, LONGITUDE_LIMIT
-from semsig_gis.sources.services.layers import POINT, SHAPE, fold
-from semsig_gis.sources.services.table import ServiceRecord, open_table
-from semsig_gis.sources.vector import LayerInfo, first_rows
+from semsig_gis.core import SourceError
+from semsig_gis.sources import (
+    FORMATS,
+    LATITUDE_LIMIT,
+    LONGITUDE_LIMIT,
+    NO_GEOMETRY,
+    POINT,
+    SHAPE,
+    LayerInfo,
+    ServiceRecord,
+    decimal,
+    first_rows,
+    fold,
+    keywords,
+    open_table,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -12,24 +12,33 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
     CLASS_CODE,
     CLASS_NAME,
     COUNT,
     LICENSES,
     SOURCE,
     SOURCE_ID,
+    CrsError,
+    Displayed,
+    EmptyResultError,
+    InputError,
     require_metric_crs,
 )
-from semsig_gis.objects.conflate import ConflationReport, conflate
+from semsig_gis.objects.conflation import ConflationReport, conflate
 from semsig_gis.objects.extent import BEYOND_EARTH_M, MAX_DISTORTION, settle_extent
 from semsig_gis.objects.surroundings import DIMENSIONS, KIND_OF
 from semsig_gis.objects.table import StreetObjects, layer_licences, layer_note
-from semsig_gis.sources import MERGING, PRUNING, TAGS_READER, file_reader, find_files, reader
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.clip import note_outside
+from semsig_gis.sources import (
+    MERGING,
+    PRUNING,
+    TAGS_READER,
+    file_reader,
+    find_files,
+    note_outside,
+    paper_taxonomy,
+    reader,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -38,11 +47,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.sources import RawLayer, RowCounts
-    from semsig_gis.sources.area import Area
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layer_spec import LayerSpec, Role
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
 
 
 # Two objects of a class within the same centimetre are one object listed twice.

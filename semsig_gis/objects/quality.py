@@ -16,17 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import COUNT, degree_bounds, plane_distortion
+from semsig_gis.core import COUNT, Displayed, degree_bounds, plane_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.geometry import Distortion
-    from semsig_gis.core.taxonomy import ObjectClass
-    from semsig_gis.objects.conflate import ConflatedPair, ConflationReport
+    from semsig_gis.core import Distortion, ObjectClass
+    from semsig_gis.objects.conflation import ConflatedPair, ConflationReport
     from semsig_gis.objects.load import LayerReport, LoadReport, UnreadLayer
     from semsig_gis.objects.table import StreetObjects
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SemsigError
+from semsig_gis.core import SemsigError
 from semsig_gis.objects.load import read_files
 from semsig_gis.sources import MERGING, find_files
 
@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import Catalog
-    from semsig_gis.sources.layer_spec import LayerSpec
+    from semsig_gis.sources import Catalog, LayerSpec, RawLayer
 
 # Files that are read in about a second.
 SMALL_BYTES = 2**21

@@ -9,33 +9,38 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.core.geometry import CLASS_NAME, LICENSES
+from semsig_gis.core import CLASS_NAME, LICENSES, InputError, SourceError
 from semsig_gis.objects.table import layer_licences
-from semsig_gis.sources import file_reader, reader
-from semsig_gis.sources import vector as vector_file
-from semsig_gis.sources.area import join_areas
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.clip import NUMBERS, parse_area
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.osm.features import frame_fields, frame_layers, has_element_columns
-from semsig_gis.sources.parquet import SUFFIXES, read_parquet
-from semsig_gis.sources.rows import WGS84
-from semsig_gis.storage.geoparquet import (
-    CHECKED_PAGES,
-    GROUP_ROWS,
-    hilbert_order,
-    seal,
+from semsig_gis.sources import (
+    NUMBERS,
+    SUFFIXES,
+    WGS84,
+    LayerSpec,
+    file_reader,
+    frame_fields,
+    frame_layers,
+    has_element_columns,
+    join_areas,
+    load_catalog,
+    parse_area,
+    read_parquet,
+    reader,
 )
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.sources import vector as vector_file
+from semsig_gis.storage import (
+    GROUP_ROWS,
+    WRITE_CHECKSUMS,
+    add_footer_checksum,
+    hilbert_order,
+    whole_file,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from pyproj import CRS
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.layer_spec import GeometryKind
+    from semsig_gis.sources import GeometryKind, RawLayer
 
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
@@ -75,9 +80,9 @@ def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
             schema_version="1.1.0",
             write_covering_bbox=True,
             row_group_size=GROUP_ROWS,
-            **CHECKED_PAGES,
+            **WRITE_CHECKSUMS,
         )
-        seal(partial)
+        add_footer_checksum(partial)
 
 
 def read_surroundings(

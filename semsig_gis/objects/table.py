@@ -11,9 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from semsig_gis import __version__
-from semsig_gis.core.display import Displayed, bounds_text
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
     CLASS_CODE,
     CLASS_NAME,
     COUNT,
@@ -23,11 +21,15 @@ from semsig_gis.core.geometry import (
     NOTES,
     SOURCE,
     SOURCE_ID,
+    DatabaseError,
+    Displayed,
+    Taxonomy,
+    bounds_text,
     crs_label,
+    map_with,
+    plot_with,
 )
-from semsig_gis.core.presentation import map_with, plot_with
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.storage import (
     BBOX,
     COVERING,
     GROUP_ROWS,
@@ -49,7 +51,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.display import Axes, MapFrame
+    from semsig_gis.core import Axes, MapFrame
     from semsig_gis.sources import RawLayer
 
 KIND = "street objects"

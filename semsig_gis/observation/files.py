@@ -7,30 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.observation.leg import Leg
 from semsig_gis.observation.north import GRID_NORTH
 from semsig_gis.observation.sentences import RADIUS_M, parse_view, require_seen, unplaced_codes
 from semsig_gis.observation.track import STEP_ERROR_M, parse_time
 from semsig_gis.observation.view import View
-from semsig_gis.storage.rows import (
-    file_rows,
-    json_rows,
-    parse_rows,
-    read_rows,
-    row_value,
-    scan_rows,
-)
+from semsig_gis.storage import file_rows, json_rows, parse_rows, read_rows, row_value, scan_rows
 
 if TYPE_CHECKING:
     import datetime as dt
     from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
     from semsig_gis.observation.north import North
     from semsig_gis.observation.track import Track
-    from semsig_gis.storage.rows import Row
+    from semsig_gis.storage import Row
 
 Route = tuple[list[tuple[str | int, View]], list[Leg]]
 Codes = tuple[int, ...]

@@ -1,18 +1,18 @@
-"""The way between two places of a route."""
+"""Legs: the displacements between the places of a route."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from semsig_gis.core.checks import MOST_METRES, require_number
+from semsig_gis.core import MOST_METRES, require_number
 
 MOST_SIGMA_M = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
-    """The way from one place of a route to the next.
+    """The displacement from one place of a route to the next.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The north that the bearings of a query count from: grid, true or magnetic."""
+"""The north from which the bearings of a query are measured: grid, true or magnetic."""
 
 from __future__ import annotations
 
@@ -9,26 +9,32 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import grid_convergence, signed_degrees, to_degrees
+from semsig_gis.core import (
+    InputError,
+    UnknownNameError,
+    grid_convergence,
+    nearest_name,
+    signed_degrees,
+    to_degrees,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
 
 NorthName = Literal["grid", "true", "magnetic"]
 NORTHS: tuple[NorthName, ...] = get_args(NorthName)
 
 MODELLED = dt.date(1900, 1, 1), dt.date(2029, 12, 31)
-"""First and last day that the magnetic field is known or foretold for (IGRF-14)."""
-WIDE = 0.5  # degrees by which north may differ within a city before an answer tells of it
+"""First and last day of the magnetic field model (IGRF-14)."""
+WIDE = 0.5  # degrees; an answer has a note if north varies by more within the city
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class North:
-    """What the bearings of a query count from.
+    """The north from which the bearings of a query are measured.
 
     Parameters
     ----------
@@ -37,9 +43,9 @@ class North:
     turn : float, default 0
         Its bearing from grid north in the middle of the city, in degrees clockwise.
     spread : float, default 0
-        By how many degrees it differs from that elsewhere in the city, at most.
+        Maximum deviation from `turn` in the city, in degrees.
     date : datetime.date, optional
-        The day for which the magnetic north was worked out.
+        The day for which the magnetic north was computed.
 
     Examples
     --------
@@ -97,12 +103,12 @@ class North:
         return cls(name=name, turn=turn, spread=spread, date=date)
 
     def __str__(self) -> str:
-        """Return its name in words, with the date where it matters."""
+        """Return its name, with the date of a magnetic north."""
         return f"{self.name} north" + (f" of {self.date}" if self.date else "")
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to say where one north does not do for all the city."""
+        """A note if north varies within the city."""
         if self.spread <= WIDE:
             return ()
         note = (
@@ -112,32 +118,32 @@ class North:
         return (note,)
 
     def to_grid(self, query: Signature) -> Signature:
-        """Return a query with its bearings from grid north."""
+        """Return a query with its bearings measured from grid north."""
         return query.turned(self.turn) if self.turn else query
 
     def from_grid(self, bearing: float) -> float:
-        """Return a bearing from grid north as one from this north, in [0, 360)."""
+        """Convert a bearing from grid north to one from this north, in [0, 360)."""
         return (bearing - self.turn) % 360.0 if self.turn else bearing
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, ready for JSON."""
+        """Return plain values for JSON."""
         date = None if self.date is None else self.date.isoformat()
         return {"name": self.name, "turn": self.turn, "spread": self.spread, "date": date}
 
 
 GRID_NORTH: North = North()
-"""The north that bearings are kept from."""
+"""The north of stored bearings."""
 
 
 def declination(
     lon: NDArray[np.float64], lat: NDArray[np.float64], date: dt.date
 ) -> NDArray[np.float64]:
-    """Return the bearing of magnetic from true north at places, in degrees clockwise.
+    """Return the bearing of magnetic north from true north at places, in degrees clockwise.
 
-    It is that of the International Geomagnetic Reference Field. InputError if the date lies
+    The model is the International Geomagnetic Reference Field. Raises InputError if the date is
     outside `MODELLED`.
     """
-    import ppigrf  # noqa: PLC0415 - only where it is used
+    import ppigrf  # noqa: PLC0415 - it imports pandas, 0.25 s
 
     first, last = MODELLED
     if not first <= date <= last:

@@ -11,20 +11,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.geometry import wrap_degrees
-from semsig_gis.core.signature import Signature, SignatureSpec, wrapped_bearings
-from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD
+from semsig_gis.core import (
+    MAX_RANGE_M,
+    WILDCARD,
+    InputError,
+    Signature,
+    SignatureSpec,
+    UnknownNameError,
+    wrap_degrees,
+    wrapped_bearings,
+)
 from semsig_gis.observation.view import CLASSES, ROUNDING, Photo, View
-from semsig_gis.storage.rows import row_value
+from semsig_gis.storage import row_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.storage.rows import Row
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.storage import Row
 
 SEEN = ("types", "bearings", "detections", "see", "photos")
 """Keys of a row that say what was seen, of which one at least is needed."""
@@ -129,7 +135,7 @@ def said_row(text: str, taxonomy: Taxonomy) -> Row:
     One word is symbols if each of its letters is one and it is no word for a class, or if it has
     capitals alone, so that ``DDBQ`` is refused for its ``Q``.
     """
-    from semsig_gis.sources.keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     word = text.strip()
     symbols = {"?", *(item.symbol for item in taxonomy.classes)}
@@ -266,7 +272,7 @@ def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...],
     sentence, *others = unplaced_parts(text)
     if not any(others):
         return sentence, (), ()
-    from semsig_gis.sources.keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     seen, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
     return sentence, seen, absent
@@ -301,14 +307,14 @@ def _class(told: object, taxonomy: Taxonomy) -> str | Row:
         raise InputError(
             f"the class of a detection is {told!r}; give a symbol, a word or scores by word."
         )
-    from semsig_gis.sources.keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     return taxonomy.decode([class_code(told, taxonomy)])
 
 
 def _scores(told: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:
     """Return the chance of each class code; what is left to one is for any class."""
-    from semsig_gis.sources.keywords import class_code  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.sources import class_code  # noqa: PLC0415 - it loads slowly
 
     scores = np.zeros(CLASSES)
     for word, chance in told.items():

@@ -10,8 +10,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from pyproj import Transformer
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.text import read_text
+from semsig_gis.core import InputError
+from semsig_gis.storage import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,18 +12,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.signature import Signature
-from semsig_gis.core.taxonomy import MAX_CODE, MAX_RANGE_M, WILDCARD
+from semsig_gis.core import (
+    FULL_TURN,
+    MAX_CODE,
+    MAX_RANGE_M,
+    WILDCARD,
+    InputError,
+    Signature,
+    require_number,
+    wrap_degrees,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
 LEAST_TURN = 0.001
 MOST_RANGE_ERROR = 3.0

@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import (
-    EmptyResultError,
-    InputError,
-    UnknownNameError,
-    extra,
-    nearest_name,
-)
-from semsig_gis.core.symbology import (
+from semsig_gis.core import (
     ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
@@ -27,12 +20,16 @@ from semsig_gis.core.symbology import (
     OUTCOMES,
     SHADES,
     WHITE,
+    EmptyResultError,
+    InputError,
+    UnknownNameError,
     class_signs,
+    extra,
     group_labels,
+    nearest_name,
 )
-from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.evaluation.result import PlotKind
-from semsig_gis.localization.likelihood.locate import Location
+from semsig_gis.evaluation import PlotKind, chain_text
+from semsig_gis.localization import Location
 from semsig_gis.reports.plots import INK, cell_pixels, draw_curve, draw_frame, label
 from semsig_gis.reports.scenes import MARKERS
 from semsig_gis.reports.shares import curve_of, plot_of
@@ -54,12 +51,11 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.symbology import Mark
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.core import Mark
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation, Identifiability
+    from semsig_gis.localization import Answer
+    from semsig_gis.objects import StreetObjects
 
 SIZE = (7.5, 6.0)  # inches of a new figure
 MOST_PIXELS = 4000  # of an image along a side

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.tables import Table
-from semsig_gis.core.text import percent
-from semsig_gis.database.summary import database_summary
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.core import Table, percent
+from semsig_gis.database import database_summary
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.reports.tables import distortion_rows, note_tables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 LONGEST_TYPES = 20  # symbols that fit into a table
 GROUP_LABELS = {"alone": "cells alone in their group", "entropy_bits": "entropy, in bits"}

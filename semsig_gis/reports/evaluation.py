@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from semsig_gis.core.symbology import ERROR_BREAKS
-from semsig_gis.core.tables import Table, figure, interval
-from semsig_gis.evaluation.figures import percentile
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.queries.distortion_text import chain_text
-from semsig_gis.evaluation.queries.distortions import DISTORTIONS, FalseClass
-from semsig_gis.evaluation.result import Evaluation
-from semsig_gis.localization.distance.ties import NEAR_METRES, NEAR_PLACES
-from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
+from semsig_gis.core import ERROR_BREAKS, Table, figure, interval
+from semsig_gis.evaluation import DISTORTIONS, Evaluation, FalseClass, chain_text, percentile
+from semsig_gis.evaluation.paper import published as paris
+from semsig_gis.localization import DEFAULT_RULE, NEAR_METRES, NEAR_PLACES
 from semsig_gis.reports.tables import short_percent
 
 if TYPE_CHECKING:

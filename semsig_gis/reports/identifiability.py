@@ -6,10 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis import __version__
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.tables import Table, figure
-from semsig_gis.core.text import percent
-from semsig_gis.evaluation.result import machine
+from semsig_gis.core import FULL_TURN, Table, figure, percent
+from semsig_gis.evaluation import machine
 from semsig_gis.reports.database import class_label
 from semsig_gis.reports.report_model import Curve, Number, Plot, Report, Section
 from semsig_gis.reports.tables import short_percent
@@ -17,8 +15,7 @@ from semsig_gis.reports.tables import short_percent
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from semsig_gis.evaluation.identifiability.check import IdentifiabilityCheck
-    from semsig_gis.evaluation.identifiability.result import Identifiability
+    from semsig_gis.evaluation import Identifiability, IdentifiabilityCheck
 
 SCORES = {
     "found": "chance to be found",

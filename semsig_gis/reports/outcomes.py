@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import extra
-from semsig_gis.core.symbology import OUTCOMES, WHITE
+from semsig_gis.core import OUTCOMES, WHITE, extra
 from semsig_gis.reports.plots import SOFT, blank_figure, cell_pixels, draw_legend, label, saved
 from semsig_gis.reports.report_model import OutcomeMap
 from semsig_gis.reports.scenes import MARKERS, draw_north, draw_scale
@@ -18,9 +17,9 @@ with extra("plot", "a report or a figure"):
     from matplotlib.lines import Line2D
 
 if TYPE_CHECKING:
-    from semsig_gis.core.symbology import Mark
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.core import Mark
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
     from semsig_gis.reports.plots import Picture
 
 MOST_SQUARES = 400  # along a side

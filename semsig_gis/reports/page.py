@@ -17,14 +17,12 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.tables import Table, markdown_rows
-from semsig_gis.core.text import escaped, one_line
+from semsig_gis.core import InputError, Table, escaped, markdown_rows, one_line
 from semsig_gis.reports.outcomes import draw_map
 from semsig_gis.reports.plots import draw_plot, in_the_dark
 from semsig_gis.reports.scenes import draw_scene
 from semsig_gis.reports.tables import number_table
-from semsig_gis.storage.whole import write_whole
+from semsig_gis.storage import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

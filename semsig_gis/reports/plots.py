@@ -17,8 +17,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from semsig_gis.core.errors import extra
-from semsig_gis.core.text import one_line
+from semsig_gis.core import extra, one_line
 
 with extra("plot", "a report or a figure"):
     import matplotlib as mpl
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.reports.report_model import Curve, Plot
 
 
@@ -43,7 +42,8 @@ COLOURS = (
 """Colours that colour-blind people tell apart: those of Okabe and Ito, and two of Tol."""
 
 # Of what is drawn and what it is drawn on; a letter on a sign is just black or white.
-INK, GROUND = "#222222", "#fefefe"
+INK: str = "#222222"
+GROUND: str = "#fefefe"
 AXIS, TICK, GRID, SOFT = "#777777", "#555555", "#dddddd", "#999999"
 DARK: Mapping[str, str] = MappingProxyType(
     {

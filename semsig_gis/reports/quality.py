@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.tables import Table
-from semsig_gis.core.text import percent
-from semsig_gis.objects.quality import SQUARE_M
+from semsig_gis.core import Table, percent
+from semsig_gis.objects import SQUARE_M
 from semsig_gis.reports.tables import brief_notes, distortion_rows, note_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from semsig_gis.database.update import UpdateReport
-    from semsig_gis.objects.quality import QualityReport
+    from semsig_gis.database import UpdateReport
+    from semsig_gis.objects import QualityReport
 
 
 ROW_COUNTS = tuple(field.name for field in fields(RowCounts))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.display import Displayed
+from semsig_gis.core import Displayed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, extra
-from semsig_gis.core.geometry import to_degrees
-from semsig_gis.core.symbology import OUTCOMES, ClassSign, class_signs
-from semsig_gis.core.text import one_line
-from semsig_gis.evaluation.queries.true_view import Sight
+from semsig_gis.core import (
+    OUTCOMES,
+    ClassSign,
+    InputError,
+    class_signs,
+    extra,
+    one_line,
+    to_degrees,
+)
+from semsig_gis.evaluation import Sight
 from semsig_gis.reports.plots import GROUND, INK, SOFT, blank_figure, draw_legend, label, saved
 from semsig_gis.reports.report_model import Pair, Scene, SceneObject
 from semsig_gis.reports.tables import length
@@ -30,9 +35,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
     from semsig_gis.reports.plots import Picture
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.localization.distance.ties import THRESHOLDS, expected_recall
+from semsig_gis.core import wilson_interval
+from semsig_gis.localization import THRESHOLDS, expected_recall
 from semsig_gis.reports.report_model import Curve, Number, Plot
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation
 
     Points = tuple[tuple[float, float, str], ...]
 

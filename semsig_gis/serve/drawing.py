@@ -7,20 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.symbology import CHANCES
-from semsig_gis.core.text import percent
-from semsig_gis.localization.likelihood.explain import UNKNOWN_NAME
-from semsig_gis.maps.location import REGION_COLOURS, region_levels
-from semsig_gis.maps.page_elements import data_url, exact_latlon, to_metres
+from semsig_gis.core import CHANCES, percent
+from semsig_gis.localization import UNKNOWN_NAME
+from semsig_gis.maps import REGION_COLOURS, data_url, exact_latlon, region_levels, to_metres
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.likelihood.explain import Explanation
-    from semsig_gis.localization.likelihood.locate import Location
-    from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.maps.image import CellPixels
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Explanation, Location, NoiseTable
+    from semsig_gis.maps import CellPixels
     from semsig_gis.serve.question import MarkNumber, Question
 
 LEAST_SHARE = 1e-6

@@ -6,7 +6,7 @@ import html
 import re
 from importlib import resources
 
-from semsig_gis.maps.page import asset_text
+from semsig_gis.maps import asset_text
 
 _SCRIPT = re.compile(r'<script src="(?P<name>[^"]+)"></script>')
 _STYLE = re.compile(r'<link rel="stylesheet" href="(?P<name>[^"]+)">')

@@ -10,26 +10,25 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import wrap_degrees
-from semsig_gis.evaluation.queries.draw import SeenFrom
-from semsig_gis.observation.detectors.camera import Camera
-from semsig_gis.observation.detectors.views import (
+from semsig_gis.core import InputError, UnknownNameError, nearest_name, wrap_degrees
+from semsig_gis.evaluation import SeenFrom
+from semsig_gis.observation import (
     DEGREE_DIGITS,
     ERROR_DIGITS,
     METRE_DIGITS,
+    Camera,
+    Leg,
+    View,
+    parse_view,
     placed,
 )
-from semsig_gis.observation.leg import Leg
-from semsig_gis.observation.sentences import parse_view
-from semsig_gis.observation.view import View
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
 MarkNumber = tuple[int, int, int]
 """The numbers of a view of the page, of a photo in it, and of a mark in that."""

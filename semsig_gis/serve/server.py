@@ -21,12 +21,11 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.core.threads import WorkCancelledError, cancellable
+from semsig_gis.core import InputError, SemsigError, WorkCancelledError, cancellable
 from semsig_gis.serve.page import policy, workbench_page
 from semsig_gis.serve.streets import city_ground
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

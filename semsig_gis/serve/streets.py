@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.maps.objects import packed_ground
-from semsig_gis.maps.page_elements import search_area
+from semsig_gis.core import EmptyResultError
+from semsig_gis.maps import packed_ground, search_area
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.database import ObjectStore, SignatureDatabase
 
 BESIDE_M = 100.0  # from the outermost cells, how far streets are drawn
 

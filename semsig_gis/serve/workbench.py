@@ -14,38 +14,56 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, SemsigError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.symbology import SHADES, VERDICTS, class_signs
-from semsig_gis.database.sightings import visible_objects_at
-from semsig_gis.evaluation.queries.distortion_text import ready_chain
-from semsig_gis.evaluation.queries.distortions import Detector as FailingDetector
-from semsig_gis.evaluation.queries.true_view import CitySights, Sight
+from semsig_gis.core import (
+    FULL_TURN,
+    SHADES,
+    VERDICTS,
+    InputError,
+    SemsigError,
+    UnknownNameError,
+    class_signs,
+    nearest_name,
+    wrap_degrees,
+)
+from semsig_gis.database import visible_objects_at
+from semsig_gis.evaluation import CitySights, Sight, ready_chain
+from semsig_gis.evaluation import Detector as FailingDetector
 from semsig_gis.exports import export_answer
-from semsig_gis.localization.likelihood.incremental import TurnMemo
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.likelihood.priors import KnownPosition, position_prior
-from semsig_gis.localization.locator import make_locator, method_index
-from semsig_gis.localization.noise.model import NOISES
-from semsig_gis.localization.suggest import next_questions, with_unplaced
-from semsig_gis.maps.image import CellPixels, city_image
-from semsig_gis.maps.location import RAYS
-from semsig_gis.maps.page_elements import (
+from semsig_gis.localization import (
+    NOISES,
+    KnownPosition,
+    LikelihoodMethod,
+    TurnMemo,
+    make_locator,
+    method_index,
+    next_questions,
+    position_prior,
+    with_unplaced,
+)
+from semsig_gis.maps import (
     MAX_ZOOM,
     OUTLINES,
+    RAYS,
+    CellPixels,
+    city_image,
     corners_of,
     data_url,
     exact_latlon,
     panel_signs,
     to_metres,
 )
-from semsig_gis.observation.detectors.exif import picture_shot
-from semsig_gis.observation.detectors.formats import read_pictures
-from semsig_gis.observation.detectors.labels import LabelMap
-from semsig_gis.observation.detectors.pictures import Shot
-from semsig_gis.observation.detectors.views import Detector, Tally, field_of_view, with_heights
-from semsig_gis.observation.north import North
-from semsig_gis.observation.view import Photo
+from semsig_gis.observation import (
+    Detector,
+    LabelMap,
+    North,
+    Photo,
+    Shot,
+    Tally,
+    field_of_view,
+    picture_shot,
+    read_pictures,
+    with_heights,
+)
 from semsig_gis.serve.drawing import answer_drawing, class_shares
 from semsig_gis.serve.question import Question, camera_of, degrees, number
 
@@ -54,13 +72,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.city import City
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
-    from semsig_gis.localization.likelihood.index import CellScores, LikelihoodIndex
-    from semsig_gis.localization.likelihood.locate import LikelihoodLocator, Location
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import City, ObjectStore, SignatureDatabase
+    from semsig_gis.localization import (
+        CellScores,
+        LikelihoodIndex,
+        LikelihoodLocator,
+        Location,
+        Noise,
+    )
 
 MOST_UPLOAD = 25 * 2**20
 """Bytes of a picture, or of a question."""

@@ -1,27 +1,123 @@
-from .files import (
-    MERGING as MERGING,
-)
-from .files import (
-    PRUNING as PRUNING,
-)
-from .files import (
-    READERS as READERS,
-)
-from .files import (
-    TAGS_READER as TAGS_READER,
-)
-from .files import (
-    file_reader as file_reader,
-)
-from .files import (
-    find_files as find_files,
-)
-from .files import (
-    reader as reader,
-)
+# What other packages may import from here: name and module, read by `__init__.py`.
+
+from .area import Area as Area
+from .area import join_areas as join_areas
+from .catalog import CATALOG_KEYS as CATALOG_KEYS
+from .catalog import CLASS_KEYS as CLASS_KEYS
+from .catalog import MEASURES as MEASURES
+from .catalog import Catalog as Catalog
+from .catalog import built_in_taxonomy as built_in_taxonomy
+from .catalog import catalog_names as catalog_names
+from .catalog import combine_catalogs as combine_catalogs
+from .catalog import data_folder as data_folder
+from .catalog import load_catalog as load_catalog
+from .catalog import paper_taxonomy as paper_taxonomy
+from .class_keywords import Keywords as Keywords
+from .class_keywords import Match as Match
+from .class_keywords import class_code as class_code
+from .class_keywords import keywords as keywords
+from .class_keywords import words_of as words_of
+from .clip import BOX as BOX
+from .clip import NUMBERS as NUMBERS
+from .clip import clip_layer as clip_layer
+from .clip import clip_layers as clip_layers
+from .clip import names_place as names_place
+from .clip import note_outside as note_outside
+from .clip import parse_area as parse_area
+from .compression import HARMLESS_BYTES as HARMLESS_BYTES
+from .compression import check_compression_ratio as check_compression_ratio
+from .csv_layer import NO_GEOMETRY as NO_GEOMETRY
+from .detect import detect_catalogs as detect_catalogs
+from .files import MERGING as MERGING
+from .files import PRUNING as PRUNING
+from .files import READERS as READERS
+from .files import TAGS_READER as TAGS_READER
+from .files import file_reader as file_reader
+from .files import find_files as find_files
+from .files import reader as reader
+from .filters import ANY_VALUE as ANY_VALUE
+from .filters import BETWEEN_SLASHES as BETWEEN_SLASHES
+from .filters import Condition as Condition
+from .filters import Rules as Rules
+from .filters import as_text as as_text
+from .filters import matches as matches
+from .http.access_token import AccessToken as AccessToken
+from .http.cache import Cache as Cache
+from .http.cache import Fetched as Fetched
+from .http.fetch import DEFAULT_HTTP as DEFAULT_HTTP
+from .http.fetch import HttpError as HttpError
+from .http.fetch import HttpSpec as HttpSpec
+from .http.fetch import NotCachedError as NotCachedError
+from .http.fetch import TooLargeError as TooLargeError
+from .http.fetch import fetch as fetch
+from .http.fetch import read_text as read_text
 from .layer import RawLayer as RawLayer
 from .layer import Reader as Reader
 from .layer import RowCounts as RowCounts
+from .layer_spec import CLASS_BY_KEYS as CLASS_BY_KEYS
+from .layer_spec import LAYER_KEYS as LAYER_KEYS
+from .layer_spec import WIDTH_BY_KEYS as WIDTH_BY_KEYS
+from .layer_spec import ClassBy as ClassBy
+from .layer_spec import ElementKind as ElementKind
+from .layer_spec import GeometryKind as GeometryKind
+from .layer_spec import LayerSpec as LayerSpec
+from .layer_spec import Role as Role
+from .layer_spec import WidthBy as WidthBy
+from .mapillary import MOST_FEATURES as MOST_FEATURES
+from .mapillary import fetch_layers as fetch_layers
+from .numbers import decimal as decimal
+from .osm.elements import TagIndex as TagIndex
+from .osm.elements import has_tags as has_tags
+from .osm.elements import relation_shape as relation_shape
+from .osm.elements import way_shape as way_shape
+from .osm.features import FORMATS as FORMATS
+from .osm.features import frame_fields as frame_fields
+from .osm.features import frame_layers as frame_layers
+from .osm.features import has_element_columns as has_element_columns
+from .osm.features import has_tag_columns as has_tag_columns
+from .osm.file import read_layers as read_layers
+from .osm.overpass import find_place as find_place
+from .osm.overpass import overpass_query as overpass_query
+from .osm.overpass import waiting_time as waiting_time
+from .parquet import SUFFIXES as SUFFIXES
+from .parquet import read_parquet as read_parquet
 from .paths import FILE_SUFFIXES as FILE_SUFFIXES
 from .paths import files_in as files_in
 from .paths import require_file as require_file
+from .probe import probe_file as probe_file
+from .rows import LATITUDE_LIMIT as LATITUDE_LIMIT
+from .rows import LONGITUDE_LIMIT as LONGITUDE_LIMIT
+from .rows import WGS84 as WGS84
+from .rows import FilteredRows as FilteredRows
+from .rows import RowRules as RowRules
+from .rows import Rows as Rows
+from .rows import fits_the_globe as fits_the_globe
+from .rows import off_the_globe as off_the_globe
+from .rows import raw_layer as raw_layer
+from .rows import usable_crs as usable_crs
+from .services.gml import parse_xml as parse_xml
+from .services.layers import POINT as POINT
+from .services.layers import SHAPE as SHAPE
+from .services.layers import Download as Download
+from .services.layers import find_field as find_field
+from .services.layers import fold as fold
+from .services.pages import PagingError as PagingError
+from .services.table import ServiceRecord as ServiceRecord
+from .services.table import open_table as open_table
+from .synthetic.city import PARIS_LIKE as PARIS_LIKE
+from .synthetic.city import CitySpec as CitySpec
+from .synthetic.city import synthetic_city as synthetic_city
+from .synthetic.city import synthetic_streets as synthetic_streets
+from .synthetic.city import synthetic_surroundings as synthetic_surroundings
+from .synthetic.streets import Network as Network
+from .vector.by_fiona import read_each as read_each
+from .vector.by_pyogrio import LayerDescription as LayerDescription
+from .vector.by_pyogrio import describe as describe
+from .vector.by_pyogrio import read_whole as read_whole
+from .vector.file import LayerInfo as LayerInfo
+from .vector.file import first_rows as first_rows
+from .vector.file import list_layers as list_layers
+from .vector.file import read_layer as read_layer
+from .vector.member import DRIVERS as DRIVERS
+from .vector.member import Member as Member
+from .vector.member import members as members

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import HALF_TURN
+from semsig_gis.core import HALF_TURN, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -36,7 +35,7 @@ class Area:
 
     @property
     def boxes(self) -> tuple[tuple[float, float, float, float], ...]:
-        """The bounds; those of either side of 180 degrees, where the area lies on both."""
+        """The bounds, or two boxes for an area that crosses 180 degrees of longitude."""
         west, _, east, _ = self.bounds
         parts = shapely.get_parts(self.polygon)
         eastern = shapely.get_x(shapely.centroid(parts)) > 0
@@ -48,7 +47,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """A box of an area that is asked for in parts, and how often it was split."""
+    """A box of an area that is requested in parts, and how often it was split."""
 
     bounds: tuple[float, float, float, float]
     splits: int = 0
@@ -58,17 +57,20 @@ class Tile:
         west, south, east, north = self.bounds
         xs = [west + (east - west) * i / columns for i in range(columns + 1)]
         ys = [south + (north - south) * i / rows for i in range(rows + 1)]
-        for bottom, top in itertools.pairwise(ys):
-            for left, right in itertools.pairwise(xs):
-                yield Tile((left, bottom, right, top), splits)
+        for y_min, y_max in itertools.pairwise(ys):
+            for x_min, x_max in itertools.pairwise(xs):
+                yield Tile((x_min, y_min, x_max, y_max), splits)
 
     def quarters(self, area: Area) -> list[Tile]:
-        """Return those of its four parts that touch an area."""
+        """Return the quarters of the tile that touch an area."""
         return _touching(area, self.parts(2, 2, splits=self.splits + 1))
 
 
 def tiles_of(area: Area, tile_deg: float, *, remedy: str) -> list[Tile]:
-    """Return tiles of at most so many degrees that touch an area; InputError for too many."""
+    """Return the tiles of at most `tile_deg` degrees that touch an area.
+
+    InputError if there are too many; `remedy` is the advice in its message.
+    """
     if not tile_deg > 0:
         raise InputError(f"tile_deg is {tile_deg}; give degrees above 0.")
     shapely.prepare(area.polygon)
@@ -90,7 +92,7 @@ def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:
 
 
 def join_areas(geometry: NDArray[np.object_]) -> shapely.Polygon | shapely.MultiPolygon | None:
-    """Return the union of what geometries enclose, in valid form; None where that is nothing."""
+    """Return the valid union of the areas of geometries, or None if they have no area."""
     parts = shapely.get_parts(shapely.make_valid(geometry))
     polygons = shapely.get_parts(parts[shapely.get_dimensions(parts) == 2])  # noqa: PLR2004
     joined = shapely.union_all(polygons)

@@ -1,4 +1,4 @@
-"""Catalogues: TOML files that say which layers of which source hold which class of object."""
+"""Catalogues: TOML files that describe the layers of a source and their classes."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import (
+from semsig_gis.core import (
+    MAX_HEIGHT_M,
+    MAX_RANGE_M,
     CatalogError,
     CrsError,
+    Displayed,
     InputError,
+    ObjectClass,
+    Taxonomy,
     UnknownNameError,
+    installed_catalogs,
     nearest_name,
+    require_metric_crs,
 )
-from semsig_gis.core.geometry import require_metric_crs
-from semsig_gis.core.plugins import installed_catalogs
-from semsig_gis.core.taxonomy import MAX_HEIGHT_M, MAX_RANGE_M, ObjectClass, Taxonomy
 from semsig_gis.sources.layer_spec import conditions_of, layer_of, require_class
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import check_keys, metres, parse_toml, texts
+from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,9 +33,9 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer_spec import LayerSpec
 
 
-# Shipped beside the catalogues: the paper's classes, words by which drafts are made, and more.
+# TOML files in the same folder that are not catalogues: classes, keywords and more.
 NO_CATALOGS = frozenset({"drift", "geofabrik", "keywords", "taxonomy"})
-# What a catalogue may say, and of which type; every other key is a mistake that gets named.
+# Keys of a catalogue and their types; another key is an error.
 CATALOG_KEYS = {
     "name": str,
     "title": str,
@@ -86,9 +88,9 @@ class Catalog(Displayed):
     geocoder : str, optional
         Base address of the Nominatim service that knows places by name.
     conflate : tuple of (str, float)
-        Classes whose objects from different layers are the same thing within so many metres.
+        Classes, and the distance in metres within which objects of different layers are merged.
     license, attribution : str
-        What holds for every layer that does not say otherwise.
+        Licence and attribution of the layers that have no own.
 
     Examples
     --------
@@ -125,12 +127,12 @@ class Catalog(Displayed):
 
     @property
     def classes(self) -> tuple[ObjectClass, ...]:
-        """The classes that its layers hold."""
-        held = {name for spec in self.layers for name in spec.classes}
-        return tuple(item for item in self.taxonomy.classes if item.name in held)
+        """Classes of its layers."""
+        names = {name for spec in self.layers for name in spec.classes}
+        return tuple(item for item in self.taxonomy.classes if item.name in names)
 
     def layer(self, name: str) -> LayerSpec:
-        """Return the layer of that name; UnknownNameError, with the nearest, if there is none."""
+        """Return the layer of a name; UnknownNameError if there is none."""
         for spec in self.layers:
             if spec.name == name:
                 return spec
@@ -161,7 +163,7 @@ def paper_taxonomy() -> Taxonomy:
 
 
 def catalog_names() -> tuple[str, ...]:
-    """Return the names that `load_catalog` takes, sorted, with those that other packages bring."""
+    """Return the names of built-in and installed catalogues, sorted."""
     return tuple(sorted(_sources()))
 
 
@@ -198,8 +200,8 @@ def load_catalog(name: str | Path) -> Catalog:
     -------
     Catalog
         The catalogue; its taxonomy is the paper's classes followed by its own. CatalogError if the
-        file is missing or not TOML, has a key that means nothing, lacks one that is needed, or
-        names a class or CRS that does not exist.
+        file is missing or not TOML, has an unknown key, lacks a required key, or names an unknown
+        class or CRS.
 
     Examples
     --------
@@ -224,7 +226,7 @@ def load_catalog(name: str | Path) -> Catalog:
             )
         source = sources[text]
     try:
-        # A package may lie in an archive, whose members are no files.
+        # The package may be imported from an archive; then `source` is not a Path.
         content = read_text(source) if isinstance(source, Path) else source.read_text("utf-8")
     except UnicodeDecodeError as error:
         raise CatalogError(
@@ -234,11 +236,11 @@ def load_catalog(name: str | Path) -> Catalog:
         raise CatalogError(
             f"catalogue {text} cannot be read ({error.strerror}); give a file that you can read."
         ) from error
-    return _parsed(content, text)
+    return _parse_catalog(content, text)
 
 
 def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
-    """Make one catalogue of several, so that their layers can be loaded and merged together.
+    """Combine catalogues, so that their layers can be loaded and merged together.
 
     Parameters
     ----------
@@ -249,10 +251,9 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     Returns
     -------
     Catalog
-        With several, each layer's name begins with its catalogue's. The first of them that says
-        a metric CRS, how far a class is seen, how tall it is, or within how many metres it is
-        merged, decides that. CatalogError if they mean different classes by one name, code or
-        symbol.
+        With several, the name of a layer begins with the name of its catalogue. Metric CRS,
+        merging radii, and range and height of a class come from the first catalogue that gives
+        them. CatalogError if one name, code or symbol means different classes.
 
     Examples
     --------
@@ -267,15 +268,16 @@ def combine_catalogs(catalogs: Sequence[Catalog]) -> Catalog:
     if len(catalogs) == 1:
         return catalogs[0]
     classes = [item for catalog in catalogs for item in catalog.taxonomy.classes]
-    # Catalogues that differ in how far a class is seen, or how tall it is, mean the same class.
+    # Classes that differ only in range or height are the same class.
     measures: dict[ObjectClass, dict[str, Any]] = {}
     for item in classes:
         kind = dataclasses.replace(item, range_m=None, height_m=None, height_sigma=None)
-        said = {name: getattr(item, name) for name in MEASURES if getattr(item, name) is not None}
-        measures[kind] = {**said, **measures.get(kind, {})}
+        values = {name: getattr(item, name) for name in MEASURES}
+        values = {name: value for name, value in values.items() if value is not None}
+        measures[kind] = {**values, **measures.get(kind, {})}
     try:
         taxonomy = Taxonomy(
-            tuple(dataclasses.replace(kind, **said) for kind, said in measures.items())
+            tuple(dataclasses.replace(kind, **values) for kind, values in measures.items())
         )
     except CatalogError as error:
         raise CatalogError(
@@ -310,22 +312,21 @@ def data_folder() -> Traversable:
 
 
 @functools.lru_cache
-def _parsed(content: str, where: str) -> Catalog:
-    return _catalog(parse_toml(content, where), where)
-
-
-def _catalog(content: dict[str, Any], where: str) -> Catalog:
+def _parse_catalog(text: str, where: str) -> Catalog:
+    """Return the checked catalogue of a TOML text."""
+    content = parse_toml(text, where)
     where = f"catalogue {where}"
     check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
-    own = _classes(content.get("classes", []), where)
+    own_classes = _classes(content.get("classes", []), where)
     try:
-        taxonomy = paper_taxonomy().extended(own)
+        taxonomy = paper_taxonomy().extended(own_classes)
         if "metric_crs" in content:
             require_metric_crs(content["metric_crs"])
     except (CatalogError, CrsError) as error:
         raise CatalogError(f"{where}: {error}") from error
     taxonomy = taxonomy.with_ranges(_ranges(content.get("ranges", {}), taxonomy, where))
     plain = {key: value for key, value in content.items() if CATALOG_KEYS[key] is str}
+    # Values of the catalogue that its layers inherit.
     shared: dict[str, Any] = {
         key: plain[key] for key in ("license", "attribution", "reader") if key in plain
     }
@@ -371,7 +372,7 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
 
 
 def _ranges(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> dict[str, float]:
-    """Return the ranges that a catalogue gives to classes outside their own tables."""
+    """Return the visibility ranges in metres of the table ``ranges``."""
     ranges = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
     double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
     if double is not None:

@@ -12,8 +12,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.geometry import FULL_TURN, HALF_TURN
+from semsig_gis.core import FULL_TURN, HALF_TURN, CrsError, InputError
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.layer_spec import LayerSpec
 from semsig_gis.sources.paths import FILE_SUFFIXES
@@ -29,16 +28,16 @@ if TYPE_CHECKING:
 
 NUMBERS = re.compile(r"[\s\d.,;eE+-]*\d[\s\d.,;eE+-]*")
 T = TypeVar("T", shapely.Polygon | shapely.MultiPolygon, "NDArray[np.object_]")
-# How a user asks for the box that a file says it covers.
+# The text by which a user requests the bounding box that a file states.
 BOX = "box"
 METRES_A_DEGREE = 111_195.0  # of latitude
 POLYGONAL = {"Polygon", "MultiPolygon"}
 
 
 def parse_area(text: str | gpd.GeoDataFrame) -> Area:
-    """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or a file of them."""
+    """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or of a file."""
     if isinstance(text, gpd.GeoDataFrame):
-        return _joined(text.geometry, "the table", name="table", kind="table")
+        return _area_of(text.geometry, "the table", name="table", kind="table")
     if NUMBERS.fullmatch(text):
         return _box(text)
     if names_place(text):
@@ -50,14 +49,14 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
 
 
 def names_place(text: str) -> bool:
-    """Tell whether a text names a place: it is neither numbers nor a file, even a missing one."""
+    """Whether a text is the name of a place, not numbers and not a path, existing or missing."""
     path = Path(text)
     is_file = path.suffix.lower() in FILE_SUFFIXES or path.is_file()
     return not is_file and not NUMBERS.fullmatch(text)
 
 
 def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tuple[RawLayer, ...]:
-    """Leave out what is outside an area.
+    """Remove the rows outside an area.
 
     Parameters
     ----------
@@ -65,13 +64,13 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
         The layers.
     text : str or GeoDataFrame
         ``west,south,east,north`` in degrees, the path of a file with polygons, a table of them, or
-        ``"box"`` for the boxes that OpenStreetMap files say they cover.
+        ``"box"`` for the bounding boxes that OpenStreetMap files state.
 
     Returns
     -------
     tuple of RawLayer
-        The layers; rows outside count as such. InputError if the area is none, or no file says
-        its box.
+        The layers; their counts include the rows outside. InputError if the area is not valid, or
+        no file states its box.
 
     Examples
     --------
@@ -95,19 +94,19 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
 
 
 def clip_layer(layer: RawLayer, area: Area) -> RawLayer:
-    """Leave out the rows of a layer that are outside an area.
+    """Remove the rows of a layer that are outside an area.
 
-    Objects stay where their centroid is in the area, buildings and streets where they touch it. A
-    row without a position stays.
+    An object is kept if its centroid is in the area, a building or street if it touches the area,
+    and a row without a position always.
     """
     outside, _ = _outside(layer, area)
-    kept = layer.table[~outside].reset_index(drop=True)
+    table = layer.table[~outside].reset_index(drop=True)
     counts = dataclasses.replace(layer.counts, outside=layer.counts.outside + int(outside.sum()))
-    return dataclasses.replace(layer, table=kept, counts=counts)
+    return dataclasses.replace(layer, table=table, counts=counts)
 
 
 def note_outside(layer: RawLayer) -> RawLayer:
-    """Tell of rows outside the box that the source says it covers, which may be mistakes."""
+    """Add a note on rows outside the bounding box that the source states; they may be errors."""
     if layer.extent is None:
         return layer
     outside, places = _outside(layer, layer.extent)
@@ -122,7 +121,7 @@ def note_outside(layer: RawLayer) -> RawLayer:
 
 
 def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np.object_]]:
-    """Tell which rows of a layer are outside an area, and where these are, narrowed."""
+    """Return which rows are outside an area, and their geometries as of `_narrowed`."""
     geometry = layer.table.geometry.to_crs(WGS84).to_numpy()
     shapely.prepare(area.polygon)
     outside = ~(shapely.is_missing(geometry) | shapely.is_empty(geometry))
@@ -132,16 +131,18 @@ def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np
         places = shapely.centroid(places)
     narrowed = _narrowed(area.polygon, area)
     shapely.prepare(narrowed)
-    apart = ~shapely.intersects(narrowed, places)
-    outside[outside] = apart
-    return outside, places[apart]
+    # The rows so far are not covered by the area; of these, keep the ones that do not touch it.
+    disjoint = ~shapely.intersects(narrowed, places)
+    outside[outside] = disjoint
+    return outside, places[disjoint]
 
 
 def _narrowed(geometry: T, area: Area) -> T:
-    """Return geometries in degrees as wide as these are around an area, as lengths are there."""
+    """Return geometries with longitudes scaled to the length of a degree of latitude."""
+    # One scale for the whole area: that of its middle latitude.
     _, south, _, north = area.bounds
-    width = np.array([math.cos(math.radians((south + north) / 2)), 1.0])
-    narrowed: T = shapely.transform(geometry, lambda xy: xy * width)
+    scale = np.array([math.cos(math.radians((south + north) / 2)), 1.0])
+    narrowed: T = shapely.transform(geometry, lambda xy: xy * scale)
     return narrowed
 
 
@@ -152,7 +153,7 @@ def _box(text: str) -> Area:
         raise InputError(
             f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
         ) from error
-    # What seems to go round more than half of the Earth is a slip.
+    # A box that crosses 180 degrees and is wider than half of the Earth is taken for an error.
     across = east < west and east + FULL_TURN - west < HALF_TURN
     on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
     if not (on_earth and (west < east or across)) or not (
@@ -164,7 +165,7 @@ def _box(text: str) -> Area:
             "north within -90 to 90."
         )
     spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
-    boxes = [shapely.box(left, south, right, north) for left, right in spans if left < right]
+    boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
     return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
 
 
@@ -175,11 +176,11 @@ def _outline(path: Path) -> Area:
         raise InputError(
             f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
         )
-    return _joined(layer.table.geometry, str(path), name=path.stem, kind="file")
+    return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
 
 
-def _joined(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
-    """Return the area of polygons, which are all that there may be."""
+def _area_of(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:
+    """Return the area of polygons; InputError if there are other geometries, or no area."""
     if shapes.crs is None:
         raise CrsError(f"{where} has no coordinate reference system; state it with set_crs.")
     geometry = shapes.dropna()

@@ -8,7 +8,7 @@ import gzip
 import zlib
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
     from pathlib import Path

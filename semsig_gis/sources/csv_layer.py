@@ -1,4 +1,4 @@
-"""Layers in CSV files: where a row says its position, and what it is."""
+"""Layers of CSV files: the columns of positions, and the rows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.rows import (
@@ -37,26 +37,26 @@ if TYPE_CHECKING:
 
     Row = Mapping[str, str | None]
 
-# Degrees go before a plane's coordinates where a file has both, and both before a shape.
+# In order of priority: degrees, coordinates in a plane, and then columns of geometries.
 KNOWN_NAMES = (
     (("lon", "longitude"), ("lat", "latitude")),
     (("x",), ("y",)),
     (("long", "lng"), ("lat", "latitude")),
 )
 SHAPE_NAMES = ("wkt", "geom", "geometry", "the_geom")
-# Well-known text, extended by the code of its CRS or not, and the same in bytes.
+# Well-known text with or without the code of its CRS, and well-known binary as hexadecimal.
 WELL_KNOWN = re.compile(r"\s*(?:SRID\s*=\s*(\d+)\s*;)?\s*([A-Za-z].*)", re.DOTALL | re.IGNORECASE)
 HEXADECIMAL = re.compile(r"\s*((?:[0-9A-Fa-f]{2}){5,})\s*")
-LONGEST_SHOWN = 40
-NO_GEOMETRY = "None"  # GDAL's word for it
+MOST_SHOWN_CHARACTERS = 40
+NO_GEOMETRY = "None"  # the geometry type of GDAL for a table without geometry
 
 
 @dataclass(slots=True)
 class CsvTable:
     """A CSV file, its separator, and the columns of its positions.
 
-    Those are two coordinates, x being easting or longitude, or a shape in well-known text. `srid`
-    is the code of the CRS that the shapes state, once one has been read.
+    These are coordinates `x` (easting or longitude) and `y`, or `shape`, a geometry in well-known
+    text. `srid` is the EPSG code that the geometries state, known after one has been read.
     """
 
     file: CsvFile
@@ -73,12 +73,12 @@ class CsvTable:
 
     @property
     def has_positions(self) -> bool:
-        """Whether there are columns for them."""
+        """Whether the file has columns of positions."""
         return bool((self.x and self.y) or self.shape)
 
     @property
     def crs(self) -> CRS | None:
-        """The CRS that the shapes state; SourceError where nobody knows it."""
+        """The CRS that the geometries state, or None; SourceError if it is unknown."""
         if not self.srid:
             return None
         try:
@@ -89,7 +89,7 @@ class CsvTable:
             ) from error
 
     def survey(self) -> tuple[int, str]:
-        """Read all rows; return their number and what they are, in the words of GDAL."""
+        """Read all rows; return their number and their geometry type in the terms of GDAL."""
         number, kinds = 0, set()
         for row in self.rows():
             number += 1
@@ -101,11 +101,11 @@ class CsvTable:
         return number, min(kinds) if len(kinds) == 1 else "Unknown"
 
     def rows(self) -> Iterator[Row | str]:
-        """Yield every row by the names of its columns, or what is wrong with it."""
+        """Yield every row as values by column name, or the text of its error."""
         return self.file.rows(self.separator)
 
     def position(self, row: Row) -> Position:
-        """Return the position of a row, or None where it is blank."""
+        """Return the position of a row, or None if it is blank."""
         texts = [(name, (row[name] or "").strip()) for name in (self.x, self.y, self.shape) if name]
         if not any(text for _, text in texts):
             return None
@@ -125,7 +125,7 @@ class CsvTable:
 
     def _shape(self, text: str) -> Position:
         try:
-            with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+            with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
                 if code := HEXADECIMAL.fullmatch(text):
                     shape = shapely.from_wkb(code[1])
                     srid = int(shapely.get_srid(shape))
@@ -134,7 +134,7 @@ class CsvTable:
                     shape, srid = shapely.from_wkt(plain), int(stated or 0)
         except (AttributeError, shapely.errors.ShapelyError) as error:
             raise BadFeatureError(
-                f"{self.shape} {text[:LONGEST_SHOWN]!r} is not well-known text"
+                f"{self.shape} {text[:MOST_SHOWN_CHARACTERS]!r} is not well-known text"
             ) from error
         self.srid = self.srid or srid
         if srid not in {0, self.srid}:
@@ -149,7 +149,10 @@ class CsvTable:
 def csv_table(
     open_: Callable[[], IO[bytes]], spec: LayerSpec | None, *, what: str, where: str
 ) -> CsvTable:
-    """Look at a CSV file; SourceError if `spec` is given and no column for positions is found."""
+    """Find the columns of positions in a CSV file.
+
+    SourceError if `spec` is given and there are none.
+    """
     file = open_csv(open_, what)
     if spec is not None and (spec.x_field or spec.y_field):
         return _stated_table(file, spec.x_field, spec.y_field, where=where)
@@ -158,7 +161,7 @@ def csv_table(
             x, y = _first(names, x_names), _first(names, y_names)
             if x and y:
                 return CsvTable(file, separator, x, y)
-    # Shapes hold semicolons and commas, but no tabs.
+    # Geometries contain semicolons and commas but no tabs, so try the tab first.
     for separator, names in reversed(list(file.layouts.items())):
         if shape := _first(names, SHAPE_NAMES):
             return CsvTable(file, separator, shape=shape)
@@ -171,7 +174,7 @@ def csv_table(
 
 
 def _stated_table(file: CsvFile, x: str | None, y: str | None, *, where: str) -> CsvTable:
-    """Return the table by the columns that the catalogue names."""
+    """Return the table with the columns of coordinates that the catalogue names."""
     if not (x and y):
         raise CatalogError(
             f"{where} has only one of x_field and y_field in the catalogue; state both."
@@ -185,14 +188,14 @@ def _stated_table(file: CsvFile, x: str | None, y: str | None, *, where: str) ->
     return CsvTable(file, file.separator, x, y)
 
 
-def _first(names: tuple[str, ...], wanted: tuple[str, ...]) -> str | None:
-    return next((name for name in names if name.lower() in wanted), None)
+def _first(names: tuple[str, ...], known_names: tuple[str, ...]) -> str | None:
+    return next((name for name in names if name.lower() in known_names), None)
 
 
 def read_csv_layer(
     table: CsvTable, spec: LayerSpec, *, filters: bool, crs: str | None, where: str
 ) -> RawLayer:
-    """Read the layer that a CSV file is."""
+    """Read the layer of a CSV file."""
     rules = RowRules(spec, table.names, filters=filters, where=where)
     rows = Rows()
     for row in table.rows():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.sources.files import file_reader
 from semsig_gis.sources.paths import files_in, require_file
 from semsig_gis.sources.probe import probe_file

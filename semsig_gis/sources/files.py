@@ -8,8 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.core.plugins import installed_readers
+from semsig_gis.core import SourceError, UnknownNameError, installed_readers, nearest_name
 from semsig_gis.sources.osm import features
 from semsig_gis.sources.paths import files_in
 from semsig_gis.sources.probe import probe_file
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer_spec import LayerSpec
 
 PACKAGE = __name__.rpartition(".")[0]
-# The module of this package that reads what a catalogue's `reader` names.
+# Module of this package that contains the function `read_layers` of a reader.
 READERS = {
     "arcgis": "services.layers",
     "ckan": "services.layers",
@@ -37,19 +36,18 @@ READERS = {
     "wfs": "services.layers",
 }
 
-# Those of them that take several files at once, which are extracts of one map, and those that need
-# not read what is outside an `area`.
+# Readers that read several files as one map, and readers that can skip rows outside an `area`.
 MERGING = frozenset({"mapillary", "osm_features", "osm_file", "overpass", "overture"})
 PRUNING = frozenset({"overture"})
 
-# The reader whose layers are told by their tags, whatever kind of file has them.
+# The reader of layers that are selected by tags, in a file of any format.
 TAGS_READER = "osm_file"
-# Layers of the same files that a message names.
-NAMES_TOLD = 4
+# Number of layers with the same files that a message lists.
+MOST_NAMES = 4
 
 
 def reader(name: str) -> Reader:
-    """Return a built-in reader, or one of the entry-point group ``semsig_gis.readers``, by name."""
+    """Return a built-in reader, or one of the entry points ``semsig_gis.readers``, by name."""
     if name in READERS:
         read: Reader = importlib.import_module(f"{PACKAGE}.{READERS[name]}").read_layers
         return read
@@ -85,13 +83,13 @@ def find_files(
     Parameters
     ----------
     specs : iterable of LayerSpec
-        Layers to look for, by the file-name patterns in ``files`` (in upper or lower case).
+        Layers to look for, by the file-name patterns in ``files`` (case is ignored).
     paths : iterable of str or Path
-        Files, and folders to look in, not in the folders below them but for partitions such as
-        ``theme=base``. A file given by itself goes before one found in a folder. Of a folder's
-        files, a layer takes those that match the first of its patterns that any matches; of
-        extracts of a map, all that match, and of OpenStreetMap vector files with columns of tags,
-        too, in a folder if it holds no file of any pattern.
+        Files, and folders to look in. Of their subfolders, only partitions such as
+        ``theme=base`` are searched. A file that is given directly has priority over the files of
+        folders. Of these, a layer gets the matches of its first pattern that matches a file. A
+        layer of a map gets the extracts that match any pattern, and vector files with columns of
+        OpenStreetMap tags; in a folder only if no file of the folder matches a pattern.
 
     Returns
     -------
@@ -99,8 +97,8 @@ def find_files(
         Layers and their files, in the order of `specs`. One file may hold several layers, and a
         layer of OpenStreetMap may be in several extracts.
     missing : tuple of LayerSpec
-        Layers that no file matches. SourceError if a path does not exist or matches no layer, or
-        several files match another layer whose ids are not unique.
+        Layers without a file. SourceError if a path does not exist or matches no layer, or if
+        several files match a layer that can have only one.
 
     Examples
     --------
@@ -109,15 +107,15 @@ def find_files(
     'trees'
     """
     specs = tuple(specs)
-    files, in_folders, tagged = _sorted_out(specs, paths)
+    files, in_folders, tagged = _group_paths(specs, paths)
     pairs: list[tuple[LayerSpec, Path]] = []
     missing = []
     for spec in specs:
-        by_hand = [path for path in files if _matches(path, spec.files)]
+        direct_files = [path for path in files if _matches(path, spec.files)]
         merging = spec.reader in MERGING
         patterns = (spec.files,) if merging else tuple((pattern,) for pattern in spec.files)
         in_folder = ([path for path in in_folders if _matches(path, any_)] for any_ in patterns)
-        candidates = by_hand or next(filter(None, in_folder), [])
+        candidates = direct_files or next(filter(None, in_folder), [])
         if spec.reader == TAGS_READER:
             candidates = [*candidates, *tagged]
         if len(candidates) > 1 and not (spec.unique_id or merging):
@@ -129,10 +127,10 @@ def find_files(
     return tuple(pairs), tuple(missing)
 
 
-def _sorted_out(
+def _group_paths(
     specs: Sequence[LayerSpec], paths: Iterable[str | Path]
 ) -> tuple[list[Path], list[Path], list[Path]]:
-    """Return files that are given and of a layer's name, those in folders, and those with tags."""
+    """Return the files given directly, the files in folders, and the files with tags."""
     files: list[Path] = []
     in_folders: list[Path] = []
     tagged: list[Path] = []
@@ -143,9 +141,9 @@ def _sorted_out(
         if any(_matches(file, spec.files) for file in inside for spec in specs):
             (in_folders if path.is_dir() else files).extend(inside)
             continue
-        with_tags = [file for file in inside if _has_tags(file, specs, forgiving=path.is_dir())]
+        with_tags = [file for file in inside if _has_tags(file, specs, skip_damaged=path.is_dir())]
         if not with_tags:
-            _refuse(path, specs)
+            _refuse_unmatched(path, specs)
         tagged.extend(with_tags)
     return files, in_folders, tagged
 
@@ -155,25 +153,25 @@ def _matches(path: Path, patterns: Iterable[str]) -> bool:
     return any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
 
 
-def _has_tags(path: Path, specs: Iterable[LayerSpec], *, forgiving: bool) -> bool:
-    """Tell whether a file of no layer's name has tags, where some layer is told by them."""
+def _has_tags(path: Path, specs: Iterable[LayerSpec], *, skip_damaged: bool) -> bool:
+    """Whether a file has OpenStreetMap tags and a layer is selected by tags."""
     if all(spec.reader != TAGS_READER for spec in specs):
         return False
-    with contextlib.suppress(*([SourceError] if forgiving else [])):
+    with contextlib.suppress(*([SourceError] if skip_damaged else [])):
         return file_reader(path) is not None
     return False
 
 
-def _refuse(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
+def _refuse_unmatched(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
     patterns: dict[tuple[str, ...], list[str]] = {}
     for spec in specs:
         patterns.setdefault(spec.files, []).append(spec.name)
-    known = ", ".join(
-        f"{', '.join(names if len(names) <= NAMES_TOLD else (*names[:NAMES_TOLD], '...'))} "
+    layers = ", ".join(
+        f"{', '.join(names if len(names) <= MOST_NAMES else (*names[:MOST_NAMES], '...'))} "
         f"({', '.join(files)})"
         for files, names in patterns.items()
     )
     verb = "contains no file of" if path.is_dir() else "is not the file of"
     tags = any(spec.reader == TAGS_READER for spec in specs)
     more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
-    raise SourceError(f"{path} {verb} any layer; the layers and their files are {known}{more}.")
+    raise SourceError(f"{path} {verb} any layer; the layers and their files are {layers}{more}.")

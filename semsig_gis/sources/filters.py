@@ -1,4 +1,4 @@
-"""What a catalogue accepts of a tag or a field: values, patterns, comparisons, or nothing there."""
+"""Conditions of catalogues on tags and fields: values, patterns, comparisons, absence."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import CatalogError
+from semsig_gis.core import CatalogError
 from semsig_gis.sources.numbers import decimal
 
 if TYPE_CHECKING:
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 
 
 Value = str | int | float | bool
-# What is accepted of each of several tags or fields.
+# Tags or fields, each with its accepted values.
 Rules = tuple[tuple[str, tuple[Value, ...]], ...]
-# Stands for every value but "no".
+# Accepts every value except "no".
 ANY_VALUE = "*"
-# Stands for a tag or a field that is absent or empty.
+# Accepts an absent or empty tag or field.
 NO_VALUE = "none"
-# A value that a catalogue writes between slashes is a pattern.
+# A value between slashes is a regular expression.
 BETWEEN_SLASHES = re.compile(r"/(.+)/")
 SIGNS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 NUMBER = r"(-?\d+(?:\.\d+)?)"
 COMPARISON = re.compile(rf"(<=?|>=?)\s*{NUMBER}")
-# What begins so is meant as a comparison.
+# A text that starts like this is meant as a comparison.
 COMPARES = re.compile(r"[<>=≤≥≠]|!=")
 # The lowest and highest of several numbers, as in "0-2".
 RANGE = re.compile(rf"\s*{NUMBER}\s*-\s*{NUMBER}\s*")
@@ -36,10 +36,10 @@ RANGE = re.compile(rf"\s*{NUMBER}\s*-\s*{NUMBER}\s*")
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """The alternatives that a catalogue accepts of a tag or a field.
+    """Alternatives that a catalogue accepts for a tag or a field.
 
-    `values` are accepted exactly, or as patterns; `comparisons` are signs and numbers; `nothing`
-    says whether the tag or field may be absent or empty.
+    `values` are exact values or patterns, `comparisons` are signs and numbers, and `nothing` is
+    whether the tag or field may be absent or empty.
     """
 
     values: tuple[Value, ...]
@@ -48,7 +48,7 @@ class Condition:
 
     @classmethod
     def parse(cls, accepted: Iterable[Value]) -> Condition:
-        """Return what a catalogue writes, as ``">=0 or none"``; CatalogError says what is wrong."""
+        """Parse the values of a catalogue, such as ``">=0 or none"``; CatalogError if not valid."""
         values: list[Value] = []
         comparisons = []
         parts = [part for value in accepted for part in _alternatives(value)]
@@ -63,15 +63,15 @@ class Condition:
                     f"'/{re.escape(text)}/' for that very text."
                 )
             elif part != NO_VALUE:
-                pattern_of(text)  # which refuses one that is none
+                pattern_of(text)  # raises if the pattern is not valid
                 values.append(part)
         return cls(tuple(values), tuple(comparisons), nothing=NO_VALUE in parts)
 
     def accepts(self, value: object, *, every: bool = False) -> bool:
-        """Tell whether a value is among the alternatives.
+        """Whether a value is among the alternatives.
 
-        A value may list several numbers, as the levels ``"-1;0"`` or ``"0-2"``; one that passes a
-        comparison is enough, unless `every` of them has to.
+        Of a value with several numbers, such as the levels ``"-1;0"`` or ``"0-2"``, one must pass
+        a comparison, or with `every` all of them.
         """
         if value is None:
             return self.nothing
@@ -91,7 +91,7 @@ class Condition:
 
 
 def _alternatives(value: Value) -> list[Value]:
-    """Return the parts of a text that is several alternatives, else the value itself."""
+    """Return the alternatives of a text such as ``">=0 or none"``, or the value unchanged."""
     if not isinstance(value, str) or BETWEEN_SLASHES.fullmatch(value):
         return [value]
     parts = [part.strip() for part in re.split(r"\sor\s", value)]
@@ -100,20 +100,19 @@ def _alternatives(value: Value) -> list[Value]:
 
 
 def _numbers(value: object) -> list[float]:
-    """Return the numbers that a value lists, NaN for a part that is none."""
+    """Return the numbers of a value, NaN for a part that is not a number."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return [float(value)]
-    return [number for part in str(value).split(";") for number in _numbers_of(part)]
-
-
-def _numbers_of(part: str) -> list[float]:
-    several = RANGE.fullmatch(part)
-    if several:
-        return [float(number) for number in several.groups()]
-    try:
-        return [decimal(part)]
-    except ValueError:
-        return [math.nan]
+    numbers: list[float] = []
+    for part in str(value).split(";"):
+        if limits := RANGE.fullmatch(part):
+            numbers += map(float, limits.groups())
+            continue
+        try:
+            numbers.append(decimal(part))
+        except ValueError:
+            numbers.append(math.nan)
+    return numbers
 
 
 def _is_blank(value: object) -> bool:
@@ -132,10 +131,10 @@ def as_text(value: object) -> str:
 
 
 def matches(value: object, accepted: Value) -> bool:
-    """Tell whether a field value is the one a catalogue names.
+    """Whether a field value matches a value of a catalogue.
 
-    Text compares as text and numbers as numbers, so that 3 is found in a text field and "3" in a
-    numeric one. A text between slashes is a regular expression for the whole value.
+    A text is compared as text and a number as a number, so that 3 matches in a text field and "3"
+    in a numeric field. A text between slashes is a regular expression for the whole value.
     """
     if value is None:
         return False
@@ -153,7 +152,7 @@ def matches(value: object, accepted: Value) -> bool:
 
 @functools.lru_cache
 def pattern_of(accepted: str) -> re.Pattern[str] | None:
-    """Return the pattern that a text between slashes is; CatalogError if it is not valid."""
+    """Return the pattern of a text between slashes, else None; CatalogError if not valid."""
     inner = BETWEEN_SLASHES.fullmatch(accepted)
     try:
         return re.compile(inner[1]) if inner else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.core.display import Displayed
+from semsig_gis.core import Displayed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RowCounts:
-    """How many rows a layer has, and how many of them are left out for each reason.
+    """Number of rows of a layer, and of rows left out for each reason.
 
-    Rows are `unreadable`, `filtered` (by the catalogue), `excluded` (by what the catalogue says in
-    ``not``), `outside` (of the area that is fetched or clipped to), `missing` (without a
-    geometry), `duplicates` (the id of an earlier row, where ids are unique), `misplaced` (off the
-    Earth, far from all others, or not finite in the metric CRS), `collapsed` (at the place of
-    another object of the class, or an area around it) or `conflated` (merged into an object of an
-    earlier layer).
+    Rows are `unreadable`, `filtered` (by the catalogue), `excluded` (by ``not`` of the catalogue),
+    `outside` (of the area that is fetched or clipped to), `missing` (without a geometry),
+    `duplicates` (with the id of an earlier row, where ids are unique), `misplaced` (off the Earth,
+    far from all others, or not finite in the metric CRS), `collapsed` (at the place of another
+    object of the class, or an area around it) or `conflated` (merged into an object of an earlier
+    layer).
     """
 
     read: int
@@ -42,32 +42,32 @@ class RowCounts:
 
     @property
     def kept(self) -> int:
-        """Number of the others."""
+        """Number of rows that are not left out."""
         dropped: int = sum(astuple(self)[1:])
         return self.read - dropped
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RawLayer(Displayed):
-    """One layer as its reader found it.
+    """One layer as a reader returns it.
 
     Parameters
     ----------
     spec : LayerSpec
-        What the catalogue says of the layer.
+        Description of the layer in the catalogue.
     table : GeoDataFrame
-        One row a feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
-        None), in the CRS of the source; ``half_width`` (metres from the centre line, or NaN)
-        where the catalogue says something about the widths of streets, and ``name``, empty where
-        there is none, where it says which field holds the names of streets.
+        One row per feature: ``class_name``, ``source_id`` and ``geometry`` (of any type, empty, or
+        None), in the CRS of the source. For streets also ``half_width`` (metres from the centre
+        line, or NaN) and ``name`` (empty if there is none), where the catalogue gives widths or
+        the field of names.
     counts : RowCounts
-        Features in the source, and those that are not in the table; ``counts.kept == len(table)``.
+        Number of rows in the source and of rows left out; ``counts.kept == len(table)``.
     errors : tuple of str
-        What was wrong with features that could not be read, the first ten of them.
+        Errors of the first ten rows that could not be read.
     notes : tuple of str
-        Where the source differs from what the catalogue expects of it.
+        Differences between the source and the expectations of the catalogue.
     extent : Area, optional
-        The box that the source says it covers, where it says so.
+        Bounding box that the source states.
 
     Examples
     --------
@@ -96,9 +96,9 @@ class RawLayer(Displayed):
 
 
 class Reader(Protocol):
-    """What a reader is: a function that reads layers from one file in one pass.
+    """A function that reads layers from one file in one pass.
 
-    Those of `MERGING` take several files, too, and those of `PRUNING` an `area`.
+    The readers in `MERGING` also take several files, the readers in `PRUNING` an `area`.
     """
 
     def __call__(
@@ -110,4 +110,4 @@ class Reader(Protocol):
         crs: str | None = None,
         **within: Area | None,
     ) -> tuple[RawLayer, ...]:
-        """Return one layer for each of `specs`; `crs` is for a file that states none."""
+        """Return one layer for each of `specs`; `crs` applies to a file that states none."""

@@ -1,4 +1,4 @@
-"""Layers of catalogues: which files and rows hold a class of object, buildings or streets."""
+"""Layers of catalogues: the files and rows of a class of objects, of buildings or streets."""
 
 from __future__ import annotations
 
@@ -8,34 +8,31 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import (
-    CatalogError,
-    UnknownNameError,
-)
+from semsig_gis.core import CatalogError, UnknownNameError
 from semsig_gis.sources.filters import COMPARES, Condition, Value
-from semsig_gis.storage.toml import check_keys, metres, one_of, texts
+from semsig_gis.storage import check_keys, metres, one_of, texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
     from semsig_gis.sources.filters import Rules
 
 
 GeometryKind = Literal["point", "line", "polygon"]
 ElementKind = Literal["node", "way", "relation"]
 Role = Literal["objects", "buildings", "streets"]
-# No street is narrower or wider; the number is in another unit, or means something else.
+# Plausible widths of a street; other numbers have another unit or another meaning.
 MIN_WIDTH_M = 0.1
 MAX_WIDTH_M = 200.0
 
 
 @dataclass(frozen=True, slots=True)
 class ClassBy:
-    """A field whose value decides the class of a row.
+    """A field that decides the class of a row by its value.
 
-    Rows of other values, and of values without a class, are left out, unless `otherwise` gives the
-    former the layer's class.
+    Values with an empty class are left out. Unlisted values are left out, too, or get the class of
+    the layer with `otherwise`.
     """
 
     field: str
@@ -45,9 +42,9 @@ class ClassBy:
 
 @dataclass(frozen=True, slots=True)
 class WidthBy:
-    """A field that says of which class a street is, and how wide the streets of a class are.
+    """A field that decides the width of a street by its value.
 
-    Widths are in metres; `default` is for other values, None where nobody knows.
+    Widths are in metres; `default` is the width for other values, None if it is unknown.
     """
 
     field: str
@@ -62,47 +59,47 @@ class LayerSpec:
     Parameters
     ----------
     name, class_name : str
-        Name of the layer in the catalogue, and class of its rows; empty where `class_by` says it
-        of every row, and for surroundings.
+        Name of the layer in the catalogue, and class of its rows; empty where `class_by` decides
+        the class of every row, and for surroundings.
     files : tuple of str
-        File-name patterns (``*``, ``?``) by which the layer's file is recognised.
+        Name patterns (``*``, ``?``) of the layer's file.
     layer : str, optional
         Layer inside a file that holds several.
     where, exclusions : tuple of (str, tuple)
-        Fields or tags and the values of each: of `where`, all must hold for a row to count, and of
-        `exclusions`, none. Values are exact, except texts between slashes (a regular expression
-        that the whole value must match), comparisons such as ``">=0"``, ``"none"`` (absent or
-        empty) and ``"*"`` (every value but ``"no"``).
+        Fields or tags with accepted values. A row counts if it meets all conditions of `where` and
+        no condition of `exclusions`. Values are exact, except texts between slashes (a regular
+        expression for the whole value), comparisons such as ``">=0"``, ``"none"`` (absent or
+        empty) and ``"*"`` (every value except ``"no"``).
     class_by : ClassBy, optional
         Field that decides the class row by row.
     width_by, width_field : WidthBy, str, optional
-        Of streets: the field that says how wide they are by its class of street, and the one that
-        holds their width in metres, which goes first.
+        For streets: the field that decides the width by its value, and the field of the width in
+        metres, which has priority.
     name_field : str, optional
-        Of streets: the field that holds their name.
+        For streets: the field of the name.
     id_field, unique_id : str, bool, optional
-        Field that identifies a row in its source (else the feature's number does), and whether rows
-        of the same id are the same object, also across several files.
+        Field that identifies a row in its source (by default the number of the feature), and
+        whether rows with the same id are the same object, also in several files.
     geometry, crs, rows : {"point", "line", "polygon"}, str, tuple of (int, int), optional
-        What is expected: geometry, CRS (used where the file states none), and the least and largest
-        number of rows.
+        Expected geometry, CRS (used if the file states none), and minimum and maximum number of
+        rows.
     x_field, y_field : str, optional
         Coordinate columns of a CSV file.
     aliases : tuple of (str, tuple of str)
-        Fields and the names that they go by in other editions of the file (Opendatasoft only).
+        Fields and their names in other editions of the file (Opendatasoft only).
     dataset, server_where, select : str, str, tuple of str, optional
-        Name of the dataset on its portal, filter in the portal's own language, and fields to ask
-        for.
+        Name of the dataset on its portal, filter in the query language of the portal, and fields
+        to request.
     tags, elements : tuple of tuple of (str, tuple of str), tuple of {"node", "way", "relation"}
-        OpenStreetMap elements that count, and their tags: alternatives, each of keys and accepted
-        values that must all hold; the value ``"*"`` accepts every value but ``"no"``.
+        Alternatives of OpenStreetMap tags, and kinds of element. An element counts if it has all
+        tags of one alternative; the value ``"*"`` accepts every value except ``"no"``.
     role : {"objects", "buildings", "streets"}
-        Street objects, footprints that hide them, or centre lines. Only objects have a class.
+        Street objects, footprints of buildings, or centre lines. Only objects have a class.
     optional, reader, note : bool, str, str
-        Whether the layer is read only when it is named, the reader of its file, and a remark for
-        people.
+        Whether the layer is read only on request, the reader of its file, and a remark for
+        users.
     license, attribution : str
-        Licence of the data and the line that its publisher asks for.
+        Licence of the data and the credit line that its publisher requires.
 
     Examples
     --------
@@ -142,12 +139,12 @@ class LayerSpec:
 
     @property
     def has_width(self) -> bool:
-        """Whether something is said about the widths of streets."""
+        """Whether a field gives the widths of streets."""
         return self.width_by is not None or self.width_field is not None
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """The classes that objects of the layer may have."""
+        """Classes that objects of the layer may have."""
         by = self.class_by
         if by is None:
             return (self.class_name,) if self.role == "objects" else ()
@@ -156,12 +153,12 @@ class LayerSpec:
 
     @property
     def terms(self) -> str:
-        """Whom to name for the layer, and under which licence."""
+        """Attribution and licence of the layer."""
         return f"{self.attribution or 'no attribution given'} ({self.license})"
 
     @property
     def fields(self) -> tuple[tuple[str, str], ...]:
-        """The keys that name a field of the file, but for coordinates, and the fields."""
+        """Pairs of a catalogue key and the field it names, without fields of coordinates."""
         uses = [("where", field) for field, _ in self.where]
         uses += [("not", field) for field, _ in self.exclusions]
         uses += [("class_by", self.class_by.field)] if self.class_by else []
@@ -203,17 +200,17 @@ LAYER_KEYS = {
     "attribution": str,
 }
 CLASS_BY_KEYS = {"field": str, "values": dict}
-OTHERWISE = "class"  # the one thing that class_by may say of other values
+OTHERWISE = "class"  # the only value of the key `otherwise` of class_by
 WIDTH_BY_KEYS = {"field": str, "values": dict, "default": object}
 
 
 def layer_of(
     item: object, where: str, *, taxonomy: Taxonomy, shared: Mapping[str, Any]
 ) -> LayerSpec:
-    """Return the checked layer of a ``[[layers]]`` table; CatalogError says what is wrong in it.
+    """Return the layer of a ``[[layers]]`` table; CatalogError if it is not valid.
 
-    `shared` has files, reader, license, attribution and exclusions of layers that do not say
-    otherwise; surroundings have no exclusions but their own.
+    `shared` has default files, reader, license, attribution and exclusions; the default exclusions
+    do not apply to surroundings.
     """
     if not isinstance(item, dict):
         raise CatalogError(f"{where} has the layer {item!r}; write a [[layers]] table.")
@@ -248,7 +245,7 @@ def layer_of(
     if "not" in item:
         exclusions = conditions_of(item["not"], "not", where)
     plain = {key: value for key, value in item.items() if LAYER_KEYS[key] in {str, bool}}
-    own = {
+    parsed = {
         "class_name": plain.pop("class", ""),
         "role": role,
         "files": files,
@@ -268,17 +265,17 @@ def layer_of(
         "tags": tuple(_tags(tags, where) for tags in item.get("tags", [])),
         "elements": tuple(one_of(kind, "elements", get_args(ElementKind), where) for kind in kinds),
     }
-    return LayerSpec(**{**shared, **plain, **own})
+    return LayerSpec(**{**shared, **plain, **parsed})
 
 
 def _require_classes(
     item: Mapping[str, Any], role: Role, class_by: ClassBy | None, where: str
 ) -> None:
     """Refuse objects without a class, and surroundings with one."""
-    given = "class" in item
-    if role == "objects" and not given and (class_by is None or class_by.otherwise):
+    has_class = "class" in item
+    if role == "objects" and not has_class and (class_by is None or class_by.otherwise):
         raise CatalogError(f"{where} lacks the key 'class'; add it.")
-    if role != "objects" and given:
+    if role != "objects" and has_class:
         raise CatalogError(f"{where} needs no class; remove it.")
 
 
@@ -300,7 +297,7 @@ def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 
 def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
-    """Refuse a class that does not exist, with a CatalogError that offers the nearest name."""
+    """Raise CatalogError for an unknown class, with the nearest name."""
     try:
         taxonomy.by_name(name)
     except UnknownNameError as error:
@@ -337,7 +334,7 @@ def _width_by(item: dict[str, Any], where: str) -> WidthBy:
 
 
 def conditions_of(item: dict[str, Any], key: str, where: str) -> Rules:
-    """Return what is asked of the fields of a table, such as ``where`` or ``not``."""
+    """Return the checked conditions of a table such as ``where`` or ``not``."""
     return tuple((field, _values(accepted, key, field, where)) for field, accepted in item.items())
 
 
@@ -357,7 +354,7 @@ def _values(accepted: object, key: str, field: str, where: str) -> tuple[Value, 
 
 def _rows(item: list[Any], where: str) -> tuple[int, int]:
     match item:
-        # bool is an int to Python, never to a catalogue
+        # True and False are integers in Python, but not in a catalogue
         case [int(least), int(most)] if 0 <= least <= most and bool not in map(type, item):
             return least, most
     raise CatalogError(f"{where} has rows = {item!r}; write [least, most].")

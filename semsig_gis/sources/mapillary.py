@@ -1,4 +1,4 @@
-"""Mapillary: what its cameras saw along the streets, from files or by its Graph API (version 4)."""
+"""Map features of Mapillary along the streets, from files or by its Graph API (version 4)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.area import tiles_of
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
 from semsig_gis.sources.rows import WGS84, RowRules, Rows, raw_layer, settle_crs
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from semsig_gis.sources.rows import Position
 
 FIELDS = ("id", "object_value", "object_type", "geometry", "first_seen_at", "last_seen_at")
-MOST_FEATURES = 2000  # in an answer, which says nothing of the others
-TILE_DEG = 0.02  # boxes may have 0.01 square degrees, but in a city that is too much
+MOST_FEATURES = 2000  # in an answer, which does not show whether there are more
+TILE_DEG = 0.02  # the limit is 0.01 square degrees, but that is too large in a city
 MOST_SPLITS = 6
-TOO_MUCH = 500  # what the service says of a box that it cannot do in time
+TOO_MUCH = 500  # HTTP status for a box that is too large or takes too long
 UNAUTHORIZED = frozenset({400, 401, 403})
 
 
@@ -38,11 +38,11 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of JSON files of map features, one for each of `specs`.
+    """Read the layers of `specs` from JSON files of map features.
 
-    The files are answers of the Graph API, or GeoJSON with the same properties. Features of values
-    that a layer does not want are filtered; those of an id that came before count once. SourceError
-    if a file is neither.
+    The files are answers of the Graph API, or GeoJSON with the same properties. A layer filters
+    features by their values; features with the same id count once. SourceError if a file is
+    neither.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
@@ -71,7 +71,7 @@ def _layer(
 
 
 def _position(feature: dict[str, Any]) -> Position | str:
-    """Return the place of a feature, or what is wrong with it."""
+    """Return the position of a feature, or an error message."""
     try:
         longitude, latitude = feature["geometry"]["coordinates"][:2]
         return float(longitude), float(latitude)
@@ -80,7 +80,7 @@ def _position(feature: dict[str, Any]) -> Position | str:
 
 
 def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:
-    """Read map features, as an answer has them; SourceError if the file holds none."""
+    """Read map features in the form of an answer; SourceError if the file has none."""
     try:
         content = parse_json(path.read_bytes())
         if "data" in content:
@@ -107,19 +107,20 @@ def fetch_layers(
     spec: HttpSpec = DEFAULT_HTTP,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Fetch the map features of layers in an area, and a little more, as files for `read_layers`.
+    """Fetch the map features of layers in an area, and some around it, as files for `read_layers`.
 
-    Values are asked for as layers say in ``server_where``, such as ``"regulatory--*"``. There are
-    no pages: a full answer, or a box that is too much, is asked for again in quarters. What
-    has come is in the cache, so that a run that was interrupted goes on there. SourceError if the
-    service refuses the token or fails.
+    The ``server_where`` of a layer lists the requested values, such as ``"regulatory--*"``. The
+    service has no pages: if an answer is full, or a box is too large, its quarters are requested.
+    Answers are cached, so that a later run continues an interrupted one. SourceError if the service
+    refuses the token or fails.
     """
     host, url = host_of(endpoints[0]), f"{endpoints[0].rstrip('/')}/map_features"
     values = sorted({v for layer in specs for v in (layer.server_where or "").split(",") if v})
     common: dict[str, str | float] = {"fields": ",".join(FIELDS), "limit": MOST_FEATURES}
     if values:
         common["object_values"] = ",".join(values)
-    few = dataclasses.replace(spec, attempts=min(spec.attempts, 2))
+    # A box that is too large fails again, so only the smallest boxes get all attempts.
+    short_spec = dataclasses.replace(spec, attempts=min(spec.attempts, 2))
     waiting = collections.deque(tiles_of(area, TILE_DEG, remedy="give a smaller one"))
     paths: list[Path] = []
     while waiting:
@@ -130,7 +131,7 @@ def fetch_layers(
                 url,
                 params={**common, "bbox": ",".join(f"{side:.7f}" for side in tile.bounds)},
                 cache=cache,
-                spec=spec if last else few,
+                spec=spec if last else short_spec,
                 accept=("application/json", "text/javascript"),
                 check=lambda file: load_features(file, where=f"the answer of {host}"),
             ).path

@@ -1,4 +1,4 @@
-"""Tables of features from GeoParquet files, whoever wrote them."""
+"""Tables of features from GeoParquet files of any writer."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import geopandas as gpd
 import pyarrow.parquet as pq
 import shapely
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.paths import require_file
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, UNREADABLE, require_intact
+from semsig_gis.storage import UNREADABLE, VERIFY_CHECKSUMS, check_footer_checksum
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -21,7 +21,7 @@ SUFFIXES = frozenset({".geoparquet", ".parquet"})
 
 
 def column_names(path: Path) -> list[str]:
-    """Return the names of the columns of a Parquet file; SourceError if it is none."""
+    """Return the column names of a Parquet file; SourceError if it is not one."""
     try:
         names: list[str] = pq.read_schema(path).names
     except UNREADABLE as error:
@@ -38,20 +38,20 @@ def read_parquet(
     columns: Collection[str] | None = None,
     box: Sequence[float] | None = None,
 ) -> gpd.GeoDataFrame:
-    """Read the features of a GeoParquet file, of which it is said what `kind` is needed.
+    """Read the features of a GeoParquet file; `kind` describes them in messages.
 
-    Of `columns`, those that are there are read, and the geometry. SourceError if it cannot be read.
+    Only `columns` that exist are read, and the geometry. SourceError if the file cannot be read.
     """
     require_file(path, f"a file of {kind}")
     try:
-        require_intact(path)
+        check_footer_checksum(path)
         names = None
         if columns is not None:
             schema = pq.read_schema(path)
             geometry = json.loads(schema.metadata[b"geo"])["primary_column"]
             names = [name for name in schema.names if name in columns or name == geometry]
         return gpd.read_parquet(
-            path, columns=names, bbox=None if box is None else tuple(box), **CHECKING_PAGES
+            path, columns=names, bbox=None if box is None else tuple(box), **VERIFY_CHECKSUMS
         )
     except shapely.errors.ShapelyError as error:
         cause = str(error).partition(": ")[2] or str(error)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Files with another suffix (.dbf, .prj, a README) accompany data and are not opened on their own.
+# Other files (.dbf, .prj, a README) only accompany data.
 FILE_SUFFIXES = frozenset(
     {".bz2", ".csv", ".fgb", ".geojson", ".geoparquet", ".gml", ".gpkg", ".gz", ".json",
      ".osm", ".parquet", ".pbf", ".shp", ".zip"}
@@ -18,14 +18,14 @@ FILE_SUFFIXES = frozenset(
 
 
 def require_file(path: Path, kind: str) -> None:
-    """Refuse a path that is not a file, with a SourceError that says which kind is needed."""
+    """Raise SourceError if a path is not a file; `kind` describes the file that is needed."""
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist"
         raise SourceError(f"{path} {what}; give {kind}.")
 
 
 def files_in(folder: Path) -> list[Path]:
-    """Return the data in a folder, and in the partitions of a dataset that it is, sorted."""
+    """Return the data files in a folder and its partitions such as ``theme=base``, sorted."""
     parts = (
         files_in(path) if "=" in path.name and path.is_dir() else [path]
         for path in folder.iterdir()

@@ -1,4 +1,4 @@
-"""From the rows that a reader collects to a `RawLayer`, column by column."""
+"""Build a `RawLayer` from the rows that a reader collects, column by column."""
 
 from __future__ import annotations
 
@@ -17,8 +17,17 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CatalogError, CrsError, nearest_name
-from semsig_gis.core.geometry import CLASS_NAME, GEOMETRY, HALF_WIDTH, NAME, SOURCE_ID, crs_label
+from semsig_gis.core import (
+    CLASS_NAME,
+    GEOMETRY,
+    HALF_WIDTH,
+    NAME,
+    SOURCE_ID,
+    CatalogError,
+    CrsError,
+    crs_label,
+    nearest_name,
+)
 from semsig_gis.sources.filters import Condition, as_text, matches, pattern_of
 from semsig_gis.sources.layer import RawLayer, RowCounts
 from semsig_gis.sources.layer_spec import MAX_WIDTH_M, MIN_WIDTH_M
@@ -34,13 +43,13 @@ if TYPE_CHECKING:
 
 
 WGS84 = CRS.from_epsg(4326)
-# Half a turn and a quarter of one, with room for the rounding of the last decimal.
+# 180 and 90 degrees, with a tolerance for the rounding of the last decimal.
 LONGITUDE_LIMIT = 180.0 + 1e-6
 LATITUDE_LIMIT = 90.0 + 1e-6
 
 
 def parse_crs(text: str) -> CRS:
-    """Return the CRS that a person wrote; CrsError if pyproj does not know it, or no map has it."""
+    """Parse the CRS that a user gives; CrsError if it is unknown, geocentric or vertical."""
     advice = "write a code such as 'EPSG:2154' or 'EPSG:4326'"
     try:
         crs = CRS.from_user_input(text)
@@ -54,11 +63,11 @@ def parse_crs(text: str) -> CRS:
     return crs
 
 
-@functools.lru_cache(maxsize=64)  # looking for the code takes 0.2 s
+@functools.lru_cache(maxsize=64)  # the search for the code takes 0.2 s
 def usable_crs(text: str) -> CRS | None:
-    """Return the CRS that a file states, or None where it does not tie coordinates to the Earth.
+    """Return the CRS that a file states, or None if it does not locate coordinates on the Earth.
 
-    One that equals an EPSG definition becomes that, so that coordinates in it are not transformed.
+    A CRS that is equal to an EPSG definition is replaced by it, to avoid a needless transformation.
     """
     if not text.strip():
         return None
@@ -82,12 +91,14 @@ def usable_crs(text: str) -> CRS | None:
 def settle_crs(
     own: CRS | None, *, implicit: bool, expected: str | None, given: str | None, where: str
 ) -> tuple[CRS, tuple[str, ...]]:
-    """Return the CRS of a layer: the file's `own`, else that `given` by the user or `expected`.
+    """Return the CRS of a layer and notes: the file's `own`, or else `given` or `expected`.
 
-    `implicit` says that `own` is only the default of the format, which goes last. A note says where
-    the file contradicts the others. CrsError if nobody states one.
+    `given` is the CRS of the user, `expected` the CRS of the catalogue. With `implicit`, `own` is
+    only the default of the format, which is used last. A note reports a contradiction. CrsError if
+    there is no CRS.
     """
     stated = given or expected
+    # A CRS in the file has priority.
     if own is not None and not implicit:
         if stated is None or own.equals(parse_crs(stated), ignore_axis_order=True):
             return own, ()
@@ -104,7 +115,10 @@ def settle_crs(
 
 
 def off_the_globe(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.bool_]:
-    """Tell which coordinates cannot be degrees, shape (n,); where the CRS has none, all can."""
+    """Return which coordinates are out of the range of degrees, shape (n,).
+
+    In a CRS with another unit, none is.
+    """
     units = {axis.unit_name for axis in crs.axis_info}
     if not crs.is_geographic or units != {"degree"}:
         return np.zeros(len(xy), dtype=np.bool_)
@@ -112,26 +126,26 @@ def off_the_globe(xy: NDArray[np.float64], crs: CRS) -> NDArray[np.bool_]:
 
 
 def fits_the_globe(xy: NDArray[np.float64]) -> bool:
-    """Tell whether every coordinate could be a longitude and a latitude in degrees."""
+    """Whether all coordinates are in the range of longitude and latitude in degrees."""
     return len(xy) > 0 and not off_the_globe(xy, WGS84).any()
 
 
-KINDS = {
+GEOMETRY_TYPES = {
     "point": ("Point", "MultiPoint"),
     "line": ("LineString", "LinearRing", "MultiLineString"),
     "polygon": ("Polygon", "MultiPolygon"),
 }
-ERRORS_KEPT = 10
-# Values that class_by does not list and that are named.
-UNLISTED_TOLD, LONGEST_VALUE = 8, 40
-# Rows of one id farther apart than this are told of: about a metre, by unit of the CRS.
+MOST_ERRORS = 10
+# Number and length of the values in a note on values that class_by does not list.
+MOST_UNLISTED, MOST_VALUE_CHARACTERS = 8, 40
+# Rows with the same id get a note if they are farther apart: about a metre, by unit of the CRS.
 APART_DEGREES, APART_METRES = 1e-5, 1.0
-# How much an element of OpenStreetMap lacks, in the text that says so.
+# Numbers in the error of an incomplete OpenStreetMap element.
 SHARE = re.compile(r"\d+ of its \d+")
 WHOLE_FLOAT = re.compile(r"(-?\d+)\.0+")
 
 T = TypeVar("T")
-# A point as its two coordinates, so that all points are built at once; else a built geometry.
+# A point is a pair of coordinates, so that all points are built at once; others are geometries.
 Position = tuple[float, float] | shapely.Geometry | None
 
 
@@ -141,13 +155,13 @@ class BadFeatureError(ValueError):
 
 @dataclasses.dataclass(slots=True)
 class Rows:
-    """The rows of a layer as a reader collects them, each in four lists.
+    """Rows of a layer as a reader collects them, in four lists of equal length.
 
-    `numbers` count from 1 in the order of the file; `names` are the identifiers that rows have
-    without a field for it; `values` are those of `RowRules.fields`; of a row that cannot be used,
-    `positions` has the text that says why. `read` counts all rows, `filtered` those that the reader
-    leaves out, `closed` those with rings that it had to close, and `errors` says by number what is
-    wrong with rows that have no values at all.
+    `numbers` count from 1 in the order of the file; `names` are the identifiers that do not come
+    from a field; `values` are the values of `RowRules.fields`; `positions` has a text instead of a
+    position for a row that cannot be used. `read` counts all rows, `filtered` the rows that the
+    reader leaves out, `closed` the rows with rings that were closed. `errors` has the error by row
+    number of rows without values.
     """
 
     read: int = 0
@@ -160,14 +174,14 @@ class Rows:
     positions: list[Position | str] = dataclasses.field(default_factory=list)
 
     def add(self, values: Sequence[Any], name: str, position: Position | str) -> None:
-        """Add the row that was read last."""
+        """Add the row with the number `read`."""
         self.numbers.append(self.read)
         self.names.append(name)
         self.values.append(values)
         self.positions.append(position)
 
-    def lose(self, count: int, reason: str) -> None:
-        """Count the rows after the last one that was read, up to `count`, as unreadable."""
+    def mark_unreadable(self, count: int, reason: str) -> None:
+        """Count the rows from the next one up to number `count` as unreadable."""
         self.errors.update(dict.fromkeys(range(self.read + 1, count + 1), reason))
         self.read = max(self.read, count)
 
@@ -175,17 +189,20 @@ class Rows:
 def raw_layer(
     rows: Rows, rules: RowRules, crs: CRS, *, by_file: bool, notes: tuple[str, ...] = ()
 ) -> RawLayer:
-    """Filter and classify the rows, build their geometries and check these against the CRS.
+    """Filter and classify rows, build their geometries and check them against the CRS.
 
-    CrsError if that is in degrees and most coordinates are not; `by_file` if the file states it.
+    `by_file` is whether the file states the CRS. CrsError if the CRS is in degrees and most
+    coordinates are not.
     """
     spec = rules.spec
-    sifted = rules.sift(rows)
-    table = sifted.table
+    filtered = rules.apply(rows)
+    table = filtered.table
+    # A position that is a text is an error; build the geometries of the others.
     broken = table[GEOMETRY][[isinstance(position, str) for position in table[GEOMETRY]]]
     errors: dict[int, str] = {**rows.errors, **dict(zip(broken.index, broken, strict=True))}
     table = table.drop(index=broken.index)
     table[GEOMETRY] = pd.Series(built_geometries(table[GEOMETRY]), table.index, dtype=object)
+    # Rows with coordinates that are not usable are errors, too.
     off_globe = functools.partial(_off_globe, crs=crs, by_file=by_file, file=rules.file)
     for check in (_not_finite, off_globe):
         if bad := check(table):
@@ -193,13 +210,13 @@ def raw_layer(
             table = table.drop(index=list(bad))
     repeated = 0
     if spec.unique_id:
-        apart = APART_DEGREES if crs.is_geographic else APART_METRES
-        table, repeated, more = _one_of_each_id(table, apart=apart)
+        tolerance = APART_DEGREES if crs.is_geographic else APART_METRES
+        table, repeated, more = _drop_duplicate_ids(table, tolerance=tolerance)
         notes += more
     geometry = table[GEOMETRY].to_numpy()
     if crs.is_projected and not by_file and fits_the_globe(shapely.get_coordinates(geometry)):
         notes += (f"the coordinates look like degrees, yet {crs_label(crs)} is stated",)
-    notes += tuple(_surprises(rows.read, table, spec))
+    notes += tuple(_deviations(rows.read, table, spec))
     if rows.closed:
         notes += (f"{rows.closed} of {rows.read} rows have rings that are not closed; closed here",)
     if spec.tags and errors:
@@ -211,17 +228,17 @@ def raw_layer(
         counts=RowCounts(
             read=rows.read,
             unreadable=len(errors),
-            filtered=rows.filtered + sifted.filtered,
-            excluded=sifted.excluded,
+            filtered=rows.filtered + filtered.filtered,
+            excluded=filtered.excluded,
             duplicates=repeated,
         ),
-        errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:ERRORS_KEPT]),
-        notes=(*sifted.notes, *notes),
+        errors=tuple(f"row {row}: {text}" for row, text in sorted(errors.items())[:MOST_ERRORS]),
+        notes=(*filtered.notes, *notes),
     )
 
 
 def built_geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
-    """Return the geometries of positions, all points built at once."""
+    """Return the geometries of positions; all points are built at once."""
     positions = list(positions)
     geometry = np.empty(len(positions), dtype=object)
     geometry[:] = [None if isinstance(position, tuple) else position for position in positions]
@@ -234,11 +251,11 @@ def built_geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
 def _not_finite(table: pd.DataFrame) -> dict[int, str]:
     xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
     wrong = ~np.isfinite(xy).all(axis=1)
-    return _refused(table.index[owner[wrong]], xy[wrong], "are not finite")
+    return _coordinate_errors(table.index[owner[wrong]], xy[wrong], "are not finite")
 
 
 def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> dict[int, str]:
-    """Refuse rows that are not degrees where they must be, or the CRS if they are most."""
+    """Return the errors of rows out of the range of degrees; CrsError if these are most rows."""
     xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
     wrong = off_the_globe(xy, crs)
     if 2 * wrong.sum() > len(xy):
@@ -253,43 +270,47 @@ def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> di
             f"{file} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
             f"{crs_label(crs)} means; {remedy}."
         )
-    return _refused(table.index[owner[wrong]], xy[wrong], f"are not in {crs_label(crs)}")
+    return _coordinate_errors(table.index[owner[wrong]], xy[wrong], f"are not in {crs_label(crs)}")
 
 
-def _refused(numbers: Iterable[int], xy: NDArray[np.float64], what: str) -> dict[int, str]:
-    bad: dict[int, str] = {}
+def _coordinate_errors(
+    numbers: Iterable[int], xy: NDArray[np.float64], what: str
+) -> dict[int, str]:
+    errors: dict[int, str] = {}
     for number, (x, y) in zip(numbers, xy, strict=True):
-        bad.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
-    return bad
+        errors.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
+    return errors
 
 
-def _one_of_each_id(
-    table: pd.DataFrame, *, apart: float
+def _drop_duplicate_ids(
+    table: pd.DataFrame, *, tolerance: float
 ) -> tuple[pd.DataFrame, int, tuple[str, ...]]:
-    """Keep the first row of every id, but one that has a position rather than one that has none."""
+    """Keep the first row of each id, or the first one with a position if there is one."""
     geometry = table[GEOMETRY].to_numpy()
     nowhere = shapely.is_missing(geometry) | shapely.is_empty(geometry)
+    # Rows with a position come first.
     ids = table[SOURCE_ID].iloc[np.argsort(nowhere, kind="stable")]
     ids = ids[ids != ""]
     firsts, repeated = ids.drop_duplicates(), ids[ids.duplicated()]
+    # Distance of each dropped row from the row that is kept.
     first_of = pd.Series(firsts.index, index=firsts).loc[repeated]
     here, there = table[GEOMETRY].loc[repeated.index], table[GEOMETRY].loc[first_of]
     metres = shapely.distance(here.to_numpy(), there.to_numpy())  # NaN where there is no position
-    far = int((metres > apart).sum())
-    note = f"{far} rows have the id of a row that stands elsewhere; the first one's place is used"
+    far = int((metres > tolerance).sum())
+    note = f"{far} rows have the id of a row at another place; the place of the first row is used"
     return table.drop(index=repeated.index), len(repeated), (note,) if far else ()
 
 
-def _surprises(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]:
-    """Yield where a layer is not what its specification expects."""
+def _deviations(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]:
+    """Yield the differences between a layer and its specification."""
     if read == 0:
         yield "the layer has no rows"
     elif spec.rows is not None and not spec.rows[0] <= read <= spec.rows[1]:
         least, most = spec.rows
         yield f"the layer has {read} rows, and {least} to {most} were expected"
     types = pd.Series([item.geom_type for item in table[GEOMETRY].dropna()], dtype="str")
-    others = types[~types.isin(KINDS[spec.geometry])]
-    if len(others) and not spec.tags:  # of OpenStreetMap, each element says what it is
+    others = types[~types.isin(GEOMETRY_TYPES[spec.geometry])]
+    if len(others) and not spec.tags:  # each element of OpenStreetMap states its own type
         names = ", ".join(sorted(others.unique()))
         yield f"{len(others)} of {read} rows are {names}, not {spec.geometry}"
     unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0
@@ -298,15 +319,15 @@ def _surprises(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str]
 
 
 def _causes(errors: Iterable[str]) -> str:
-    """Say how many elements of OpenStreetMap are unreadable for which reason."""
+    """Return a note on the numbers of unreadable OpenStreetMap elements by cause."""
     causes = Counter(SHARE.sub("some of its", text.partition(" ")[2]) for text in errors)
     listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
     return f"unreadable: {listed}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, slots=True)
-class Sifted:
-    """The rows that the rules of a layer let pass, and how many they leave out, and why.
+class FilteredRows:
+    """Rows that pass the rules of a layer, and the numbers of rows left out.
 
     Rows are `filtered` by ``where`` or ``class_by``, and `excluded` by ``not``.
     """
@@ -318,7 +339,7 @@ class Sifted:
 
 
 class RowRules:
-    """The filter, classes, widths and identifiers of one layer, checked against its fields."""
+    """Conditions, classes, widths and identifiers of a layer, checked against its fields."""
 
     def __init__(
         self, spec: LayerSpec, fields: Sequence[str], *, filters: bool, where: str
@@ -343,27 +364,27 @@ class RowRules:
             require_field(column, fields, where=where, key=key)
         self.fields = tuple(dict.fromkeys(column for _, column in uses))
 
-    def sift(self, rows: Rows) -> Sifted:
+    def apply(self, rows: Rows) -> FilteredRows:
         """Return class, identifier, half-width in metres, name and position of rows that pass.
 
-        The index has their numbers. The half-width is NaN where nobody knows it, and the name
-        empty; the identifier is the row's number where it has none, or empty where ids are unique,
-        because the number could be another row's id.
+        The index has the row numbers. An unknown half-width is NaN, and an unknown name is empty. A
+        row without an id has its number as identifier, or an empty one where ids are unique,
+        because the number could be the id of another row.
         """
         spec = self.spec
         size = len(rows.numbers)
         columns = dict(zip(self.fields, zip(*rows.values, strict=True), strict=False))
-        kept = np.ones(size, bool)
+        passed = np.ones(size, bool)
         for field, condition in self._where if size else ():
-            kept &= [condition.accepts(value) for value in columns[field]]
-        filtered = size - int(kept.sum())
+            passed &= [condition.accepts(value) for value in columns[field]]
+        filtered = size - int(passed.sum())
         excluded: dict[str, int] = {}
         for field, condition in self._not if size else ():
-            out = kept & [condition.accepts(value, every=True) for value in columns[field]]
+            out = passed & [condition.accepts(value, every=True) for value in columns[field]]
             excluded[field] = int(out.sum())
-            kept &= ~out
+            passed &= ~out
         classes = self._classes(columns, size)
-        unlisted = kept & np.array([name is None for name in classes], bool)
+        unlisted = passed & np.array([name is None for name in classes], bool)
         ids = columns.get(spec.id_field or "", [None] * size)
         names = [""] * size if spec.unique_id else rows.names
         titles = columns.get(spec.name_field or "", [None] * size)
@@ -379,19 +400,19 @@ class RowRules:
         unused = [HALF_WIDTH] * (not spec.has_width) + [NAME] * (spec.name_field is None)
         notes = []
         if any(excluded.values()):
-            told = (f"{field} {number}" for field, number in excluded.items() if number)
-            notes.append(f"left out by the catalogue's not: {', '.join(told)}")
+            listed = (f"{field} {number}" for field, number in excluded.items() if number)
+            notes.append(f"left out by the catalogue's not: {', '.join(listed)}")
         if unlisted.any():
             notes.append(self._unlisted(columns, unlisted))
-        return Sifted(
-            table[kept & ~unlisted].drop(columns=unused),
+        return FilteredRows(
+            table[passed & ~unlisted].drop(columns=unused),
             filtered=filtered + int(unlisted.sum()),
             excluded=sum(excluded.values()),
             notes=tuple(notes),
         )
 
     def _classes(self, columns: Mapping[str, Sequence[Any]], size: int) -> list[str | None]:
-        """Return the class of each row, None where `class_by` does not list its value."""
+        """Return the class of each row, None for a value that `class_by` does not list."""
         by, name = self.spec.class_by, self.spec.class_name
         if by is None or self.spec.role != "objects":
             return [name] * size
@@ -400,19 +421,19 @@ class RowRules:
         return [_first(by.classes, value, default) or None for value in values]
 
     def _unlisted(self, columns: Mapping[str, Sequence[Any]], rows: NDArray[np.bool_]) -> str:
-        """Name the values that `class_by` does not list, those of the most rows first."""
+        """Return a note on the values that `class_by` does not list, the most frequent first."""
         by, name = self.spec.class_by, self.spec.class_name
         if by is None:
             return ""
         values = itertools.compress(columns[by.field], rows)
         counts = Counter(
-            "no value" if v is None else repr(as_text(v)[:LONGEST_VALUE]) for v in values
+            "no value" if v is None else repr(as_text(v)[:MOST_VALUE_CHARACTERS]) for v in values
         )
-        told = [f"{value} {number}" for value, number in counts.most_common(UNLISTED_TOLD)]
-        others = len(counts) - len(told)
-        told += [f"and {others} others"] if others else []
+        listed = [f"{value} {number}" for value, number in counts.most_common(MOST_UNLISTED)]
+        others = len(counts) - len(listed)
+        listed += [f"and {others} others"] if others else []
         remedy = f'; write otherwise = "class" to take them as {name}' if name else ""
-        return f"left out, unlisted in class_by {by.field!r}: {', '.join(told)}{remedy}"
+        return f"left out, unlisted in class_by {by.field!r}: {', '.join(listed)}{remedy}"
 
     def _half_widths(self, columns: Mapping[str, Sequence[Any]], size: int) -> NDArray[np.float64]:
         by, own = self.spec.width_by, self.spec.width_field
@@ -427,8 +448,8 @@ class RowRules:
 
 
 def _first(choices: Iterable[tuple[Value, T]], value: object, default: T) -> T:
-    """Return what belongs to the first of the wanted values that a value is."""
-    return next((result for wanted, result in choices if matches(value, wanted)), default)
+    """Return the result of the first choice that matches a value, or the default."""
+    return next((result for accepted, result in choices if matches(value, accepted)), default)
 
 
 def _identifier(value: object, name: str) -> str:
@@ -447,7 +468,7 @@ def _metres(value: object) -> float:
 
 
 def require_field(field: str, fields: Sequence[str], *, where: str, key: str) -> None:
-    """Refuse a field that a file does not have; CatalogError lists the fields and the nearest."""
+    """Raise CatalogError if a file does not have a field; the message lists its fields."""
     if field not in fields:
         raise CatalogError(
             f"{where} has no field {field!r}, which the catalogue names in {key}"

@@ -1,1 +1,5 @@
-"""Files that appear whole, runs that resume, tables that carry their specs."""
+"""Atomic files and folders, resumable runs, GeoParquet, rasters, TOML and rows of text."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,7 +1,7 @@
-"""GeoParquet: tables with their specs, read by box.
+"""Read and write GeoParquet files with metadata of the package ("specs"), also by box.
 
-Rows stand in a spatial order with their bounds in a column: the bounding-box covering of GeoParquet
-1.1, which geopandas and GDAL read by too.
+Rows are in spatial order with their bounds in a column, the bounding-box covering of GeoParquet
+1.1, which geopandas and GDAL use, too.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.resources import raise_if_short
+from semsig_gis.core import DatabaseError, raise_if_short
 from semsig_gis.storage.text import parse_json
 from semsig_gis.storage.whole import reason, whole_file
 
@@ -37,50 +37,50 @@ BBOX = "bbox"
 SIDES = ("xmin", "ymin", "xmax", "ymax")
 BOUNDS = pa.struct([(side, pa.float32()) for side in SIDES])
 COVERING = {"bbox": {side: [BBOX, side] for side in SIDES}}
-"""What the ``geo`` metadata of a file says of the column `BBOX`."""
+"""Description of the column `BBOX` in the ``geo`` metadata of a file."""
 
-NOWHERE = (math.inf, math.inf, -math.inf, -math.inf)
-"""Meets nothing: of a file, only what it says of itself is read."""
+EMPTY_BOX = (math.inf, math.inf, -math.inf, -math.inf)
+"""Intersects nothing: only the metadata of a file is read."""
 
 GROUP_ROWS = 8192
-"""Rows that are read together: the street objects of about two square kilometres of Paris."""
+"""Rows of a row group: the street objects of about two square kilometres of Paris."""
 
 BATCH_ROWS = 1 << 15
-"""Rows of a whole file that are unpacked at once."""
+"""Rows that are decompressed at once if the whole file is read."""
 
 
 def hilbert_order(geometries: NDArray[np.object_] | gpd.array.GeometryArray) -> NDArray[np.int64]:
-    """Return the permutation along a Hilbert curve, so that neighbours mostly are rows nearby.
+    """Return the permutation that sorts geometries along a Hilbert curve.
 
-    No geometry is missing or empty; equals keep their order.
+    No geometry may be missing or empty; equal ones keep their order.
     """
     if len(geometries) == 0:
         return np.empty(0, np.int64)
-    import geopandas as gpd  # noqa: PLC0415 - it loads slowly
+    import geopandas as gpd  # noqa: PLC0415 - 0.7 s
 
-    along = gpd.GeoSeries(geometries).hilbert_distance().to_numpy()
-    return np.argsort(along, kind="stable")
+    distances = gpd.GeoSeries(geometries).hilbert_distance().to_numpy()
+    return np.argsort(distances, kind="stable")
 
 
 def bounds_column(bounds: ArrayLike) -> pa.StructArray:
-    """Return the column by which readers choose the rows within a box.
+    """Return the column of bounds, shape (n, 4), for reading by box.
 
-    Bounds, shape (n, 4), become float32, rounded outwards: half the bytes, and no row is missed.
+    Bounds are float32, which needs half the bytes, and rounded outwards, so that no row is missed.
     """
     exact = np.asarray(bounds, dtype=np.float64).reshape(-1, len(SIDES))
     rounded = exact.astype(np.float32)
     outwards = np.array([-np.inf, -np.inf, np.inf, np.inf], np.float32)
-    short = np.where(outwards < 0, rounded > exact, rounded < exact)
-    sides = np.where(short, np.nextafter(rounded, outwards), rounded)
+    too_small = np.where(outwards < 0, rounded > exact, rounded < exact)
+    sides = np.where(too_small, np.nextafter(rounded, outwards), rounded)
     return pa.StructArray.from_arrays([pa.array(side) for side in sides.T], names=list(SIDES))
 
 
 def groups_meeting(file: pq.ParquetFile, box: Sequence[float]) -> list[int]:
-    """Return the numbers of the row groups that may meet a box; all without a column of bounds."""
+    """Return the indices of row groups that may intersect a box; all without a bounds column."""
     west, south, east, north = box
     groups = []
     for number in range(file.num_row_groups):
-        sides = _extremes(file.metadata.row_group(number))
+        sides = _bounds_statistics(file.metadata.row_group(number))
         if not sides.keys() >= set(SIDES) or (
             sides["xmin"].min <= east
             and sides["ymin"].min <= north
@@ -91,21 +91,22 @@ def groups_meeting(file: pq.ParquetFile, box: Sequence[float]) -> list[int]:
     return groups
 
 
-def _extremes(group: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow has no types
+def _bounds_statistics(group: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow has no types
     """Return the statistics of the bounds of a row group, by side."""
-    extremes = {}
+    sides = {}
     for number in range(group.num_columns):
         name, _, side = group.column(number).path_in_schema.rpartition(".")
         statistics = group.column(number).statistics
         if name == BBOX and statistics is not None and statistics.has_min_max:
-            extremes[side] = statistics
-    return extremes
+            sides[side] = statistics
+    return sides
 
 
 def rows_meeting(table: pa.Table, box: Sequence[float]) -> pa.Table:
-    """Return the rows of a table that meet the box ``xmin, ymin, xmax, ymax``, or nearly so.
+    """Return the rows with bounds that intersect the box ``xmin, ymin, xmax, ymax``.
 
-    Without a column of bounds, all rows are returned.
+    Bounds are rounded outwards, so there may be some more rows. Without a column of bounds, all
+    rows are returned.
     """
     if BBOX not in table.column_names or table.schema.field(BBOX).type != BOUNDS:
         return table
@@ -119,9 +120,9 @@ def _sides(column: pa.ChunkedArray) -> list[NDArray[np.float32]]:
     return [side.to_numpy(zero_copy_only=False) for side in fields]
 
 
-def each_bounds(path: str | Path) -> Iterator[NDArray[np.float64]]:
-    """Yield bounds of a Parquet file's rows, shape (n, 4), by group; none without such a column."""
-    with pq.ParquetFile(path, **CHECKING_PAGES) as file:
+def bounds_by_group(path: str | Path) -> Iterator[NDArray[np.float64]]:
+    """Yield the bounds of the rows of each row group, shape (n, 4); none without such a column."""
+    with pq.ParquetFile(path, **VERIFY_CHECKSUMS) as file:
         if BBOX not in file.schema_arrow.names or file.schema_arrow.field(BBOX).type != BOUNDS:
             return
         for group in range(file.num_row_groups):
@@ -133,12 +134,12 @@ UNREADABLE = (
     *(pa.ArrowException, OSError, ValueError, LookupError, TypeError),
     CRSError,
 )
-"""What geopandas raises for a damaged file whose shapes can be read."""
+"""Errors of geopandas for a damaged file, where the geometries can be read."""
 
 SPEC_KEY = b"semsig"
 COMPRESSION = 3
 BYTE_TYPES = {pa.string(), pa.large_string(), pa.binary()}
-# Well-known binary of a point: 1 for little-endian, 1 for a point, and where it is.
+# Well-known binary of a point: 1 for little-endian, 1 for a point, and its coordinates.
 WKB_POINT = np.dtype([("order", "u1"), ("type", "<u4"), ("x", "<f8"), ("y", "<f8")])
 
 
@@ -147,7 +148,7 @@ def geo_metadata(
 ) -> dict[str, Any]:
     """Return the ``geo`` metadata of a GeoParquet 1.1 file with WKB in the column ``geometry``.
 
-    Bounds are ``xmin, ymin, xmax, ymax`` in `crs`; geometry types are such as ``"Point"``.
+    Bounds are ``xmin, ymin, xmax, ymax`` in `crs`; a geometry type is a name such as ``"Point"``.
     """
     column = {
         "encoding": "WKB",
@@ -159,7 +160,7 @@ def geo_metadata(
 
 
 def points_to_wkb(xy: NDArray[np.float64]) -> pa.Array:
-    """Return points, shape (n, 2), as an Arrow column of well-known binary, 21 bytes a point."""
+    """Return points, shape (n, 2), as an Arrow column of well-known binary, 21 bytes per point."""
     points = np.ones(len(xy), WKB_POINT)
     points["x"], points["y"] = xy.T
     fixed = pa.binary(WKB_POINT.itemsize)
@@ -168,9 +169,9 @@ def points_to_wkb(xy: NDArray[np.float64]) -> pa.Array:
 
 
 def whole_numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
-    """Return an Arrow column of whole numbers, none missing, without loading pandas for it.
+    """Return an Arrow column of integers as a numpy array, without loading pandas.
 
-    ValueError if it holds something else.
+    ValueError if the column contains missing values or another type.
     """
     array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     if array.null_count or not pa.types.is_integer(array.type):
@@ -181,11 +182,12 @@ def whole_numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
 
 
 def wkb_to_points(column: pa.ChunkedArray) -> NDArray[np.float64]:
-    """Return the places of points in well-known binary, shape (n, 2).
+    """Return the coordinates of points in well-known binary, shape (n, 2).
 
-    They are fewer where one is missing, empty or no point; ValueError if it cannot be read.
+    Rows that are missing, empty or no point are omitted; ValueError if the binary cannot be read.
     """
     binary = column.combine_chunks()
+    # Fast path: if all rows have the size of a point, the bytes are an array of `WKB_POINT`.
     if binary.type == pa.binary() and not binary.null_count:
         _, ends, flat = binary.buffers()
         offsets = np.frombuffer(ends, np.int32)[binary.offset : binary.offset + len(binary) + 1]
@@ -194,8 +196,6 @@ def wkb_to_points(column: pa.ChunkedArray) -> NDArray[np.float64]:
             points = content.view(WKB_POINT)
             if (points["order"] == 1).all() and (points["type"] == 1).all():
                 return np.stack([points["x"], points["y"]], axis=1)
-    import shapely  # noqa: PLC0415 - it loads slowly
-
     try:
         shapes = shapely.from_wkb(column.to_numpy(zero_copy_only=False))
     except shapely.errors.ShapelyError as error:
@@ -212,10 +212,10 @@ def write_geoparquet(
     specs: dict[str, Any],
     group_rows: int | None = None,
 ) -> None:
-    """Write an Arrow table as one whole GeoParquet file with specs in its metadata.
+    """Write an Arrow table as a GeoParquet file with specs in its metadata, atomically.
 
-    The column ``geometry`` holds WKB, which `geo` describes (see `geo_metadata`). Specs are plain
-    JSON values. `group_rows` is how many rows are read together, in a file that is read by box.
+    The column ``geometry`` contains WKB, which `geo` describes (see `geo_metadata`). Specs are
+    plain JSON values. `group_rows` is the size of a row group, for files that are read by box.
     """
     with whole_file(path) as partial:
         pq.write_table(
@@ -224,21 +224,21 @@ def write_geoparquet(
             row_group_size=group_rows,
             **_encoding(table.schema),
         )
-        seal(partial)
+        add_footer_checksum(partial)
 
 
 def write_geoparquet_blocks(
     blocks: Iterable[pa.Table], path: str | Path, *, geo: dict[str, Any], specs: dict[str, Any]
 ) -> None:
-    """Write Arrow tables of the same columns, at least one, as `write_geoparquet` writes one."""
+    """Write one or more Arrow tables with the same columns to one file, like `write_geoparquet`."""
     blocks = iter(blocks)
     with whole_file(path) as partial:
         block = next(blocks)
         schema = block.schema.with_metadata(_metadata(geo, specs))
         with pq.ParquetWriter(partial, schema, **_encoding(schema)) as writer:
-            for part in itertools.chain([block], blocks):
-                writer.write_table(part.replace_schema_metadata(schema.metadata), GROUP_ROWS)
-        seal(partial)
+            for table in itertools.chain([block], blocks):
+                writer.write_table(table.replace_schema_metadata(schema.metadata), GROUP_ROWS)
+        add_footer_checksum(partial)
 
 
 def _metadata(geo: dict[str, Any], specs: dict[str, Any]) -> dict[bytes, bytes]:
@@ -246,12 +246,11 @@ def _metadata(geo: dict[str, Any], specs: dict[str, Any]) -> dict[bytes, bytes]:
 
 
 def _encoding(schema: pa.Schema) -> dict[str, Any]:
-    """Return how the columns of a file are packed."""
-    # Lengths apart from the bytes, and numbers by their differences: smaller for short rows. The
-    # numbers in lists are few different ones, and so are rounded ones: a dictionary packs them
-    # tighter.
-    few = [f"{field.name}.list.element" for field in schema if pa.types.is_list(field.type)]
-    few += [field.name for field in schema if pa.types.is_floating(field.type)]
+    """Return the options for encoding and compression of the columns of a file."""
+    # Numbers in lists and rounded numbers have few distinct values: a dictionary is smallest.
+    repeated = [f"{field.name}.list.element" for field in schema if pa.types.is_list(field.type)]
+    repeated += [field.name for field in schema if pa.types.is_floating(field.type)]
+    # Differences of integers, and lengths stored separately from bytes, are smaller for short rows.
     encodings = {
         field.name: "DELTA_BINARY_PACKED"
         if pa.types.is_integer(field.type)
@@ -262,45 +261,46 @@ def _encoding(schema: pa.Schema) -> dict[str, Any]:
     return {
         "compression": "zstd",
         "compression_level": COMPRESSION,
-        "use_dictionary": few,
+        "use_dictionary": repeated,
         "column_encoding": encodings,
-        **CHECKED_PAGES,
+        **WRITE_CHECKSUMS,
     }
 
 
-CHECKED_PAGES = {"write_page_checksum": True}
-"""For whatever writes Parquet: a sum of every page, which `CHECKING_PAGES` has looked at."""
-CHECKING_PAGES = {"page_checksum_verification": True}
-"""For whatever reads it."""
+WRITE_CHECKSUMS = {"write_page_checksum": True}
+"""Option for writing Parquet: a checksum of every page."""
+VERIFY_CHECKSUMS = {"page_checksum_verification": True}
+"""Option for reading Parquet: verify these checksums."""
 
-# Between the pages and the footer, where no reader looks: this and the sum of the footer.
-SEAL = b"semsig"
-SUM_BYTES = 4
-FOOTER_END = 8  # its length and what Parquet files end with
+# Stored between the pages and the footer, where no reader looks: this and the footer's checksum.
+CHECKSUM_MARK = b"semsig"
+CHECKSUM_BYTES = 4
+FOOTER_END = 8  # bytes: the length of the footer and the end mark of Parquet files
 
 
-def seal(path: Path) -> None:
-    """Put a sum of its footer into a Parquet file, as the sums of pages leave that out.
+def add_footer_checksum(path: Path) -> None:
+    """Add a checksum of the footer to a Parquet file; page checksums do not cover the footer.
 
-    All readers take it as it was; whoever writes it anew loses the sum.
+    All readers ignore it; another program that writes the file again drops it.
     """
     with path.open("r+b") as file:
         start, footer = _footer(file)
         file.seek(start)
-        file.write(SEAL + _sum(footer) + footer)
+        file.write(CHECKSUM_MARK + _checksum(footer) + footer)
 
 
-def require_intact(path: Path) -> None:
-    """Raise ValueError if the footer of a Parquet file is not the one that was sealed, if any."""
+def check_footer_checksum(path: Path) -> None:
+    """Raise ValueError if a Parquet file has a footer checksum that does not match its footer."""
     with path.open("rb") as file:
         start, footer = _footer(file)
-        file.seek(max(start - len(SEAL) - SUM_BYTES, 0))
-        if file.read(len(SEAL)) == SEAL and file.read(SUM_BYTES) != _sum(footer):
+        file.seek(max(start - len(CHECKSUM_MARK) - CHECKSUM_BYTES, 0))
+        marked = file.read(len(CHECKSUM_MARK)) == CHECKSUM_MARK
+        if marked and file.read(CHECKSUM_BYTES) != _checksum(footer):
             raise ValueError("the checksum of its footer does not match")
 
 
 def _footer(file: BinaryIO) -> tuple[int, bytes]:
-    """Return where the footer of an open Parquet file begins, and all from there on."""
+    """Return the offset of the footer of an open Parquet file, and its bytes to the end."""
     size = file.seek(0, os.SEEK_END)
     file.seek(max(size - FOOTER_END, 0))
     length = int.from_bytes(file.read(FOOTER_END // 2), "little") + FOOTER_END
@@ -308,8 +308,8 @@ def _footer(file: BinaryIO) -> tuple[int, bytes]:
     return start, file.read()
 
 
-def _sum(footer: bytes) -> bytes:
-    return zlib.crc32(footer).to_bytes(SUM_BYTES, "little")
+def _checksum(footer: bytes) -> bytes:
+    return zlib.crc32(footer).to_bytes(CHECKSUM_BYTES, "little")
 
 
 def read_geoparquet(
@@ -319,18 +319,18 @@ def read_geoparquet(
     columns: list[str] | None = None,
     box: Sequence[float] | None = None,
 ) -> tuple[pa.Table, dict[str, Any], CRS]:
-    """Return the table, the specs and the CRS of a file that `write_geoparquet` wrote.
+    """Return the table, the specs and the CRS of a file written by `write_geoparquet`.
 
-    DatabaseError if it is missing, damaged, or not of that kind (``specs["kind"]``). Rows that do
-    not meet the box ``xmin, ymin, xmax, ymax`` may be left out.
+    DatabaseError if it is missing, damaged, or of another kind (``specs["kind"]``). With a box
+    ``xmin, ymin, xmax, ymax``, row groups that do not intersect it are skipped.
     """
     file = Path(path)
-    if not os.path.isfile(file):  # noqa: PTH113 - it answers where Path.is_file raises
+    if not os.path.isfile(file):  # noqa: PTH113 - Path.is_file raises for some names
         what = "is a folder" if os.path.isdir(file) else "does not exist"  # noqa: PTH112
         raise DatabaseError(f"{file} {what}; give a {kind} file.")
     try:
-        require_intact(file)
-        parquet = pq.ParquetFile(file, memory_map=True, **CHECKING_PAGES)
+        check_footer_checksum(file)
+        parquet = pq.ParquetFile(file, memory_map=True, **VERIFY_CHECKSUMS)
         metadata = parquet.schema_arrow.metadata or {}
     except PermissionError as error:
         raise DatabaseError(
@@ -352,7 +352,7 @@ def read_geoparquet(
         raise DatabaseError(f"{file} is a {stored} file; give a {kind} file.")
     try:
         if box is None:
-            # Not in one piece: the memory of a batch serves the next one, too.
+            # In batches, because the memory of a batch is used again for the next one.
             batches = list(parquet.iter_batches(BATCH_ROWS, columns=columns))
             table = pa.Table.from_batches(batches) if batches else parquet.read(columns)
         else:
@@ -370,5 +370,5 @@ def read_geoparquet(
 
 @functools.lru_cache(maxsize=16)
 def _crs_of(text: str) -> CRS:
-    """Return the CRS that JSON describes; that of one file in many is made once."""
+    """Return the CRS of PROJ JSON; cached, because many files have the same."""
     return CRS.from_user_input(json.loads(text))

@@ -1,4 +1,4 @@
-"""Read and write rasters at the cells of a grid; the home of rasterio."""
+"""Read and write rasters at the cells of a grid, the only module that imports rasterio."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import CrsError, InputError, SourceError, extra
+from semsig_gis.core import CrsError, InputError, SourceError, extra
 from semsig_gis.storage.text import require_regular
 from semsig_gis.storage.whole import whole_file
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.geometry import GridSpec
+    from semsig_gis.core import GridSpec
 
 TILE = 512
-# 330 km by 330 km at a step of 10 m; a file of more is a mistake in the data.
-MOST_PIXELS = 1 << 30
+# 330 km by 330 km at a step of 10 m; a larger raster is a mistake in the data.
+MAX_PIXELS = 1 << 30
 
 
 def raster_at_cells(
@@ -45,21 +45,22 @@ def raster_at_cells(
     crs: CRS,
     band: int | None = None,
 ) -> NDArray[np.float64]:
-    """Return the mean of a raster over each of some cells, by the area of the pixels in it.
+    """Return the mean of a raster in each cell, weighted by the area of the pixels in it.
 
-    The raster may be in any format that GDAL reads and in any CRS; `crs` is that of the grid. NaN
-    stands where the raster has no data; a cell that touches its edge from outside may get the value
-    there. `band` counts from 1. SourceError if the file is no raster, CrsError if its CRS does not
-    fit the grid's or is missing, InputError if `band` is wrong, or missing where there are several.
+    The raster may have any format that GDAL reads, and any CRS; `crs` is the CRS of the grid. The
+    mean is NaN where the raster has no data; a cell that touches the raster's edge from outside may
+    get the value there. `band` counts from 1. SourceError if the file is not a raster, CrsError if
+    its CRS is missing or cannot be transformed, InputError if `band` is wrong, or missing although
+    there are several.
     """
     across, up = np.asarray(columns, dtype=np.int64), np.asarray(rows, dtype=np.int64)
     left, top = int(across.min()), int(up.max())
     west, north = grid.origin[0] + left * grid.step, grid.origin[1] + (top + 1) * grid.step
     try:
         with warnings.catch_warnings():
-            # A raster without a place on the ground is told about below.
+            # A missing CRS is an error below.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            if os.path.exists(path):  # noqa: PTH110 - it answers where Path.exists raises
+            if os.path.exists(path):  # noqa: PTH110 - Path.exists raises for some names
                 require_regular(path)
             source = rasterio.open(path)
         with source:
@@ -68,7 +69,8 @@ def raster_at_cells(
                     f"{path} does not say its coordinate reference system; give a raster that "
                     "does, such as a GeoTIFF."
                 )
-            number = _chosen_band(source, str(path), band)
+            number = _band_number(source, str(path), band)
+            # GDAL resamples the raster to pixels that are the cells.
             with WarpedVRT(
                 source,
                 crs=crs.to_wkt(),
@@ -93,9 +95,9 @@ def raster_at_cells(
     return values[top - up, across - left]
 
 
-def _chosen_band(source: rasterio.DatasetReader, path: str, band: int | None) -> int:
-    """Return the band to read."""
-    # What only tells how opaque the others are is none to choose.
+def _band_number(source: rasterio.DatasetReader, path: str, band: int | None) -> int:
+    """Return the number of the band to read; InputError if it is wrong or not unique."""
+    # An alpha band contains the opacity of the others.
     kinds = enumerate(source.colorinterp, start=1)
     bands = [number for number, kind in kinds if kind != ColorInterp.alpha]
     if band is None and len(bands) == 1:
@@ -118,15 +120,15 @@ def write_cells(
     crs: CRS,
     notes: Mapping[str, str],
 ) -> None:
-    """Write numbers of cells as a Cloud-Optimised GeoTIFF, whole; NaN where there is none.
+    """Write values of cells as a Cloud-Optimised GeoTIFF, atomically; other pixels are NaN.
 
-    Each band has a name, one number a cell and their unit. Cells, at least one, are ordered by
-    column, and written in strips, so that memory stays flat. InputError if the cells span too wide
-    an area, or the file cannot be written.
+    Each band has a name, one value per cell, and a unit. Cells, at least one, are sorted by column;
+    they are written in strips to limit memory. InputError if the cells span too large an area, or
+    the file cannot be written.
     """
     left, top = int(columns[0]), int(rows.max())
     width, height = int(columns[-1]) - left + 1, top - int(rows.min()) + 1
-    if width * height > MOST_PIXELS:
+    if width * height > MAX_PIXELS:
         raise InputError(
             f"the cells span {width:,} by {height:,} pixels, which is too wide for a raster; "
             "export the distant parts of the city separately."
@@ -155,6 +157,7 @@ def write_cells(
                 for band, (name, (_, unit)) in enumerate(bands.items(), start=1):
                     file.set_band_description(band, name)
                     file.set_band_unit(band, unit)
+                # One strip of columns at a time, as wide as a tile.
                 for start in range(0, width, TILE):
                     low, high = np.searchsorted(columns, [left + start, left + start + TILE])
                     strip = np.full((height, min(TILE, width - start)), np.nan, np.float32)
@@ -174,7 +177,7 @@ def write_cells(
             )
             _check_blocks(partial)
         except (CPLE_BaseError, RasterioError) as error:
-            # GDAL's own words do not help; they stay with the cause.
+            # GDAL's message does not help the user; the cause has it.
             raise InputError(
                 f"{path} could not be written whole, so what was there before is unchanged; free "
                 "some space or choose another folder."
@@ -182,7 +185,7 @@ def write_cells(
 
 
 def _check_blocks(path: Path) -> None:
-    """Read a raster block by block: what a full disk cuts off is not always told of earlier."""
+    """Read all blocks of a raster, to detect one that a full disk has truncated silently."""
     with rasterio.open(path) as file:
         for level in (None, *range(len(file.overviews(1)))):
             with rasterio.open(path, overview_level=level) as part:

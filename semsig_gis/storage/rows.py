@@ -1,4 +1,4 @@
-"""Rows of text files: CSV, and JSON lines."""
+"""Read rows of text files: CSV and JSON lines."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core import InputError, SemsigError
 from semsig_gis.storage.text import parse_json, read_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-MOST_ROWS = 2**30
-"""Bytes of a file of rows, which is read whole."""
+MAX_ROWS_BYTES = 2**30
+"""Maximum size of a file of rows, which is read into memory."""
 
 Row = dict[str, Any]
-"""The values of a row by name."""
+"""Values of a row by name."""
 
 _T = TypeVar("_T")
 
 
 def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list[tuple[int, _T]]:
-    """Return the line number of each row of a file (CSV or JSON lines), and what `read` made of it.
+    """Return the line number and ``read(row)`` of each row of a file (CSV or JSON lines).
 
-    `read` raises an error that says what is wrong with a row; `what` names a row in messages.
-    InputError if the file cannot be read, has no rows, or a row cannot be used.
+    `read` raises an error with the reason if a row is not valid; `what` names a row in messages.
+    InputError if the file cannot be read, has no rows, or a row is not valid.
     """
     return _all_rows(file_rows(path, what=what), str(path), read, what)
 
@@ -34,34 +34,34 @@ def read_rows(path: str | Path, read: Callable[[Row], _T], *, what: str) -> list
 def parse_rows(
     lines: Iterable[str | bytes], source: str, read: Callable[[Row], _T], *, what: str
 ) -> list[tuple[int, _T]]:
-    """Return what `read_rows` does, from JSON lines that messages call `source`."""
+    """Return the result of `read_rows` for JSON lines; `source` names them in messages."""
     return _all_rows(json_rows(lines), source, read, what)
 
 
 def _all_rows(
     rows: Iterable[tuple[int, Row | Exception]], source: str, read: Callable[[Row], _T], what: str
 ) -> list[tuple[int, _T]]:
-    """Return what `read` made of all rows, and raise the first error."""
-    found = []
-    for line, _, one in scan_rows(rows, source, read, what=what):
-        if isinstance(one, InputError):
-            raise one
-        found.append((line, one))
-    if not found:
+    """Return line number and ``read(row)`` of all rows, or raise the first error."""
+    results = []
+    for line, _, value in scan_rows(rows, source, read, what=what):
+        if isinstance(value, InputError):
+            raise value
+        results.append((line, value))
+    if not results:
         raise InputError(f"{source} has no rows; give one {what} on each line.")
-    return found
+    return results
 
 
 def file_rows(path: str | Path, *, what: str) -> Iterator[tuple[int, Row | Exception]]:
-    """Give the line number of each row of a file (CSV or JSON lines) and its values, or its error.
+    """Yield line number and values, or an error, of each row of a file (CSV or JSON lines).
 
     InputError if the file cannot be read; `what` names a row in messages.
     """
     file = Path(path)
     try:
         if file.suffix.lower() == ".csv":
-            return csv_rows(read_whole(file, most=MOST_ROWS).decode("utf-8-sig"), str(file))
-        return json_rows(read_whole(file, most=MOST_ROWS).split(b"\n"))
+            return csv_rows(read_whole(file, most=MAX_ROWS_BYTES).decode("utf-8-sig"), str(file))
+        return json_rows(read_whole(file, most=MAX_ROWS_BYTES).split(b"\n"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(
@@ -76,34 +76,34 @@ def scan_rows(
     *,
     what: str,
 ) -> Iterator[tuple[int, Row, _T | InputError]]:
-    """Give the line number of each row, its values, and what `read` made of it or its error.
+    """Yield line number, values, and ``read(values)`` or its error, of each row.
 
-    The values of a row that cannot be read are none.
+    The values of a row that cannot be parsed are empty.
     """
     for line, row in rows:
-        found: _T | InputError
+        result: _T | InputError
         try:
             if isinstance(row, Exception):
                 raise row
             if not isinstance(row, dict):
                 raise InputError("it is not a table of names and values")
-            found = read(row)
+            result = read(row)
         except (SemsigError, ValueError, TypeError, OverflowError, RecursionError) as error:
             reason = str(error).rstrip(".")
             msg = f"line {line} of {source} is no {what} ({reason}); correct it or take it out."
-            found = InputError(msg)
-            found.__cause__ = error
-        yield line, row if isinstance(row, dict) else {}, found
+            result = InputError(msg)
+            result.__cause__ = error
+        yield line, row if isinstance(row, dict) else {}, result
 
 
 def row_value(row: Row, name: str) -> Any:  # noqa: ANN401 - any value of JSON
-    """Return a value of a row, None where it is missing or empty; 0 is a value."""
+    """Return a value of a row; None if it is missing or a blank text."""
     value = row.get(name)
     return None if isinstance(value, str) and not value.strip() else value
 
 
 def csv_rows(text: str, source: str) -> Iterator[tuple[int, Row | Exception]]:
-    """Give the line number of each row of CSV, and its values or its error."""
+    """Yield line number and values, or an error, of each row of CSV."""
     reader = csv.DictReader(io.StringIO(text, newline=""))
     try:
         _ = reader.fieldnames
@@ -121,7 +121,7 @@ def csv_rows(text: str, source: str) -> Iterator[tuple[int, Row | Exception]]:
 
 
 def json_rows(lines: Iterable[str | bytes]) -> Iterator[tuple[int, Row | Exception]]:
-    """Give the number of each line of JSON that is not blank, and its values or its error."""
+    """Yield line number and values, or an error, of each JSON line that is not blank."""
     for line, text in enumerate(lines, start=1):
         if text.strip():
             row: Row | Exception

@@ -1,7 +1,8 @@
-"""Runs that can be interrupted: the folder of a run, which only the same recipe takes up again.
+"""Folders of runs that can be interrupted and resumed with the same parameters.
 
-A run writes its recipe into the folder first. A step is done when its file is there, and every file
-appears whole, so the same command goes on after the last finished step.
+A run first writes its parameters (the "recipe") into its folder. A step is finished if its file
+exists, because files are written atomically. So the same command continues after the last finished
+step.
 """
 
 from __future__ import annotations
@@ -14,28 +15,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import TEMPORARY_PREFIX, remove_abandoned, temporary_folder
+from semsig_gis.core import TEMPORARY_PREFIX, InputError, remove_abandoned, temporary_folder
 from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import put_in_place, reason, write_whole
+from semsig_gis.storage.whole import reason, replace_folder, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
 
     Recipe = dict[str, Any]
-    """What a run is, as plain JSON values by name."""
+    """Parameters of a run as plain JSON values by name."""
 
 PARTIAL = ".partial"
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunKind:
-    """One kind of run, and how its folders are recognized.
+    """A kind of run, with the layout of its folders.
 
-    `content` says what such a folder holds, and `another` is the refusal of a run of another
-    recipe, with ``{folder}`` and ``{difference}`` in it. `read` returns the recipe in a folder or
-    raises OSError, TypeError or ValueError; `write` puts one there. `names` are the entries of a
-    run that has no results yet, and `results` is the pattern of these.
+    `content` describes such a folder in messages, and `another` is the message for a folder with
+    another recipe, with ``{folder}`` and ``{difference}`` in it. `read` returns the recipe in a
+    folder or raises OSError, TypeError or ValueError; `write` writes one. `names` are the entries
+    of a run without results, and `results` is the glob pattern of results.
     """
 
     content: str
@@ -46,38 +46,38 @@ class RunKind:
     results: str
 
     def begin(self, folder: Path, recipe: Recipe) -> None:
-        """Begin a run in a folder, or take up the one in it; one without results is replaced.
+        """Start a run in a folder, or resume the one in it; a run without results is replaced.
 
-        InputError if the folder holds something else or cannot be written.
+        InputError if the folder contains anything else or cannot be written.
         """
         recipe = _plain(recipe)
         entries = self._entries(folder)
         if entries:
             stored = self._read(folder, entries)
             if stored == recipe:
-                for place in (folder, *filter(Path.is_dir, folder.rglob("*"))):
-                    remove_abandoned(place)
+                for subfolder in (folder, *filter(Path.is_dir, folder.rglob("*"))):
+                    remove_abandoned(subfolder)
                 return
             if not entries <= set(self.names) or not self.abandon(folder):
                 self._refuse(folder, stored, recipe)
         self.write(folder, recipe)
 
     def require_same(self, folder: Path, recipe: Recipe) -> None:
-        """Refuse a folder with results of another recipe, or with something else."""
+        """Raise InputError if a folder contains another recipe, or no run."""
         recipe = _plain(recipe)
         stored = self._read(folder, self._entries(folder))
         if stored != recipe:
             self._refuse(folder, stored, recipe)
 
     def abandon(self, folder: Path) -> bool:
-        """Remove the folder of a run without results, and return whether it was one."""
+        """Remove the folder of a run if it has no results; return whether it was removed."""
         if any(folder.glob(self.results)):
             return False
         shutil.rmtree(folder, ignore_errors=True)
         return True
 
     def _entries(self, folder: Path) -> set[str]:
-        """Return the names in a folder; none if it does not exist."""
+        """Return the names in a folder, without temporary ones; empty if it does not exist."""
         try:
             names = {path.name for path in folder.iterdir()} if folder.exists() else set()
         except OSError as error:
@@ -102,30 +102,31 @@ class RunKind:
 
 
 def _plain(recipe: Recipe) -> Recipe:
-    """Return a recipe as it is read again from JSON: with lists in the place of tuples."""
+    """Return a recipe as JSON returns it, with lists instead of tuples."""
     plain: Recipe = json.loads(json.dumps(recipe))
     return plain
 
 
-def _difference(one: Any, other: Any) -> list[str]:  # noqa: ANN401 - whatever JSON holds
-    """Return the names that lead to the first value in which two recipes differ."""
-    if not (isinstance(one, dict) and isinstance(other, dict)):
+def _difference(stored: Any, recipe: Any) -> list[str]:  # noqa: ANN401 - any value of JSON
+    """Return the path of names to the first value in which two recipes differ."""
+    if not (isinstance(stored, dict) and isinstance(recipe, dict)):
         return []
-    name = next(name for name in {**other, **one} if one.get(name, ...) != other.get(name, ...))
-    return [name, *_difference(one.get(name), other.get(name))]
+    names = {**recipe, **stored}
+    name = next(name for name in names if stored.get(name, ...) != recipe.get(name, ...))
+    return [name, *_difference(stored.get(name), recipe.get(name))]
 
 
 def partial_folder(out: str | Path) -> Path:
-    """Return the folder beside `out` in which a run works until it is finished."""
+    """Return the folder of an unfinished run, next to its final folder `out`."""
     target = Path(os.path.realpath(out))
     return target.with_name(f"{target.name}{PARTIAL}")
 
 
 def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
-    """Rename the folder of a run (see `partial_folder`) to its place, and return that.
+    """Rename the folder of a run (see `partial_folder`) to its final name, and return the new path.
 
-    With `keep`, all other entries are removed first, and what is in the place is replaced. Raise
-    InputError if that fails; the results then stay in the folder.
+    With `keep`, all other entries are removed first, and an existing final folder is replaced.
+    InputError if that fails; the results then remain in `folder`.
     """
     target = folder.with_name(folder.name.removesuffix(PARTIAL))
     try:
@@ -135,8 +136,8 @@ def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
             for path in folder.iterdir():
                 if path.name not in keep:
                     _remove(path)
-            with temporary_folder(target.parent) as box:
-                put_in_place(folder, target, box=box)
+            with temporary_folder(target.parent) as temporary:
+                replace_folder(folder, target, temporary=temporary)
     except OSError as error:
         raise InputError(
             f"{target} could not be put in its place ({reason(error)}); the results are in "
@@ -146,7 +147,7 @@ def finish(folder: Path, *, keep: Collection[str] | None = None) -> Path:
 
 
 def _remove(path: Path) -> None:
-    """Remove a file or a folder, while a late process may remove of it what it had made."""
+    """Remove a file or a folder, also while another process removes its own files from it."""
     while path.is_dir():
         with contextlib.suppress(FileNotFoundError):
             shutil.rmtree(path)
@@ -154,7 +155,7 @@ def _remove(path: Path) -> None:
 
 
 def read_json(path: Path) -> Recipe:
-    """Return the values of a JSON file; TypeError if it holds anything but an object."""
+    """Return the values of a JSON file; TypeError if it does not contain an object."""
     values = parse_json(read_whole(path), finite=True)
     if not isinstance(values, dict):
         raise TypeError(f"{path} contains no named values")
@@ -162,5 +163,5 @@ def read_json(path: Path) -> Recipe:
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
-    """Write values into a JSON file."""
+    """Write a JSON file."""
     write_whole(path, json.dumps(values, indent=2) + "\n")

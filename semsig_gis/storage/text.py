@@ -1,4 +1,4 @@
-"""Text files that are read whole: regular ones up to a size, and JSON in them up to a depth."""
+"""Read text and JSON files with limits: regular files only, maximum size, no deep nesting."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ import stat
 from pathlib import Path
 from typing import Any
 
-MOST_BYTES = 2**28
-MOST_INTEGER = 2**63
+MAX_TEXT_BYTES = 2**28
+MAX_INTEGER = 2**63
 
 
 def require_regular(path: str | Path) -> int:
-    """Return the size of a file in bytes; OSError if there is none, or it is a pipe or a device.
+    """Return the size of a file in bytes; OSError if it is missing, a pipe or a device.
 
-    Reading from these may never end.
+    Reading from a pipe or a device may never end.
     """
-    status = os.stat(path)  # noqa: PTH116 - its errors say the path as it was given
+    status = os.stat(path)  # noqa: PTH116 - its errors contain the path unchanged
     if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
         what = "it is a pipe or a device, not a file"
         raise OSError(errno.EINVAL, what, str(path))
     return status.st_size
 
 
-def read_whole(path: str | Path, *, most: int = MOST_BYTES) -> bytes:
-    """Return the content of a regular file; OSError if it cannot be read or is longer than `most`.
+def read_whole(path: str | Path, *, most: int = MAX_TEXT_BYTES) -> bytes:
+    """Return the content of a regular file; OSError if it cannot be read or exceeds `most` bytes.
 
-    The error says in words what is wrong, as `strerror`.
+    The `strerror` of the error is a message for the user.
     """
     size = require_regular(path)
     if size > most:
@@ -39,14 +39,14 @@ def read_whole(path: str | Path, *, most: int = MOST_BYTES) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Return text in UTF-8, with or without a byte order mark, as `read_whole` does."""
+    """Return the text of a UTF-8 file, with or without a byte order mark (see `read_whole`)."""
     return read_whole(path).decode("utf-8-sig")
 
 
 def parse_json(text: str | bytes, *, finite: bool = False) -> Any:  # noqa: ANN401 - any JSON
-    """Return the value of JSON; ValueError if it is none, or is nested too deeply.
+    """Return the value of JSON; ValueError if it is not valid, or is nested too deeply.
 
-    With `finite`, NaN, infinity and whole numbers that 64 bits cannot hold are refused, too.
+    With `finite`, also for NaN, infinity and integers beyond 64 bits.
     """
     kinds: dict[str, Any] = (
         {"parse_constant": _finite, "parse_float": _finite, "parse_int": _whole} if finite else {}
@@ -66,6 +66,6 @@ def _finite(text: str) -> float:
 
 def _whole(text: str) -> int:
     value = int(text)
-    if not -MOST_INTEGER <= value < MOST_INTEGER:
+    if not -MAX_INTEGER <= value < MAX_INTEGER:
         raise ValueError(f"{text[:20]} is beyond 64 bits")
     return value

@@ -1,4 +1,4 @@
-"""Checks on TOML that people write: every key known, every value of its type, else a sentence."""
+"""Read, check and write TOML: unknown keys and values of a wrong type raise a clear error."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import CatalogError, InputError, nearest_name
+from semsig_gis.core import CatalogError, InputError, nearest_name
 from semsig_gis.storage.text import parse_json, read_text
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ TYPE_NAMES: dict[type, str] = {
 
 
 def read_values(path: str | Path, what: str) -> Any:  # noqa: ANN401 - as the file has it
-    """Read plain values from a TOML file (suffix ``.toml``) or a JSON file.
+    """Return the values of a TOML file (suffix ``.toml``) or a JSON file.
 
-    InputError if it cannot be read; `what` says what it is for.
+    InputError if it cannot be read; `what` names its purpose in the message.
     """
     file = Path(path)
     try:
@@ -43,7 +43,7 @@ def read_values(path: str | Path, what: str) -> Any:  # noqa: ANN401 - as the fi
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """Parse TOML; CatalogError names the file, `where`, if the text is something else."""
+    """Return the values of TOML; CatalogError, with the file name `where`, if it is not valid."""
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
@@ -56,9 +56,9 @@ def check_keys(
     where: str,
     needed: Iterable[str] = (),
 ) -> None:
-    """Refuse a table with an unknown key, a value of another type, or a key too few.
+    """Raise CatalogError if a table has an unknown key, a value of a wrong type, or lacks a key.
 
-    `allowed` gives the type of each key's value, ``object`` for one that is checked elsewhere.
+    `allowed` is the type of the value by key, ``object`` if it is checked elsewhere.
     """
     for key, value in table.items():
         if key not in allowed:
@@ -69,7 +69,7 @@ def check_keys(
         kind = allowed[key]
         if kind is object:
             continue
-        # bool is an int to Python, never to a catalogue
+        # A bool is an int in Python, but not in a catalogue.
         if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
             raise CatalogError(f"{where} has {key} = {value!r}; write {TYPE_NAMES[kind]}.")
     for key in needed:
@@ -78,7 +78,7 @@ def check_keys(
 
 
 def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  # noqa: ANN401
-    """Return a value that is one of `choices` (or a `Literal`); CatalogError offers the nearest."""
+    """Return `value` if it is one of `choices`; else CatalogError, with the nearest choice."""
     if value not in choices:
         names = ", ".join(repr(choice) for choice in choices)
         raise CatalogError(
@@ -88,15 +88,15 @@ def one_of(value: str, key: str, choices: tuple[str, ...], where: str) -> Any:  
 
 
 def texts(items: object, key: str, where: str) -> tuple[str, ...]:
-    """Return a list of texts, none of them empty; CatalogError for anything else."""
+    """Return a list of texts that are not empty; CatalogError for any other value."""
     if not isinstance(items, list) or not all(isinstance(item, str) and item for item in items):
         raise CatalogError(f"{where} has {key} = {items!r}; write a list of texts.")
     return tuple(items)
 
 
 def metres(value: object, key: str, where: str, *, most: float) -> float:
-    """Return a length in metres, above 0 and up to `most`; CatalogError for anything else."""
-    # bool is an int to Python, never to a catalogue; NaN is not above 0
+    """Return a length in metres, above 0 and up to `most`; CatalogError for any other value."""
+    # A bool is an int in Python, but not in a catalogue. NaN fails both comparisons.
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= most:
         raise CatalogError(
             f"{where} has {key} = {value!r}; write metres above 0 and up to {most:g}."
@@ -105,29 +105,31 @@ def metres(value: object, key: str, where: str, *, most: float) -> float:
 
 
 def toml_text(values: Mapping[str, Any]) -> str:
-    """Write values, without None, NaN or infinity, as TOML: a section for each table comes last.
+    """Return values (without None, NaN or infinity) as TOML; tables become sections at the end.
 
-    A parser reads back the same values, but for tables that are empty.
+    Parsing the text returns the same values, except for empty tables.
     """
     return _section(values).lstrip("\n")
 
 
-def _section(values: Mapping[str, Any], *above: str) -> str:
-    tables = {name: part for name, part in values.items() if isinstance(part, Mapping)}
+def _section(values: Mapping[str, Any], *parents: str) -> str:
+    tables = {name: value for name, value in values.items() if isinstance(value, Mapping)}
     lines = [
-        f"{_key(name)} = {_inline(part)}\n" for name, part in values.items() if name not in tables
+        f"{_key(name)} = {_inline(value)}\n" for name, value in values.items() if name not in tables
     ]
-    for name, part in tables.items():
-        path = (*above, _key(name))
-        own = any(not isinstance(one, Mapping) for one in part.values())
-        lines += [f"\n[{'.'.join(path)}]\n"] if own else []
-        lines.append(_section(part, *path))
+    for name, table in tables.items():
+        path = (*parents, _key(name))
+        # A table that contains only tables needs no heading.
+        if any(not isinstance(value, Mapping) for value in table.values()):
+            lines.append(f"\n[{'.'.join(path)}]\n")
+        lines.append(_section(table, *path))
     return "".join(lines)
 
 
 def _inline(value: Any) -> str:  # noqa: ANN401 - any value of JSON
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{_key(n)} = {_inline(one)}' for n, one in value.items())} }}"
+        items = ", ".join(f"{_key(name)} = {_inline(item)}" for name, item in value.items())
+        return f"{{ {items} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(_inline, value))}]"
     return _text(value) if isinstance(value, str) else json.dumps(value, allow_nan=False)

@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all."""
+"""Write files and folders atomically: they appear completely or not at all."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import BACKUP_FOLDER, locked, temporary_folder
+from semsig_gis.core import BACKUP_FOLDER, InputError, locked, temporary_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,105 +17,107 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path that replaces `path` if, and only if, the block succeeds.
+    """Give a temporary path to write, which replaces `path` if the block succeeds.
 
-    The path ends in the same name, in a folder of its own beside the file; missing folders are
-    made. InputError if there is no writing there, or `path` is a folder, a device or a pipe.
+    The temporary file has the same name, in a temporary folder next to `path`. Missing folders are
+    created. InputError if the folder is not writable, or `path` is a folder, a device or a pipe.
     """
-    # A link stays, and the file that it names is replaced.
+    # If `path` is a link, the link remains and its target is replaced.
     target = Path(os.path.realpath(path))
-    if os.path.isdir(target):  # noqa: PTH112 - it answers where Path.is_dir raises
+    if os.path.isdir(target):  # noqa: PTH112 - Path.is_dir raises for some names
         raise InputError(f"{path} is a folder; give the name of a file to write.")
     if os.path.exists(target) and not os.path.isfile(target):  # noqa: PTH110, PTH113
         raise InputError(f"{path} is a device or a pipe; give the name of a file to write.")
     with contextlib.ExitStack() as stack:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
+            # A folder, because some formats write further files next to the file (-journal).
             folder = stack.enter_context(temporary_folder(target.parent))
         except OSError as error:
             raise InputError(
                 f"{path} cannot be written ({reason(error)}); choose a folder you can write to."
             ) from error
-        # A folder of its own, because some formats write companions beside the file (-journal).
         partial = folder / Path(path).name
         try:
             yield partial
             os.replace(partial, target)  # noqa: PTH105 - the rename is the point
         except OSError as error:
+            # An error about another file is not about writing this one.
             if error.errno is None or error.filename not in {None, str(partial), str(target)}:
                 raise
-            raise InputError(
-                f"{path} could not be written ({reason(error)}); what was there before is "
-                "unchanged, so make room or choose another place."
-            ) from error
+            raise _not_written(path, error) from error
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:
-    """Write bytes, or text in UTF-8, as a whole file (see `whole_file`)."""
+    """Write bytes, or text in UTF-8, to a file atomically (see `whole_file`)."""
     with whole_file(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @contextlib.contextmanager
 def whole_folder(path: str | Path) -> Iterator[Path]:
-    """Give an empty folder that replaces `path` if, and only if, the block succeeds.
+    """Give an empty temporary folder, which replaces `path` if the block succeeds.
 
-    A folder that is there is replaced with all that is in it. InputError if it cannot be written.
+    An existing folder is replaced with all its contents. InputError if it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    with _box(target) as box:
-        partial = box / target.name
+    with _temporary_next_to(target) as temporary:
+        partial = temporary / target.name
         partial.mkdir()
         yield partial
-        put_in_place(partial, target, box=box)
+        replace_folder(partial, target, temporary=temporary)
 
 
-def move_folder(new: Path, place: Path) -> None:
-    """Rename a folder to its place beside it; what is there is replaced, or stays if that fails."""
-    with _box(place) as box:
-        put_in_place(new, place, box=box)
+def move_folder(new: Path, target: Path) -> None:
+    """Rename a folder to `target` next to it; an existing one is replaced only on success."""
+    with _temporary_next_to(target) as temporary:
+        replace_folder(new, target, temporary=temporary)
 
 
 @contextlib.contextmanager
-def _box(target: Path) -> Iterator[Path]:
-    """Give a temporary folder beside a folder that is being written."""
+def _temporary_next_to(target: Path) -> Iterator[Path]:
+    """Give a temporary folder next to a folder that is being written."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with temporary_folder(target.parent) as box:
-            yield box
+        with temporary_folder(target.parent) as temporary:
+            yield temporary
     except OSError as error:
-        raise InputError(
-            f"{target} could not be written ({reason(error)}); what was there before is "
-            "unchanged, so make room or choose another place."
-        ) from error
+        raise _not_written(target, error) from error
 
 
-def put_in_place(new: Path, place: Path, *, box: Path) -> None:
-    """Rename a folder to its place; what is there is put into a temporary folder beside it.
+def _not_written(path: str | Path, error: OSError) -> InputError:
+    return InputError(
+        f"{path} could not be written ({reason(error)}); what was there before is "
+        "unchanged, so make room or choose another place."
+    )
 
-    The place is never empty where the system lets two folders change places. Else a run that is
-    killed in between leaves the old one aside, from where `remove_abandoned` puts it back.
+
+def replace_folder(new: Path, target: Path, *, temporary: Path) -> None:
+    """Rename a folder to `target`; an existing one is moved to a folder in `temporary` first.
+
+    If the system can exchange two folders, `target` exists all the time. Otherwise, if the process
+    is killed in between, `remove_abandoned` moves the old folder back.
     """
-    aside = box / BACKUP_FOLDER / place.name
-    aside.parent.mkdir()
-    if exchanged(new, place):
-        new.rename(aside)
+    backup = temporary / BACKUP_FOLDER / target.name
+    backup.parent.mkdir()
+    if exchange(new, target):
+        new.rename(backup)
         return
     with contextlib.suppress(FileNotFoundError):
-        place.rename(aside)
+        target.rename(backup)
     try:
-        new.rename(place)
+        new.rename(target)
     except OSError:
-        if aside.exists():
-            aside.rename(place)
+        if backup.exists():
+            backup.rename(target)
         raise
 
 
 @contextlib.contextmanager
-def alone_in(folder: Path) -> Iterator[bool]:
-    """Wait until no other program is in such a block with a folder; give whether that is sure.
+def folder_locked(folder: Path) -> Iterator[bool]:
+    """Lock a folder, after waiting until no other process locks it; give whether that succeeded.
 
-    It is not where the system does not lock folders.
+    It does not succeed where the system cannot lock folders.
     """
     try:
         file = os.open(folder, os.O_RDONLY)
@@ -133,18 +134,18 @@ AT_FDCWD = -100
 RENAME_EXCHANGE = 2
 
 
-def exchanged(one: Path, other: Path) -> bool:
-    """Let two files or folders change places in one step; False where that is impossible."""
+def exchange(first: Path, second: Path) -> bool:
+    """Exchange two files or folders in one step; return False if that is impossible."""
     if sys.platform != "linux":
         return False
     renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
     if renameat2 is None:
         return False
-    sys.audit("os.rename", str(one), str(other), -1, -1)  # as Python's own renames are told
-    names = os.fsencode(one), os.fsencode(other)
+    sys.audit("os.rename", str(first), str(second), -1, -1)  # as os.rename does
+    names = os.fsencode(first), os.fsencode(second)
     return bool(renameat2(AT_FDCWD, names[0], AT_FDCWD, names[1], RENAME_EXCHANGE) == 0)
 
 
 def reason(error: OSError) -> str:
-    """Return the system's few words about an error, such as "Permission denied"."""
+    """Return the system's message of an error, such as "Permission denied"."""
     return os.strerror(error.errno) if error.errno else str(error)

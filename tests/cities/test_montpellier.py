@@ -12,21 +12,16 @@ import pyogrio
 import pytest
 from worlds import assert_same
 
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.objects.load import build_objects, choose_layers
-from semsig_gis.objects.quality import quality_report
-from semsig_gis.sources import find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.vector import read_layer
+from semsig_gis.core import GridSpec
+from semsig_gis.database import build_database, open_database, save_database
+from semsig_gis.objects import build_objects, choose_layers, quality_report
+from semsig_gis.sources import find_files, load_catalog, read_layer
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.load import LoadReport
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import LoadReport, StreetObjects
 
 RADIUS = 30.0
 

@@ -10,10 +10,8 @@ import pytest
 from open_cities import CITIES, serve, write_files
 from servers import Server
 
-from semsig_gis.objects.fetch import fetch_layers, open_cache
-from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.sources.catalog import data_folder, load_catalog
-from semsig_gis.sources.clip import parse_area
+from semsig_gis.objects import assemble, choose_layers, fetch_layers, open_cache, read_files
+from semsig_gis.sources import data_folder, load_catalog, parse_area
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,13 +15,10 @@ import shapely
 from osm_xml import node, relation, way, write_osm
 from osmium.osm import WAY, Area, Node, Relation, Way
 
-from semsig_gis.database.build import build_database
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.objects.load import build_objects, choose_layers
-from semsig_gis.objects.surroundings import read_surroundings
-from semsig_gis.sources import find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.osm.file import read_layers
+from semsig_gis.database import build_database
+from semsig_gis.evaluation import evaluate
+from semsig_gis.objects import build_objects, choose_layers, read_surroundings
+from semsig_gis.sources import find_files, load_catalog, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

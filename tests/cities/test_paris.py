@@ -11,16 +11,15 @@ import numpy as np
 import pytest
 import shapely
 
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
+from semsig_gis.objects import build_objects
+from semsig_gis.sources import RowCounts, load_catalog, paper_taxonomy
 from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
     from semsig_gis.sources import RawLayer
 
 STOPS = "positions-geographiques-des-stations-du-reseau-ratp.csv"

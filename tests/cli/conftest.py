@@ -14,9 +14,8 @@ import shapely
 from worlds import random_town, save_town, surroundings
 
 from semsig_gis.cli import main
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.objects.surroundings import save_surroundings
-from semsig_gis.objects.table import save_objects
+from semsig_gis.database import open_database, save_database
+from semsig_gis.objects import save_objects, save_surroundings
 
 X, Y = 770_000.0, 6_280_000.0
 

@@ -21,7 +21,7 @@ from servers import Answer, Server
 from stand_ins import STAND_INS
 
 from semsig_gis import __version__
-from semsig_gis.database.file import open_database
+from semsig_gis.database import open_database
 
 if TYPE_CHECKING:
     from stand_ins import StandIn
@@ -435,7 +435,7 @@ def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: st
     assert (seen["types"], seen["bearings"]) == ("DXD", [80.0, 120.0, 200.0])
     assert seen["ranges"] == [pytest.approx(7.3, abs=0.1), pytest.approx(25, abs=1), None]
     assert seen["sectors"] == [[55.0, 125.0]]
-    notes = ["D at 200.0° stands outside the sectors"]
+    notes = ["D at 200.0° is outside the sectors"]
     notes += ["edit+edit does not use ranges and sectors"] if method == "edit+edit" else []
     for note, words in zip(answer["notes"], notes, strict=True):
         assert words in note

@@ -17,12 +17,10 @@ from sentences import sentence
 from small_city import chances_of, small_city, small_evaluation
 
 from semsig_gis.cli.localize import print_answer
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.evaluation.file import save_evaluation
-from semsig_gis.evaluation.identifiability.result import save_identifiability
-from semsig_gis.exports.rasters import cell_errors
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.database import ObjectStore, open_database, save_database, save_with_store
+from semsig_gis.evaluation import save_evaluation, save_identifiability
+from semsig_gis.exports import cell_errors
+from semsig_gis.objects import open_objects, save_objects
 
 if TYPE_CHECKING:
     from conftest import Done, Run

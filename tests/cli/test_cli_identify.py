@@ -11,12 +11,18 @@ import geopandas as gpd
 import pytest
 from worlds import random_town
 
-from semsig_gis.database.city import City
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store
-from semsig_gis.database.tiles import TileSpec, build_tiles
+from semsig_gis.database import (
+    City,
+    ObjectStore,
+    TileSpec,
+    build_tiles,
+    open_database,
+    open_store,
+    save_database,
+    save_with_store,
+)
 from semsig_gis.evaluation.identifiability import analysis
-from semsig_gis.objects.table import save_objects
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from conftest import Done, Run

@@ -17,13 +17,10 @@ from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, World, random_town
 
-from semsig_gis.database.file import save_database
-from semsig_gis.database.sightings import visible_objects_at
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.evaluation.file import open_evaluation
-from semsig_gis.localization.likelihood.answer_rule import open_rule
-from semsig_gis.localization.noise.model import open_noise
-from semsig_gis.objects.table import save_objects
+from semsig_gis.database import ObjectStore, save_database, save_with_store, visible_objects_at
+from semsig_gis.evaluation import open_evaluation
+from semsig_gis.localization import open_noise, open_rule
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,10 +15,9 @@ from pyproj import Transformer
 from sentences import sentence
 from worlds import CORNER, random_town, surroundings
 
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore, save_with_store
+from semsig_gis.database import ObjectStore, build_database, save_with_store
 from semsig_gis.evaluation.identifiability import analysis
-from semsig_gis.objects.surroundings import save_surroundings
+from semsig_gis.objects import save_surroundings
 
 if TYPE_CHECKING:
     import geopandas as gpd

@@ -12,10 +12,8 @@ from PIL import Image
 from sentences import sentence
 
 from benchmarks.rendered import Scene
-from semsig_gis.observation.detectors.camera import Camera
-from semsig_gis.observation.files import read_queries
-from semsig_gis.observation.view import Photo, View
-from semsig_gis.sources.catalog import built_in_taxonomy
+from semsig_gis.observation import Camera, Photo, View, read_queries
+from semsig_gis.sources import built_in_taxonomy
 
 if TYPE_CHECKING:
     from pathlib import Path

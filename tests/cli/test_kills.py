@@ -16,17 +16,15 @@ import pytest
 from kills import killed_at
 from worlds import assert_index_fits, random_town
 
-from semsig_gis.database.build import build_database
-from semsig_gis.database.city import open_city
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.table import save_objects
+from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from conftest import Run
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 BEFORE = random_town().street_objects
 AFTER = dataclasses.replace(BEFORE, table=BEFORE.table[7:].reset_index(drop=True))

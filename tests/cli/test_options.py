@@ -10,21 +10,19 @@ import typer
 from sentences import refused, sentence
 
 from semsig_gis.cli.commands import app
-from semsig_gis.core.checks import MOST_METRES, MOST_SEED
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.parallel import check_workers
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.tiles import TileSpec
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.identifiability.lookalikes import check_radius
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.noise.model import NoiseSpec, named_noise
-from semsig_gis.observation.leg import Leg
-from semsig_gis.observation.view import check_north
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import (
+    MOST_METRES,
+    MOST_SEED,
+    GridSpec,
+    InputError,
+    SignatureSpec,
+    check_workers,
+)
+from semsig_gis.database import TileSpec, ViewpointSpec
+from semsig_gis.evaluation import QuerySpec, check_radius, parse_chain
+from semsig_gis.localization import LikelihoodMethod, NoiseSpec, named_noise
+from semsig_gis.observation import Leg, check_north
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -25,7 +25,7 @@ from stand_ins import ArcGIS
 from stores import keep_in_bucket
 
 from semsig_gis.sources import catalog as catalogs
-from semsig_gis.sources.catalog import data_folder, load_catalog
+from semsig_gis.sources import data_folder, load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

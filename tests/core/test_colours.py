@@ -16,7 +16,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from semsig_gis.core.symbology import (
+from semsig_gis.core import (
     ANSWERS,
     CANDIDATE_RAMP,
     CELL_CHANCES,
@@ -36,8 +36,8 @@ from semsig_gis.core.symbology import (
     ClassSign,
     group_labels,
 )
-from semsig_gis.exports.styles import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
-from semsig_gis.maps.page_elements import OUTLINES, mark_svg
+from semsig_gis.exports import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
+from semsig_gis.maps import OUTLINES, mark_svg
 from semsig_gis.reports import axes, plots, scenes
 
 SIGHTS = {

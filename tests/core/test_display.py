@@ -41,15 +41,15 @@ from semsig_gis import (
     synthetic_city,
     update_database,
 )
-from semsig_gis.core.display import Displayed
-from semsig_gis.objects.load import assemble
-from semsig_gis.reports.report_model import Scene
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import Displayed
+from semsig_gis.objects import assemble
+from semsig_gis.reports import Scene
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 LONGEST_LINE = 250
 

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core import errors
-from semsig_gis.core.errors import extra
+from semsig_gis.core import errors, extra
 
 NAMES = st.text(st.characters(codec="utf-8"), max_size=12)
 

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from pyproj import CRS, Proj
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.geometry import (
+from semsig_gis.core import (
+    CrsError,
     GridSpec,
+    InputError,
     angular_distance,
     cell_ids,
     cells_near,

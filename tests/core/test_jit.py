@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from machine import PATIENCE_S
 from numba.core.caching import CompileResultCacheImpl
 
-from semsig_gis.core.jit import compiled
+from semsig_gis.core import compiled
 
 if TYPE_CHECKING:
     import pytest

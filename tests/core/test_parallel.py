@@ -12,9 +12,7 @@ from distributed import LocalCluster
 from sentences import refused
 
 from semsig_gis import __version__
-from semsig_gis.core import parallel
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.parallel import Outcome, check_workers, run_tasks
+from semsig_gis.core import InputError, Outcome, check_workers, parallel, run_tasks
 
 if TYPE_CHECKING:
     from pathlib import Path

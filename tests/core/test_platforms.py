@@ -11,10 +11,8 @@ import filelock
 import pytest
 
 from semsig_gis import open_cache
-from semsig_gis.core.resources import free_address_space
-from semsig_gis.core.temporary import temporary_folder
-from semsig_gis.core.threads import cores
-from semsig_gis.storage.whole import alone_in, exchanged, whole_folder
+from semsig_gis.core import cores, free_address_space, temporary_folder
+from semsig_gis.storage import exchange, folder_locked, whole_folder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,7 +40,7 @@ def test_without_locks_temporary_folders_are_created_and_removed(
     with temporary_folder(tmp_path) as first, temporary_folder(tmp_path) as second:
         assert {*tmp_path.iterdir()} == {first, second}
     assert list(tmp_path.iterdir()) == []
-    with alone_in(tmp_path) as alone:
+    with folder_locked(tmp_path) as alone:
         assert not alone
 
 
@@ -53,7 +51,7 @@ def test_folder_that_cannot_be_opened_is_not_locked(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(os, "open", refuse)
-    with alone_in(tmp_path) as alone:
+    with folder_locked(tmp_path) as alone:
         assert not alone
 
 
@@ -61,7 +59,7 @@ def test_without_exchange_a_folder_is_replaced_in_two_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert not exchanged(tmp_path, tmp_path)
+    assert not exchange(tmp_path, tmp_path)
     for text in ("old", "new"):
         with whole_folder(tmp_path / "city") as folder:
             (folder / "a.txt").write_text(text)

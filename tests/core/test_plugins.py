@@ -15,9 +15,15 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.core.plugins import CATALOGS, READERS, installed_catalogs, installed_readers
-from semsig_gis.objects.table import open_objects
+from semsig_gis.core import (
+    CATALOGS,
+    READERS,
+    CatalogError,
+    SourceError,
+    installed_catalogs,
+    installed_readers,
+)
+from semsig_gis.objects import open_objects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -11,9 +11,8 @@ import pyarrow as pa
 import pytest
 from sentences import refused
 
-from semsig_gis.core import resources
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.file import save_database
+from semsig_gis.core import InputError, resources
+from semsig_gis.database import save_database
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.rtree import ObjectIndex, PackedIndex
+from semsig_gis.core import InputError, ObjectIndex, PackedIndex
 
 if TYPE_CHECKING:
     from collections.abc import Callable

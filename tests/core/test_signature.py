@@ -10,10 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.signature import BEARING_UNITS, Signature, SignatureSpec, quantize
-from semsig_gis.database.sightings import SightingPairs, clockwise_order
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import (
+    BEARING_UNITS,
+    InputError,
+    Signature,
+    SignatureSpec,
+    UnknownNameError,
+    quantize,
+)
+from semsig_gis.database import SightingPairs, clockwise_order
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

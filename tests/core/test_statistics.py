@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.statistics import (
+from semsig_gis.core import (
+    InputError,
     binomial_tail,
     fit_shares,
     log_interval,

@@ -7,11 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from semsig_gis.core.symbology import COLOURS, SHAPES, ClassSign, class_signs
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.exports.styles import CLASS_MARKERS
-from semsig_gis.maps.page_elements import OUTLINES
-from semsig_gis.reports.scenes import MARKERS
+from semsig_gis.core import COLOURS, SHAPES, ClassSign, ObjectClass, Taxonomy, class_signs
+from semsig_gis.exports import CLASS_MARKERS
+from semsig_gis.maps import OUTLINES
+from semsig_gis.reports import MARKERS
 
 MANY = Taxonomy(
     tuple(ObjectClass(code, chr(64 + code), f"c{code}", f"C {code}") for code in range(1, 27))

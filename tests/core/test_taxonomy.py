@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, UnknownNameError
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
+from semsig_gis.core import CatalogError, ObjectClass, Taxonomy, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

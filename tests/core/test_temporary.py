@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from semsig_gis.core import temporary
-from semsig_gis.core.temporary import (
+from semsig_gis.core import (
     BACKUP_FOLDER,
     LOCK_FILE,
     MACHINE_PREFIX,
     TEMPORARY_PREFIX,
     remove_abandoned,
+    temporary,
     temporary_folder,
 )
 

@@ -7,7 +7,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.text import escaped, one_line, visible
+from semsig_gis.core import escaped, one_line, visible
 
 ASTRONAUT = "\U0001f469\u200d\U0001f680"
 HARMLESS = ("Arbre d'alignement", "\u0645\u06cc\u200c\u062e", ASTRONAUT)

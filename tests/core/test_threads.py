@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.threads import WorkCancelledError, cancellable, each_in_order, share_rows
+from semsig_gis.core import InputError, WorkCancelledError, cancellable, each_in_order, share_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

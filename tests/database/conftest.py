@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 import pytest
 from worlds import random_town
 
-from semsig_gis.database.file import save_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.objects.table import save_objects
+from semsig_gis.database import ObjectStore, TileSpec, build_tiles, save_database, save_with_store
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from worlds import World
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 @pytest.fixture(scope="session")

@@ -21,15 +21,25 @@ from worlds import (
     worlds,
 )
 
-from semsig_gis.core import resources
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cells_near, wrap_degrees
-from semsig_gis.core.rtree import PackedIndex
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database import build
-from semsig_gis.database.build import build_database, sightings_by_block
-from semsig_gis.database.sightings import SightingPairs, bearings
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.core import (
+    CrsError,
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    PackedIndex,
+    SignatureSpec,
+    cells_near,
+    resources,
+    wrap_degrees,
+)
+from semsig_gis.database import (
+    SightingPairs,
+    ViewpointSpec,
+    bearings,
+    build,
+    build_database,
+    sightings_by_block,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,34 +17,33 @@ import shapely
 from sentences import assert_sentence, refused
 from worlds import CORNER, assert_index_fits, assert_same, random_town, surroundings
 
-from semsig_gis.core.errors import CrsError, DatabaseError, InputError
-from semsig_gis.database import store as store_module
-from semsig_gis.database.build import build_database
-from semsig_gis.database.city import City, open_city
-from semsig_gis.database.file import (
+from semsig_gis.core import CrsError, DatabaseError, InputError
+from semsig_gis.database import (
+    City,
+    ObjectStore,
     PartitionedDatabase,
+    build_database,
+    built_digest,
     digest,
+    open_city,
     open_database,
+    open_store,
     part_files,
     read_manifest,
     save_database,
-)
-from semsig_gis.database.store import (
-    ObjectStore,
-    built_digest,
-    open_store,
     save_with_store,
     store_path,
 )
-from semsig_gis.objects.table import open_objects
+from semsig_gis.database import store as store_module
+from semsig_gis.objects import open_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from worlds import World
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 
 # --- Cities and columns -----------------------------------------------------------------------
@@ -408,7 +407,7 @@ def test_what_waits_for_its_database_is_put_in_its_place(
     waiting = stored.with_name("city.objects.next")
     store_path(stored).rename(waiting)
     with monkeypatch.context() as patch:  # where nobody knows who else does so
-        patch.setattr(store_module, "alone_in", lambda _: nullcontext(enter_result=False))
+        patch.setattr(store_module, "folder_locked", lambda _: nullcontext(enter_result=False))
         assert_fits(open_store(stored), TOWN)
         assert City(stored).store_path == waiting
     with monkeypatch.context() as patch:

@@ -8,11 +8,15 @@ import pytest
 from sentences import refused
 from small_city import small_city
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.temporary import LOCK_FILE, MACHINE_PREFIX, temporary_folder
-from semsig_gis.database.companions import companions, remove_companions
-from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store
+from semsig_gis.core import LOCK_FILE, MACHINE_PREFIX, DatabaseError, InputError, temporary_folder
+from semsig_gis.database import (
+    ObjectStore,
+    companions,
+    open_database,
+    open_store,
+    remove_companions,
+    save_with_store,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,13 +13,16 @@ import shapely
 from sentences import assert_sentence, refused
 from worlds import ARRAYS, CORNER, random_town
 
-from semsig_gis.core.errors import DatabaseError, SemsigError
-from semsig_gis.database.file import database_specs, open_database, save_database
-from semsig_gis.database.tiles import build_tiles
-from semsig_gis.evaluation.file import open_evaluation, save_evaluation
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.objects.surroundings import read_surroundings, save_surroundings
-from semsig_gis.objects.table import objects_specs, open_objects, save_objects
+from semsig_gis.core import DatabaseError, SemsigError
+from semsig_gis.database import build_tiles, database_specs, open_database, save_database
+from semsig_gis.evaluation import evaluate, open_evaluation, save_evaluation
+from semsig_gis.objects import (
+    objects_specs,
+    open_objects,
+    read_surroundings,
+    save_objects,
+    save_surroundings,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

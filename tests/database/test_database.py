@@ -13,20 +13,21 @@ from sentences import refused
 from worlds import ARRAYS, TAXONOMY, assert_same
 
 import semsig_gis
-from semsig_gis.core.errors import DatabaseError, InputError, UnknownNameError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.database.database import join_databases
-from semsig_gis.database.file import open_database
-from semsig_gis.database.sequences import SequenceTable, checked_sequence
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.core import DatabaseError, GridSpec, InputError, SignatureSpec, UnknownNameError
+from semsig_gis.database import (
+    SequenceTable,
+    ViewpointSpec,
+    checked_sequence,
+    join_databases,
+    open_database,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 def test_cells_are_ordered_and_numbered(database: SignatureDatabase) -> None:

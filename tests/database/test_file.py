@@ -16,25 +16,25 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, World, assert_same, brute_force, worlds
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.database.file import (
+from semsig_gis.core import DatabaseError
+from semsig_gis.database import (
     INPUTS,
     MANIFEST,
     Manifest,
     PartFile,
+    describe_part,
     digest,
     open_database,
     open_dataset,
     read_manifest,
     save_database,
 )
-from semsig_gis.database.tiles import describe_part
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 @given(world=worlds())

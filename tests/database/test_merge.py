@@ -11,25 +11,29 @@ import shapely
 from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_same, objects_of, surroundings
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.merge import merge_databases
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
-from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.table import Licence, save_objects
+from semsig_gis.core import DatabaseError, GridSpec, SignatureSpec, Taxonomy
+from semsig_gis.database import (
+    ObjectStore,
+    TileSpec,
+    ViewpointSpec,
+    build_database,
+    build_tiles,
+    merge_databases,
+    open_database,
+    open_store,
+    save_database,
+    save_with_store,
+    store_path,
+)
+from semsig_gis.objects import Licence, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import geopandas as gpd
 
-    from semsig_gis.database.viewpoints import ViewpointMode
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import ViewpointMode
+    from semsig_gis.objects import StreetObjects
 
 EAST = float(CORNER[0])
 CLASSES = Taxonomy(

@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database import occlusion
-from semsig_gis.database.occlusion import Footprints, buildings_near, hidden
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.core import InputError
+from semsig_gis.database import Footprints, buildings_near, hidden, occlusion
+from semsig_gis.sources import load_catalog
 from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:

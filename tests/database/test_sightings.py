@@ -12,18 +12,27 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, TOWN, World, worlds
 
-from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec, cell_ids, wrap_degrees
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.database import viewpoints
-from semsig_gis.database.database import visible_objects_in
-from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.sightings import bearings, visible_objects_at
-from semsig_gis.database.viewpoints import ViewpointSpec, choose_viewpoints
-from semsig_gis.localization.likelihood.off_centre import views_aside
+from semsig_gis.core import (
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    ObjectIndex,
+    cell_ids,
+    wrap_degrees,
+)
+from semsig_gis.database import (
+    Footprints,
+    ViewpointSpec,
+    bearings,
+    choose_viewpoints,
+    viewpoints,
+    visible_objects_at,
+    visible_objects_in,
+)
+from semsig_gis.localization import views_aside
 
 if TYPE_CHECKING:
-    from semsig_gis.database.viewpoints import ViewpointMode
+    from semsig_gis.database import ViewpointMode
 
 
 # --- Viewpoints -------------------------------------------------------------------------------

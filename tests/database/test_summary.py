@@ -13,17 +13,15 @@ from hypothesis import assume, given
 from noisy_cells import six_cells
 from worlds import CORNER, lamps, surroundings, worlds
 
-from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.database.build import build_database
-from semsig_gis.database.summary import database_summary
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.core import EmptyResultError
+from semsig_gis.database import ViewpointSpec, build_database, database_summary
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from worlds import World
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 @pytest.fixture(scope="module")

@@ -18,34 +18,41 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_index_fits, assert_same, surroundings
 
-from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.database.build import build_cells, build_database
-from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, open_store, save_with_store, store_path
-from semsig_gis.database.tiles import TileSpec, build_tiles
-from semsig_gis.database.update import (
+from semsig_gis.core import (
+    CrsError,
+    DatabaseError,
+    EmptyResultError,
+    InputError,
+    ObjectClass,
+    Taxonomy,
+)
+from semsig_gis.database import (
+    ObjectStore,
+    TileSpec,
+    ViewpointSpec,
+    build_cells,
+    build_database,
+    build_tiles,
     compare_cells,
+    open_database,
+    open_store,
+    save_with_store,
+    store_path,
     update_database,
     update_file,
     update_tile,
     update_tiles,
 )
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.objects.table import Licence, save_objects
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.objects import Licence, assemble, choose_layers, read_files, save_objects
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from worlds import World
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.update import UpdateReport
-    from semsig_gis.database.viewpoints import ViewpointMode
-    from semsig_gis.objects.load import Loaded
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase, UpdateReport, ViewpointMode
+    from semsig_gis.objects import Loaded, StreetObjects
 
 # Two classes that are seen from further than the others, and one from nearer.
 RANGES = {CODES[0]: 45.0, CODES[1]: 12.5}

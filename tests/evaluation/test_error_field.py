@@ -11,8 +11,9 @@ import pytest
 from sentences import refused
 from small_city import small_city, small_evaluation
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.evaluation.error_field import ENOUGH, RADII, error_field, guess_error
+from semsig_gis.core import InputError
+from semsig_gis.evaluation import ENOUGH, RADII, guess_error
+from semsig_gis.evaluation.error_field import error_field
 
 CITY, EVALUATION = small_city()[0], small_evaluation()
 XY = np.stack([EVALUATION.queries.geometry.x, EVALUATION.queries.geometry.y], axis=1)

@@ -13,9 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.evaluation.figures import (
+from semsig_gis.core import InputError, wilson_interval
+from semsig_gis.evaluation import (
     AMBIGUITIES,
     LENGTHS,
     calibration_bins,
@@ -27,7 +26,7 @@ from semsig_gis.evaluation.figures import (
     query_figures,
     range_labels,
 )
-from semsig_gis.localization.distance.ties import THRESHOLDS
+from semsig_gis.localization import THRESHOLDS
 
 NAN = math.nan
 

@@ -13,24 +13,22 @@ from noisy_cells import noise_specs, random_database
 from pandas.testing import assert_frame_equal
 from sentences import refused
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.evaluation.file import (
+from semsig_gis.core import DatabaseError, InputError
+from semsig_gis.evaluation import (
+    NAMED_DISTORTIONS,
+    Detector,
+    QuerySpec,
+    evaluate,
+    machine,
     open_evaluation,
+    parse_chain,
     save_evaluation,
     settings_from_dict,
     settings_to_dict,
     used_noises,
 )
-from semsig_gis.evaluation.queries.distortion_text import NAMED_DISTORTIONS, parse_chain
-from semsig_gis.evaluation.queries.distortions import Detector
-from semsig_gis.evaluation.queries.draw import QuerySpec
-from semsig_gis.evaluation.result import machine
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.metrics.edit import EditWeights
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.noise.model import NoiseSpec
-from semsig_gis.storage.geoparquet import read_geoparquet, write_geoparquet
+from semsig_gis.localization import EditWeights, LikelihoodMethod, Method, NoiseSpec
+from semsig_gis.storage import read_geoparquet, write_geoparquet
 
 if TYPE_CHECKING:
     from pathlib import Path

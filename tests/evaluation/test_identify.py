@@ -21,32 +21,30 @@ from scipy.stats import spearmanr
 from sentences import refused
 from small_city import chances_of
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.city import City
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.evaluation.identifiability import result as identifiability_file
-from semsig_gis.evaluation.identifiability.analysis import _places, identify
-from semsig_gis.evaluation.identifiability.check import check_identifiability
-from semsig_gis.evaluation.identifiability.lookalikes import find_lookalikes
-from semsig_gis.evaluation.identifiability.result import (
+from semsig_gis.core import DatabaseError, InputError, wilson_interval
+from semsig_gis.database import City, open_database, save_database
+from semsig_gis.evaluation import (
+    check_identifiability,
+    draw_trials,
+    find_lookalikes,
+    identify,
     open_identifiability,
     save_identifiability,
+    symbol_columns,
+    trial_cells,
+    try_cells,
 )
-from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
-from semsig_gis.evaluation.identifiability.trials import draw_trials, trial_cells, try_cells
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.noise.model import NoiseSpec, named_noise
-from semsig_gis.observation.view import Photo
+from semsig_gis.evaluation.identifiability import result as identifiability_file
+from semsig_gis.evaluation.identifiability.analysis import _places
+from semsig_gis.localization import NoiseSpec, build_index, named_noise
+from semsig_gis.observation import Photo
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.evaluation.identifiability.result import (
-        Identifiability,
-    )
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.evaluation import Identifiability
+    from semsig_gis.localization import Noise
 
 DATABASE = random_database(5, cells=90, longest=8)
 INDEX = build_index(DATABASE, named_noise("medium"))

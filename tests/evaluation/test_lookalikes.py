@@ -14,26 +14,31 @@ from hypothesis import strategies as st
 from noisy_cells import mixtures, noise_specs, parts_of, random_database
 from scipy.special import ndtr
 
-from semsig_gis.core.signature import Signature
-from semsig_gis.evaluation.identifiability import lookalikes
-from semsig_gis.evaluation.identifiability.lookalikes import find_lookalikes
-from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
-from semsig_gis.evaluation.identifiability.trials import (
+from semsig_gis.core import Signature
+from semsig_gis.evaluation import (
     draw_trials,
+    find_lookalikes,
     leave_class_out,
+    symbol_columns,
     trial_cells,
     try_cells,
     try_without_classes,
 )
-from semsig_gis.localization.likelihood.association import rerank
-from semsig_gis.localization.likelihood.index import CellScores, build_index
-from semsig_gis.localization.likelihood.posterior import posterior
-from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.evaluation.identifiability import lookalikes
+from semsig_gis.localization import (
+    CellScores,
+    NoiseMixture,
+    NoiseSpec,
+    build_index,
+    named_noise,
+    posterior,
+    rerank,
+)
+from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
-    from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.evaluation import SymbolColumns
+    from semsig_gis.localization import Noise
 
 COLUMNS = symbol_columns(build_index(random_database(5, cells=300), named_noise("medium")))
 

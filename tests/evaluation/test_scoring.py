@@ -12,26 +12,39 @@ from noisy_cells import database_of, random_database
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.compare import changed_successes, common_cases, compare_evaluations
-from semsig_gis.evaluation.queries.distortions import DISTORTIONS, Detector, Distortion
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.localization.distance.ties import NEAR_PLACES, THRESHOLDS
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import make_locator, parse_method
-from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.reports.evaluation import evaluation_tables
+from semsig_gis.core import InputError, SemsigError
+from semsig_gis.database import ObjectStore
+from semsig_gis.evaluation import (
+    DISTORTIONS,
+    Detector,
+    Distortion,
+    QuerySpec,
+    changed_successes,
+    common_cases,
+    compare_evaluations,
+    draw_queries,
+    evaluate,
+)
+from semsig_gis.localization import (
+    NEAR_PLACES,
+    THRESHOLDS,
+    LikelihoodMethod,
+    Method,
+    NoiseSpec,
+    build_index,
+    cell_noise,
+    locate,
+    make_locator,
+    named_noise,
+    parse_method,
+    score_cells,
+)
+from semsig_gis.reports import evaluation_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation
 
 
 ALL_MISSED = Distortion(occurrences=1, bearing_sigma=0.0)

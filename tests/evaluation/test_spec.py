@@ -9,19 +9,16 @@ from hypothesis import strategies as st
 from noisy_cells import noise_specs
 from sentences import refused
 
-from semsig_gis.core.errors import SemsigError
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.distortions import Detector
-from semsig_gis.evaluation.spec import (
+from semsig_gis.core import SemsigError
+from semsig_gis.evaluation import (
+    Detector,
     Districts,
     ExperimentSpec,
     open_experiment_spec,
+    parse_chain,
     parse_experiment,
 )
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import parse_method
-from semsig_gis.localization.noise.model import NoiseSpec, save_noise
+from semsig_gis.localization import LikelihoodMethod, Method, NoiseSpec, parse_method, save_noise
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -19,8 +19,7 @@ from semsig_gis.exports import export_answer
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization import Localization, Location
 
 CITY, _ = small_city()
 LOCATION = small_location()

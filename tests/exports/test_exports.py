@@ -21,16 +21,15 @@ from small_city import (
     small_location,
 )
 
-from semsig_gis.core.errors import EmptyResultError, InputError, SemsigError, UnknownNameError
+from semsig_gis.core import EmptyResultError, InputError, SemsigError, UnknownNameError
 from semsig_gis.exports import LAYERS, RASTERS, export_answer, export_database
-from semsig_gis.localization.regions import search_regions
+from semsig_gis.localization import search_regions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization import Localization, Location
 
 CITY, OBJECTS = small_city()
 CHANCES = chances_of(CITY)

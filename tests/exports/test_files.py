@@ -20,10 +20,9 @@ from hypothesis import strategies as st
 from sentences import refused
 from small_city import chances_of, small_city, small_evaluation
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.database.file import open_database
-from semsig_gis.exports import export_database
-from semsig_gis.exports.files import as_written, formula_safe
+from semsig_gis.core import DatabaseError
+from semsig_gis.database import open_database
+from semsig_gis.exports import as_written, export_database, formula_safe
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -33,24 +33,32 @@ from sentences import refused
 from small_city import chances_of, small_city, small_localization, small_location
 from worlds import CORNER, World, assert_same
 
-from semsig_gis.core.errors import DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.signature import SignatureSpec, quantize
-from semsig_gis.core.symbology import OUTCOMES, class_signs
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.build import build_database
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.identifiability.result import Identifiability
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.geopackage import read_geopackage
-from semsig_gis.exports.styles import CLASS_MARKERS, by_class
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.objects.table import Licence, StreetObjects, open_objects, save_objects
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import (
+    OUTCOMES,
+    DatabaseError,
+    EmptyResultError,
+    GridSpec,
+    InputError,
+    SignatureSpec,
+    Taxonomy,
+    class_signs,
+    quantize,
+)
+from semsig_gis.database import ViewpointSpec, build_database
+from semsig_gis.evaluation import Identifiability, evaluate
+from semsig_gis.exports import (
+    CLASS_MARKERS,
+    by_class,
+    export_answer,
+    export_database,
+    read_geopackage,
+)
+from semsig_gis.localization import Method
+from semsig_gis.objects import Licence, StreetObjects, open_objects, save_objects
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import CellGeometry
+    from semsig_gis.database import CellGeometry
 
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"

@@ -16,24 +16,23 @@ from rio_cogeo.cogeo import cog_validate
 from sentences import refused
 from small_city import chances_of, small_city, small_evaluation, small_location
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.core.symbology import ERROR_BREAKS, FAILURES
+from semsig_gis.core import ERROR_BREAKS, FAILURES, GridSpec, InputError
 from semsig_gis.evaluation.error_field import error_field
-from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.rasters import (
+from semsig_gis.exports import (
+    AMBIGUITY,
     CLEAR,
     ERRORS,
     STYLES,
     by_pixel,
     cell_errors,
+    export_answer,
+    export_database,
     export_geotiff,
 )
-from semsig_gis.exports.styles import AMBIGUITY
 from semsig_gis.storage import raster
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 def assert_holds(file: Path, database: SignatureDatabase, values: np.ndarray) -> None:

@@ -21,23 +21,25 @@ from machine import PATIENCE_S, qgis_variables
 from map_pages import HOSTILE
 from small_city import chances_of, small_city, small_evaluation, small_localization, small_location
 
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.exports import export_answer, export_database
-from semsig_gis.exports.hexagons import hexagons_layer
-from semsig_gis.exports.layers import (
+from semsig_gis.core import Taxonomy
+from semsig_gis.exports import (
     answer_layers,
     cells_layer,
     evaluation_layers,
+    export_answer,
+    export_database,
     figures_apart,
+    hexagons_layer,
+    layer_fields,
     objects_layer,
+    project_archive,
+    shown_layers,
 )
-from semsig_gis.exports.project import layer_fields, project_archive, shown_layers
-from semsig_gis.localization.regions import search_regions
-from semsig_gis.objects.table import Licence
+from semsig_gis.localization import search_regions
+from semsig_gis.objects import Licence
 
 if TYPE_CHECKING:
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization import Localization, Location
 
 PROGRAM = Path(__file__).parents[1] / "qgis_project.py"
 SVG = "{http://www.w3.org/2000/svg}"

@@ -18,10 +18,10 @@ from pystac.extensions.projection import ProjectionExtension
 from sentences import refused
 from small_city import small_city
 
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.database.file import save_database
+from semsig_gis.core import DatabaseError, InputError
+from semsig_gis.database import save_database
 from semsig_gis.exports import export_item
-from semsig_gis.objects.table import save_objects
+from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -12,17 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.sequences import SequenceTable
-from semsig_gis.localization.distance.memo import DistanceMemo
-from semsig_gis.localization.requirement import Requirement
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import WILDCARD, InputError, UnknownNameError
+from semsig_gis.database import SequenceTable
+from semsig_gis.localization import DistanceMemo, Requirement
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.core.errors import SemsigError
+    from semsig_gis.core import SemsigError
 
 
 def test_distances_are_measured_once_and_the_time_is_told() -> None:

@@ -10,17 +10,20 @@ from sentences import refused
 from worlds import random_town, save_town
 
 import semsig_gis
-from semsig_gis.core.defaults import DEFAULT_METHOD, PAPER_METHOD
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.city import open_city
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import localize, parse_method
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.localization.requirement import Requirement
+from semsig_gis.core import DEFAULT_METHOD, PAPER_METHOD, InputError
+from semsig_gis.database import open_city
+from semsig_gis.evaluation import evaluate
+from semsig_gis.localization import (
+    LikelihoodMethod,
+    Method,
+    Requirement,
+    build_index,
+    cell_noise,
+    localize,
+    locate,
+    named_noise,
+    parse_method,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,17 +14,14 @@ from noisy_cells import cells_at
 from sentences import refused
 from small_city import small_city, small_localization, small_location
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.localization.likelihood.posterior import Posterior
-from semsig_gis.localization.regions import search_regions
+from semsig_gis.core import GridSpec, InputError
+from semsig_gis.localization import Posterior, search_regions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.distance.search import Localization
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Localization, Location
 
 Cell = tuple[int, int]
 PLACES = st.tuples(st.integers(-3, 3), st.integers(-3, 3))

@@ -8,8 +8,7 @@ import pytest
 from map_pages import MapPage, assert_quiet
 from small_city import small_city, small_evaluation
 
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.page import save_map
+from semsig_gis.maps import evaluation_map, save_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

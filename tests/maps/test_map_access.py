@@ -20,12 +20,17 @@ from small_city import (
     small_location,
 )
 
-from semsig_gis.database.build import build_database
-from semsig_gis.maps.cells import ambiguity_map, identifiability_map
-from semsig_gis.maps.drift import drift_map
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.location import localization_map, location_map
-from semsig_gis.maps.objects import ground_map, objects_map
+from semsig_gis.database import build_database
+from semsig_gis.maps import (
+    ambiguity_map,
+    drift_map,
+    evaluation_map,
+    ground_map,
+    identifiability_map,
+    localization_map,
+    location_map,
+    objects_map,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,19 +16,22 @@ from selenium.webdriver.support.wait import WebDriverWait
 from small_city import chances_of
 from worlds import CODES, TAXONOMY, random_town
 
-from semsig_gis.core.symbology import OBJECT_COLOURS, SAME_LEVELS, SAME_TYPES
-from semsig_gis.database.build import build_database
-from semsig_gis.database.update import compare_cells
-from semsig_gis.maps.cells import ambiguity_map, identifiability_map
-from semsig_gis.maps.drift import drift_map
-from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.page_elements import layers_of, to_latlon
-from semsig_gis.objects.changes import compare_objects
+from semsig_gis.core import OBJECT_COLOURS, SAME_LEVELS, SAME_TYPES
+from semsig_gis.database import build_database, compare_cells
+from semsig_gis.maps import (
+    ambiguity_map,
+    drift_map,
+    identifiability_map,
+    layers_of,
+    objects_map,
+    to_latlon,
+)
+from semsig_gis.objects import compare_objects
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 CITY = random_town().database
 TOLD = chances_of(CITY)

@@ -16,18 +16,15 @@ from selenium.webdriver.common.keys import Keys
 from sentences import refused
 from small_city import small_city, small_evaluation
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.symbology import FAILURES, OUTCOMES
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.page import page_of_map
-from semsig_gis.maps.page_elements import OUTLINES
+from semsig_gis.core import FAILURES, OUTCOMES, InputError
+from semsig_gis.evaluation import evaluate
+from semsig_gis.localization import Method
+from semsig_gis.maps import OUTLINES, evaluation_map, page_of_map
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation
 
 SUCCESSFUL, FAILED = (mark.colour for mark in OUTCOMES.values())
 # How much of the lines is drawn.

@@ -12,10 +12,9 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 from small_city import small_city, small_evaluation
 
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.maps.evaluation import evaluation_map
+from semsig_gis.evaluation import evaluate
+from semsig_gis.localization import build_index, named_noise
+from semsig_gis.maps import evaluation_map
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,15 +16,21 @@ from noisy_cells import cells_at
 from PIL import Image
 from pyproj import CRS, Transformer
 
-from semsig_gis.core.geometry import GridSpec
+from semsig_gis.core import GridSpec
+from semsig_gis.maps import (
+    city_image,
+    corners_of,
+    level_image,
+    mercator,
+    place_lattices,
+    script_json,
+)
 from semsig_gis.maps import image as map_image
-from semsig_gis.maps.image import city_image, level_image, mercator, place_lattices, script_json
-from semsig_gis.maps.page_elements import corners_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 PLACES = [
     ("EPSG:2154", (765_200.0, 6_275_000.0)),

@@ -12,31 +12,26 @@ from html_pages import HtmlPage
 from small_city import chances_of, small_city
 
 import semsig_gis
-from semsig_gis.core.signature import Signature
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.core.text import percent
-from semsig_gis.database.update import CellChanges
-from semsig_gis.evaluation.queries.distortions import MissingClasses
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.answer_rule import AnswerRule
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.maps.cells import ambiguity_legend, identifiability_legend
-from semsig_gis.maps.drift import drift_legend
-from semsig_gis.maps.evaluation import evaluation_legend
-from semsig_gis.maps.location import localization_legend, location_legend
-from semsig_gis.maps.objects import objects_legend
-from semsig_gis.objects.changes import ClassChange, ObjectChanges
-from semsig_gis.objects.table import Licence
+from semsig_gis.core import Signature, Taxonomy, percent
+from semsig_gis.database import CellChanges
+from semsig_gis.evaluation import MissingClasses, evaluate
+from semsig_gis.localization import AnswerRule, Method, build_index, localize, locate, named_noise
+from semsig_gis.maps import (
+    ambiguity_legend,
+    drift_legend,
+    evaluation_legend,
+    identifiability_legend,
+    localization_legend,
+    location_legend,
+    objects_legend,
+)
+from semsig_gis.objects import ClassChange, Licence, ObjectChanges
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}{{7*7}}&\\é\u202eabc"
 CITY, OBJECTS = small_city()

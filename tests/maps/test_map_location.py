@@ -12,23 +12,16 @@ from map_pages import IMAGES, LEGEND
 from selenium.webdriver.common.by import By
 from worlds import random_town
 
-from semsig_gis.core.signature import Signature
-from semsig_gis.core.symbology import ANSWERS, CANDIDATE_RAMP, VERDICTS
-from semsig_gis.core.text import percent
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.maps.location import SECTOR, localization_map, location_map
-from semsig_gis.maps.page_elements import OUTLINES
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.core import ANSWERS, CANDIDATE_RAMP, VERDICTS, Signature, percent
+from semsig_gis.database import ObjectStore
+from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
+from semsig_gis.maps import OUTLINES, SECTOR, localization_map, location_map
+from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
     from map_pages import MapPage
 
-    from semsig_gis.localization.likelihood.locate import Location
+    from semsig_gis.localization import Location
 
 WORLD = random_town()
 CITY = WORLD.database

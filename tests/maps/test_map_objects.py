@@ -19,15 +19,10 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 from worlds import random_town
 
-from semsig_gis.core.symbology import class_signs
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.locator import localize
-from semsig_gis.maps.location import localization_map
-from semsig_gis.maps.objects import ground_map, objects_map
-from semsig_gis.maps.page import page_of_map
-from semsig_gis.maps.page_elements import to_latlon
-from semsig_gis.objects.table import Licence, StreetObjects
+from semsig_gis.core import Taxonomy, class_signs
+from semsig_gis.localization import Method, localize
+from semsig_gis.maps import ground_map, localization_map, objects_map, page_of_map, to_latlon
+from semsig_gis.objects import Licence, StreetObjects
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,9 +13,8 @@ from html_pages import HtmlPage
 from map_pages import requested
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.maps import page as map_page
-from semsig_gis.maps.page import (
+from semsig_gis.core import InputError, UnknownNameError
+from semsig_gis.maps import (
     asset_text,
     assets,
     external_files,
@@ -24,6 +23,7 @@ from semsig_gis.maps.page import (
     save_map,
     show_map,
 )
+from semsig_gis.maps import page as map_page
 
 if TYPE_CHECKING:
     from pathlib import Path

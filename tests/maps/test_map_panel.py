@@ -15,10 +15,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_evaluation
 from worlds import random_town
 
-from semsig_gis.maps.cells import ambiguity_map
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.page_elements import to_latlon
+from semsig_gis.maps import ambiguity_map, evaluation_map, objects_map, to_latlon
 
 if TYPE_CHECKING:
     from map_pages import MapPage

@@ -8,10 +8,8 @@ import pytest
 from map_pages import HOSTILE
 from small_city import small_city, small_location
 
-from semsig_gis.core.symbology import GROUP_COLOURS
-from semsig_gis.maps.cells import ambiguity_map
-from semsig_gis.maps.location import location_map
-from semsig_gis.maps.page import save_map
+from semsig_gis.core import GROUP_COLOURS
+from semsig_gis.maps import ambiguity_map, location_map, save_map
 
 if TYPE_CHECKING:
     from map_pages import MapPage

@@ -11,8 +11,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_location
 
-from semsig_gis.maps.cells import ambiguity_map
-from semsig_gis.maps.location import location_map
+from semsig_gis.maps import ambiguity_map, location_map
 
 if TYPE_CHECKING:
     from map_pages import MapPage

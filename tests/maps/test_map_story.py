@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 from map_pages import IMAGES
 from small_city import chances_of, small_city, small_evaluation, small_location
 
-from semsig_gis.maps.cells import Cells, ambiguity_map, identifiability_map
-from semsig_gis.maps.city import city_map
-from semsig_gis.maps.drift import drift_map
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.location import location_map
-from semsig_gis.maps.objects import objects_map
-from semsig_gis.maps.page_elements import layers_of
+from semsig_gis.maps import (
+    Cells,
+    ambiguity_map,
+    city_map,
+    drift_map,
+    evaluation_map,
+    identifiability_map,
+    layers_of,
+    location_map,
+    objects_map,
+)
 
 if TYPE_CHECKING:
     import folium

@@ -25,37 +25,45 @@ from sentences import refused
 from small_city import chances_of
 from worlds import TAXONOMY, random_town
 
-from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, InputError
-from semsig_gis.core.signature import SignatureSpec
-from semsig_gis.core.symbology import CANDIDATE_RAMP, OBJECT_COLOURS, VERDICTS
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.queries.distortions import MissingClasses
-from semsig_gis.evaluation.queries.draw import QuerySpec
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.maps.cells import ambiguity_map, identifiability_map
-from semsig_gis.maps.drift import drift_map
-from semsig_gis.maps.evaluation import evaluation_map
-from semsig_gis.maps.location import localization_map, location_map
-from semsig_gis.maps.objects import ground_map, objects_map
-from semsig_gis.maps.page_elements import layers_of, page_element, search_area, to_latlon
-from semsig_gis.objects.table import Licence, StreetObjects
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.core import (
+    CANDIDATE_RAMP,
+    OBJECT_COLOURS,
+    VERDICTS,
+    CrsError,
+    DatabaseError,
+    EmptyResultError,
+    InputError,
+    SignatureSpec,
+    Taxonomy,
+)
+from semsig_gis.database import ObjectStore, build_database
+from semsig_gis.evaluation import MissingClasses, QuerySpec, evaluate
+from semsig_gis.localization import Method, build_index, localize, locate, named_noise
+from semsig_gis.maps import (
+    ambiguity_map,
+    drift_map,
+    evaluation_map,
+    ground_map,
+    identifiability_map,
+    layers_of,
+    localization_map,
+    location_map,
+    objects_map,
+    page_element,
+    search_area,
+    to_latlon,
+)
+from semsig_gis.objects import Licence, StreetObjects
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from map_pages import MapPage
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.localization import Noise
 
 WORLD = random_town()
 CITY, OBJECTS = WORLD.database, WORLD.street_objects

@@ -11,18 +11,15 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import CODES, TAXONOMY, objects_of
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.taxonomy import ObjectClass, Taxonomy
-from semsig_gis.objects.changes import compare_objects, replace_layers
-from semsig_gis.objects.table import Licence, open_objects, save_objects
+from semsig_gis.core import CrsError, InputError, ObjectClass, Taxonomy
+from semsig_gis.objects import Licence, compare_objects, open_objects, replace_layers, save_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from worlds import Thing
 
-    from semsig_gis.objects.changes import ObjectChanges
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import ObjectChanges, StreetObjects
 
 TREE, _, LAMP = CODES[:3]
 KINDS = ("same", "moved", "changed", "removed", "added")

@@ -14,19 +14,15 @@ from hypothesis import strategies as st
 from sentences import refused
 from worlds import TAXONOMY, objects_of
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.objects.conflate import conflate
-from semsig_gis.objects.load import build_objects
-from semsig_gis.objects.table import Licence, open_objects, save_objects
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.vector import read_layer
+from semsig_gis.core import InputError, UnknownNameError
+from semsig_gis.objects import Licence, build_objects, conflate, open_objects, save_objects
+from semsig_gis.sources import load_catalog, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from semsig_gis.objects.conflate import ConflationReport
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import ConflationReport, StreetObjects
 
 LICENCES = (Licence("A (CC0)", ("a",)), Licence("B (ODbL)", ("b",)))
 

@@ -20,29 +20,36 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.objects.draft import draft_catalog
-from semsig_gis.objects.guesses import (
+from semsig_gis.core import CrsError, SourceError
+from semsig_gis.objects import (
     Column,
     Sample,
+    assemble,
     columns_of,
+    draft_catalog,
     guess_class,
     guess_class_by,
     guess_position,
+    read_files,
 )
-from semsig_gis.objects.load import assemble, read_files
-from semsig_gis.sources import reader
-from semsig_gis.sources.catalog import catalog_names, load_catalog, paper_taxonomy
-from semsig_gis.sources.keywords import Keywords, Match, keywords, words_of
-from semsig_gis.sources.vector import LayerInfo
+from semsig_gis.sources import (
+    Keywords,
+    LayerInfo,
+    Match,
+    catalog_names,
+    keywords,
+    load_catalog,
+    paper_taxonomy,
+    reader,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from semsig_gis.core.taxonomy import ObjectClass
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.catalog import Catalog
+    from semsig_gis.core import ObjectClass
+    from semsig_gis.sources import Catalog, RawLayer
 
 # What a person would take of the comments.
 OFFERED = re.compile(r"# (?=\[\[classes|(?:where|class_by|\w*id\w*|code|symbol|name|title) = )")

@@ -9,20 +9,24 @@ from pyproj import CRS, Geod, Proj, Transformer
 from raw_layers import raw_layer
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.core.geometry import angular_distance, grid_convergence, wrap_degrees
-from semsig_gis.database.build import build_database
-from semsig_gis.objects.extent import settle_extent
-from semsig_gis.objects.load import assemble
-from semsig_gis.sources.catalog import Catalog, paper_taxonomy
-from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.core import (
+    CrsError,
+    EmptyResultError,
+    InputError,
+    angular_distance,
+    grid_convergence,
+    wrap_degrees,
+)
+from semsig_gis.database import build_database
+from semsig_gis.objects import assemble, settle_extent
+from semsig_gis.sources import Catalog, LayerSpec, paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.objects.load import Loaded
+    from semsig_gis.objects import Loaded
     from semsig_gis.sources import RawLayer
 
 HELSINKI, PARIS, BERLIN, LYON = (24.94, 60.17), (2.35, 48.86), (13.4, 52.52), (4.83, 45.76)

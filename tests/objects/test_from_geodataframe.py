@@ -14,18 +14,14 @@ import shapely
 from osm_xml import street_town, write_osm
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, EmptyResultError, InputError
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.objects.from_geodataframe import objects_from_frame
-from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.core import CrsError, EmptyResultError, InputError
+from semsig_gis.database import ObjectStore, ViewpointSpec, build_database
+from semsig_gis.objects import assemble, choose_layers, objects_from_frame, read_files
+from semsig_gis.sources import Catalog, LayerSpec, load_catalog, paper_taxonomy
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.objects import StreetObjects
 
 OSM = load_catalog("openstreetmap")
 KEYS = ["amenity", "highway", "natural", "traffic_sign", "building"]

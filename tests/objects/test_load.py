@@ -12,29 +12,33 @@ from raw_layers import raw_layer
 from sentences import refused
 from servers import Answer, Server
 
-from semsig_gis.core.errors import (
-    InputError,
-    SourceError,
-    UnknownNameError,
-)
-from semsig_gis.core.geometry import MERGED
-from semsig_gis.database.build import build_database
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.objects.fetch import fetch_layers, find_area, open_cache
-from semsig_gis.objects.load import (
+from semsig_gis.core import MERGED, InputError, SourceError, UnknownNameError
+from semsig_gis.database import build_database, open_database, save_database
+from semsig_gis.objects import (
     assemble,
     choose_layers,
+    fetch_layers,
+    find_area,
+    open_cache,
+    open_objects,
+    passed_by,
+    quality_report,
     read_files,
+    read_small,
+    save_objects,
 )
-from semsig_gis.objects.quality import quality_report
-from semsig_gis.objects.skipped_layers import passed_by, read_small
-from semsig_gis.objects.table import open_objects, save_objects
-from semsig_gis.reports.quality import quality_tables
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import Catalog, load_catalog, paper_taxonomy
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
+from semsig_gis.reports import quality_tables
+from semsig_gis.sources import (
+    Catalog,
+    ClassBy,
+    LayerSpec,
+    RowCounts,
+    RowRules,
+    Rows,
+    load_catalog,
+    paper_taxonomy,
+)
 from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.rows import RowRules, Rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -92,9 +96,9 @@ def test_the_classes_of_the_paper_are_not_taken_from_others() -> None:
         rows.read += 1
         rows.add([text], text, (0.0, 0.0))
     assert own.classes == ("taxi_station",)
-    sifted = rules.sift(rows)
-    assert sifted.table["source_id"].tolist() == ["Taxi"]
-    assert sifted.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
+    filtered = rules.apply(rows)
+    assert filtered.table["source_id"].tolist() == ["Taxi"]
+    assert filtered.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
 
 
 def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None:

@@ -13,17 +13,13 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from raw_layers import raw_layer
 
-from semsig_gis.objects.conflate import conflate
-from semsig_gis.objects.load import build_objects
-from semsig_gis.objects.quality import quality_report
-from semsig_gis.objects.table import StreetObjects
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.objects import StreetObjects, build_objects, conflate, quality_report
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from semsig_gis.objects.load import LoadReport
-    from semsig_gis.objects.quality import QualityReport
+    from semsig_gis.objects import LoadReport, QualityReport
     from semsig_gis.sources import RawLayer
 
 TAXONOMY = paper_taxonomy()

@@ -11,9 +11,8 @@ import shapely
 from osm_xml import node, way, write_osm
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.objects.surroundings import read_area, read_surroundings, save_surroundings
-from semsig_gis.objects.table import licenses_of
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.objects import licenses_of, read_area, read_surroundings, save_surroundings
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -20,17 +20,22 @@ from raw_layers import raw_layer
 from sentences import assert_sentence, refused
 from worlds import objects_of
 
-from semsig_gis.core.errors import CrsError, DatabaseError, EmptyResultError, UnknownNameError
-from semsig_gis.objects.load import LayerReport, build_objects
-from semsig_gis.objects.table import Licence, objects_specs, open_objects, save_objects
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.storage.geoparquet import geo_metadata, write_geoparquet
+from semsig_gis.core import CrsError, DatabaseError, EmptyResultError, UnknownNameError
+from semsig_gis.objects import (
+    LayerReport,
+    Licence,
+    build_objects,
+    objects_specs,
+    open_objects,
+    save_objects,
+)
+from semsig_gis.sources import RowCounts, load_catalog, paper_taxonomy
+from semsig_gis.storage import geo_metadata, write_geoparquet
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
     from semsig_gis.sources import RawLayer
 
 LAMBERT = "EPSG:2154"

@@ -13,17 +13,14 @@ from noisy_cells import parts_of
 from sentences import assert_sentence, refused
 from worlds import TAXONOMY
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.observation.files import parse_queries, parse_route, read_queries, read_route
-from semsig_gis.observation.leg import Leg
-from semsig_gis.observation.north import North
+from semsig_gis.core import InputError, Signature
+from semsig_gis.observation import Leg, North, parse_queries, parse_route, read_queries, read_route
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.observation.files import QueryLine
+    from semsig_gis.observation import QueryLine
 
 ROWS = st.lists(
     st.lists(st.tuples(st.sampled_from("BCDEG?"), st.integers(0, 359)), min_size=1, max_size=6),

@@ -13,17 +13,10 @@ from pyproj import CRS
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.geometry import GridSpec, grid_convergence
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.file import PartitionedDatabase, save_database
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.observation.north import GRID_NORTH, North, declination
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.core import GridSpec, InputError, Signature, UnknownNameError, grid_convergence
+from semsig_gis.database import PartitionedDatabase, save_database
+from semsig_gis.localization import Method, build_index, localize, locate, named_noise
+from semsig_gis.observation import GRID_NORTH, North, Photo, View, declination
 
 if TYPE_CHECKING:
     from pathlib import Path

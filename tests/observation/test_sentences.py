@@ -12,13 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import SemsigError
-from semsig_gis.observation.sentences import GUESS_ERROR, parse_view
-from semsig_gis.observation.view import Photo
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.core import SemsigError
+from semsig_gis.observation import GUESS_ERROR, Photo, parse_view
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
-    from semsig_gis.observation.view import View
+    from semsig_gis.observation import View
 
 TAXONOMY = load_catalog("openstreetmap").taxonomy
 

@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.observation.view import FULL_VIEW, Photo, View
+from semsig_gis.core import InputError, Signature
+from semsig_gis.observation import FULL_VIEW, Photo, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,7 +19,7 @@ from view_oracle import cell_loglik, random_view
 from benchmarks import bayes, chances, history, stranger, tables, views
 from benchmarks.views import NOISE
 from semsig_gis.maps import page
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.observation import Photo, View
 
 MEASURES = ("edit", "jaccard", "histogram")
 SINGLES = {

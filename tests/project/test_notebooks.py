@@ -15,8 +15,8 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
 
-from semsig_gis.maps.page import MapFrame
-from semsig_gis.reports.plots import Picture
+from semsig_gis.maps import MapFrame
+from semsig_gis.reports import Picture
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

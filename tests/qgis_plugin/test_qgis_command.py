@@ -30,11 +30,10 @@ from sentences import refused
 
 from semsig_gis.cli.commands import app
 from semsig_gis.cli.console import VARIABLE
-from semsig_gis.core.defaults import DEFAULT_METHOD
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.noise.model import NOISES
-from semsig_gis.sources.catalog import catalog_names, load_catalog
+from semsig_gis.core import DEFAULT_METHOD
+from semsig_gis.evaluation import parse_chain
+from semsig_gis.localization import NOISES, Method
+from semsig_gis.sources import catalog_names, load_catalog
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
 

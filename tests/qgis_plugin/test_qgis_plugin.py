@@ -25,9 +25,8 @@ from machine import PATIENCE_S, qgis_variables, unavailable
 from small_city import small_city
 
 import semsig_gis
-from semsig_gis.database.file import open_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.objects.table import open_objects, save_objects
+from semsig_gis.database import ObjectStore, open_database, save_with_store
+from semsig_gis.objects import open_objects, save_objects
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = ROOT / "qgis_plugin" / "semsig"

@@ -16,9 +16,16 @@ from sentences import refused
 from worlds import random_town
 
 from semsig_gis import Method, build_index, evaluate, identify, localize, locate, named_noise
-from semsig_gis.core.errors import EmptyResultError, InputError, UnknownNameError
-from semsig_gis.core.symbology import CELL_CHANCES, GROUP_COLOURS, SHADES, class_signs
-from semsig_gis.maps.page import MapFrame
+from semsig_gis.core import (
+    CELL_CHANCES,
+    GROUP_COLOURS,
+    SHADES,
+    EmptyResultError,
+    InputError,
+    UnknownNameError,
+    class_signs,
+)
+from semsig_gis.maps import MapFrame
 from semsig_gis.reports import axes as drawing
 
 if TYPE_CHECKING:
@@ -28,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from numpy.typing import NDArray
 
-    from semsig_gis.evaluation.result import PlotKind
+    from semsig_gis.evaluation import PlotKind
 
 TOWN = random_town()
 CITY, OBJECTS = TOWN.database, TOWN.street_objects

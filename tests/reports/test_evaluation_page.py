@@ -14,15 +14,10 @@ from map_pages import MapPage, assert_quiet
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.reports.evaluation import evaluation_headline, paris_points
-from semsig_gis.reports.evaluation_page import evaluation_page
-from semsig_gis.reports.page import write_page
+from semsig_gis.core import InputError
+from semsig_gis.evaluation import evaluate, parse_chain
+from semsig_gis.localization import Method, build_index, named_noise
+from semsig_gis.reports import evaluation_headline, evaluation_page, paris_points, write_page
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,8 +25,8 @@ if TYPE_CHECKING:
 
     from selenium.webdriver import Chrome
 
-    from semsig_gis.evaluation.result import Evaluation
-    from semsig_gis.reports.report_model import Section
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.reports import Section
 
 CITY = random_town().database
 

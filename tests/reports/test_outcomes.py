@@ -7,10 +7,9 @@ import pytest
 from reports import HARM, LONG, outcome_map, texts
 from worlds import random_town
 
-from semsig_gis.core.symbology import OUTCOMES
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.reports import outcomes
-from semsig_gis.reports.outcomes import draw_map
+from semsig_gis.core import OUTCOMES
+from semsig_gis.evaluation import evaluate
+from semsig_gis.reports import draw_map, outcomes
 
 CITY = random_town().database
 

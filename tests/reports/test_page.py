@@ -23,17 +23,15 @@ from reports import HARM, LONG, hostile_report, ordinary_report, plot, report, s
 from sentences import refused
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.text import one_line
-from semsig_gis.reports.page import html_page, markdown_page, write_page, write_report
-from semsig_gis.reports.report_model import Number, Section
+from semsig_gis.core import InputError, one_line
+from semsig_gis.reports import Number, Section, html_page, markdown_page, write_page, write_report
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from selenium.webdriver import Chrome
 
-    from semsig_gis.reports.report_model import Report
+    from semsig_gis.reports import Report
 
 FLOATS = st.none() | st.floats()
 TEXTS = st.text(max_size=20) | st.sampled_from(["=1+1", "\t@a", "+", "-2", "a,b", 'a"b', "a\nb"])

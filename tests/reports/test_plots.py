@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from matplotlib.lines import Line2D
 from reports import HARM, LONG, plot, texts
 
-from semsig_gis.reports.plots import (
+from semsig_gis.reports import (
     COLOURS,
     DARK,
     GRID,
     GROUND,
     INK,
-    _look,
+    Curve,
+    Plot,
     blank_figure,
     draw_curve,
     draw_legend,
@@ -28,10 +29,10 @@ from semsig_gis.reports.plots import (
     label,
     saved,
 )
-from semsig_gis.reports.report_model import Curve, Plot
+from semsig_gis.reports.plots import _look
 
 if TYPE_CHECKING:
-    from semsig_gis.reports.plots import Picture
+    from semsig_gis.reports import Picture
 
 
 def picture(text: str, *, title: str = "A title") -> Picture:

@@ -14,54 +14,50 @@ from noisy_cells import random_database, rows, six_cells
 from small_city import chances_of
 from worlds import random_town
 
-from semsig_gis.core.geometry import Distortion
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.update import UpdateReport
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.experiments.tables import (
+from semsig_gis.core import Distortion, wilson_interval
+from semsig_gis.database import UpdateReport, ViewpointSpec
+from semsig_gis.evaluation import (
+    ChanceBin,
+    ExperimentSpec,
+    IdentifiabilityCheck,
+    QuerySpec,
+    check_identifiability,
+    evaluate,
     experiment_figures,
     experiment_markdown,
     experiment_tables,
+    identify,
+    parse_chain,
 )
-from semsig_gis.evaluation.identifiability.analysis import identify
-from semsig_gis.evaluation.identifiability.check import (
-    ChanceBin,
-    IdentifiabilityCheck,
-    check_identifiability,
+from semsig_gis.localization import LikelihoodMethod, Method, build_index, named_noise
+from semsig_gis.objects import (
+    ClassChange,
+    ClassQuality,
+    ConflatedPair,
+    LayerReport,
+    QualityReport,
+    UnreadLayer,
 )
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.evaluation.spec import ExperimentSpec
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.noise.model import named_noise
-from semsig_gis.objects.changes import ClassChange
-from semsig_gis.objects.conflate import ConflatedPair
-from semsig_gis.objects.load import LayerReport, UnreadLayer
-from semsig_gis.objects.quality import ClassQuality, QualityReport
-from semsig_gis.reports.database import database_tables
-from semsig_gis.reports.evaluation import (
+from semsig_gis.reports import (
+    check_tables,
     comparison_sentence,
     comparison_table,
+    database_tables,
     evaluation_tables,
-)
-from semsig_gis.reports.identifiability import (
-    check_tables,
     identifiability_page,
     identifiability_tables,
+    quality_tables,
+    update_tables,
+    write_report,
 )
-from semsig_gis.reports.page import write_report
-from semsig_gis.reports.quality import quality_tables, update_tables
 from semsig_gis.sources import RowCounts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.core.tables import Table
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.core import Table
+    from semsig_gis.localization import LikelihoodIndex
 
 SIX = six_cells()
 LONG = replace(

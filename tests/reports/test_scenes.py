@@ -14,22 +14,21 @@ from reports import HARM, LONG, hostile_report, scene, texts
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.symbology import class_signs
-from semsig_gis.evaluation.scoring import evaluate
-from semsig_gis.reports.report_model import SceneObject
-from semsig_gis.reports.scenes import (
-    _round_length,
+from semsig_gis.core import InputError, class_signs
+from semsig_gis.evaluation import evaluate
+from semsig_gis.reports import (
+    SceneObject,
     cell_scene,
     draw_scene,
     draw_scenes,
     example_scenes,
     failure_pairs,
 )
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.reports.scenes import _round_length
+from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation
 
 CLASSES = paper_taxonomy()
 TOWN = random_town()

@@ -6,17 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.tables import Table, figure, interval
-from semsig_gis.core.text import percent
-from semsig_gis.reports.report_model import Number
-from semsig_gis.reports.tables import (
+from semsig_gis.core import Table, figure, interval, percent
+from semsig_gis.reports import (
     WIDEST,
-    _width,
+    Number,
     brief_notes,
     distortion_rows,
     note_tables,
     number_table,
 )
+from semsig_gis.reports.tables import _width
 
 FIGURES = st.none() | st.floats(-1e6, 1e6)
 NUMBERS = st.lists(

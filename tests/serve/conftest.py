@@ -9,7 +9,7 @@ from small_city import small_city
 from workbench import serving
 
 from semsig_gis import ObjectStore, open_city, save_with_store
-from semsig_gis.serve.workbench import Workbench
+from semsig_gis.serve import Workbench
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -17,13 +17,10 @@ from pyproj import Transformer
 from sentences import refused
 from workbench import bomb
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.sightings import visible_objects_at
-from semsig_gis.observation.detectors.camera import Camera
-from semsig_gis.observation.view import View
-from semsig_gis.serve.question import Question
-from semsig_gis.serve.streets import city_ground
-from semsig_gis.serve.workbench import Workbench
+from semsig_gis.core import InputError
+from semsig_gis.database import visible_objects_at
+from semsig_gis.observation import Camera, View
+from semsig_gis.serve import Question, Workbench, city_ground
 
 if TYPE_CHECKING:
     from collections.abc import Callable

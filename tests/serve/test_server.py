@@ -11,15 +11,14 @@ from machine import PATIENCE_S
 from sentences import refused
 from workbench import serving
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.threads import share_rows
+from semsig_gis.core import InputError, share_rows
 from semsig_gis.serve import server
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from workbench import Page
 
-    from semsig_gis.serve.workbench import Workbench
+    from semsig_gis.serve import Workbench
 
 
 @pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])

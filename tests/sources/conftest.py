@@ -8,8 +8,7 @@ import pytest
 from machine import PATIENCE_S
 from servers import Server
 
-from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import HttpSpec
+from semsig_gis.sources import Cache, HttpSpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

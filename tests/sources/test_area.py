@@ -14,11 +14,18 @@ from hypothesis import strategies as st
 from pyproj import Geod
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError, SemsigError
-from semsig_gis.sources import RawLayer, RowCounts
-from semsig_gis.sources.area import join_areas
-from semsig_gis.sources.clip import clip_layer, clip_layers, names_place, note_outside, parse_area
-from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.core import CrsError, InputError, SemsigError
+from semsig_gis.sources import (
+    LayerSpec,
+    RawLayer,
+    RowCounts,
+    clip_layer,
+    clip_layers,
+    join_areas,
+    names_place,
+    note_outside,
+    parse_area,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,23 +14,24 @@ import shapely
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, InputError, SourceError, UnknownNameError
-from semsig_gis.core.taxonomy import ObjectClass
-from semsig_gis.sources import FILE_SUFFIXES, find_files
-from semsig_gis.sources.catalog import (
+from semsig_gis.core import CatalogError, InputError, ObjectClass, SourceError, UnknownNameError
+from semsig_gis.sources import (
+    DRIVERS,
+    FILE_SUFFIXES,
     Catalog,
+    LayerSpec,
+    WidthBy,
     catalog_names,
     combine_catalogs,
+    find_files,
     load_catalog,
     paper_taxonomy,
 )
-from semsig_gis.sources.layer_spec import LayerSpec, WidthBy
-from semsig_gis.sources.vector.member import DRIVERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
     Town = Callable[..., Path]
     Snapshot = Callable[[str, str], None]

@@ -13,25 +13,23 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from semsig_gis.core.errors import CatalogError
-from semsig_gis.sources import READERS
-from semsig_gis.sources.catalog import (
+from semsig_gis.core import CatalogError
+from semsig_gis.sources import (
     CATALOG_KEYS,
-    CLASS_KEYS,
-    MEASURES,
-    _catalog,
-    catalog_names,
-    data_folder,
-    paper_taxonomy,
-)
-from semsig_gis.sources.layer_spec import (
     CLASS_BY_KEYS,
+    CLASS_KEYS,
     LAYER_KEYS,
+    MEASURES,
+    READERS,
     WIDTH_BY_KEYS,
     ElementKind,
     GeometryKind,
     Role,
+    catalog_names,
+    data_folder,
+    paper_taxonomy,
 )
+from semsig_gis.sources.catalog import _parse_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -54,7 +52,7 @@ BEYOND = (
 def accepts(content: dict[str, Any]) -> bool:
     """Tell whether the reader takes a catalogue."""
     try:
-        _catalog(copy.deepcopy(content), "it")
+        _parse_catalog(copy.deepcopy(content), "it")
     except CatalogError:
         return False
     return True

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.sources.compression import HARMLESS_BYTES, check_compression_ratio
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.osm.file import read_layers
-from semsig_gis.sources.vector import read_layer
+from semsig_gis.core import SourceError
+from semsig_gis.sources import (
+    HARMLESS_BYTES,
+    LayerSpec,
+    check_compression_ratio,
+    read_layer,
+    read_layers,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError
-from semsig_gis.sources.filters import BETWEEN_SLASHES, Condition, as_text, matches
+from semsig_gis.core import CatalogError
+from semsig_gis.sources import BETWEEN_SLASHES, Condition, as_text, matches
 
 numbers = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False)
 plain = st.text().filter(lambda text: not BETWEEN_SLASHES.fullmatch(text))

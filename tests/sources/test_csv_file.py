@@ -12,11 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.numbers import decimal
+from semsig_gis.core import SourceError
+from semsig_gis.sources import LayerSpec, decimal, list_layers, read_layer
 from semsig_gis.sources.services import layers as opendatasoft
-from semsig_gis.sources.vector import list_layers, read_layer
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,9 +12,8 @@ import shapely
 from osm_xml import street_town, write_osm
 from sentences import refused, sentence
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.detect import detect_catalogs
-from semsig_gis.sources.probe import probe_file
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import detect_catalogs, probe_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -85,16 +84,18 @@ def test_load_without_catalog_describes_a_file_once(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[str] = []
-    for name in ("list_layers", "read_info"):
+
+    def count(name: str) -> None:
         function = getattr(pyogrio, name)
-        monkeypatch.setattr(
-            pyogrio,
-            name,
-            lambda *args, name=name, function=function, **options: (
-                calls.append(name),
-                function(*args, **options),
-            )[1],
-        )
+
+        def counted(*arguments: object, **options: object) -> object:
+            calls.append(name)
+            return function(*arguments, **options)
+
+        monkeypatch.setattr(pyogrio, name, counted)
+
+    count("list_layers")
+    count("read_info")
     path = write(tmp_path, "benches.geojson")
     assert run("load", path, "--out", tmp_path / "objects.parquet")[0] == 0
     assert calls == ["read_info"]

@@ -10,10 +10,15 @@ import pytest
 import shapely
 from sentences import refused
 
-from semsig_gis.core.errors import SourceError
-from semsig_gis.sources import file_reader, find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.osm.features import frame_layers, has_element_columns, read_layers
+from semsig_gis.core import SourceError
+from semsig_gis.sources import (
+    file_reader,
+    find_files,
+    frame_layers,
+    has_element_columns,
+    load_catalog,
+)
+from semsig_gis.sources.osm.features import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

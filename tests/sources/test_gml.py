@@ -8,9 +8,8 @@ import pytest
 import shapely
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, SourceError
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.services.gml import parse_xml
+from semsig_gis.core import CrsError, SourceError
+from semsig_gis.sources import LayerSpec, parse_xml
 from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:

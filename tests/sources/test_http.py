@@ -20,20 +20,19 @@ from sentences import assert_sentence, refused
 from servers import Answer, published, zipped
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.http import cache as _http_cache
-from semsig_gis.sources.http.access_token import AccessToken
-from semsig_gis.sources.http.cache import Cache
-from semsig_gis.sources.http.fetch import (
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import (
+    AccessToken,
+    Cache,
     HttpError,
     HttpSpec,
     NotCachedError,
     TooLargeError,
-    _check_redirect,
-    _connection_error,
     fetch,
     read_text,
 )
+from semsig_gis.sources.http import cache as _http_cache
+from semsig_gis.sources.http.fetch import _check_redirect, _connection_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 
     from servers import Script, Seen, Server
 
-    from semsig_gis.sources.http.cache import Fetched
+    from semsig_gis.sources import Fetched
 
     Get = Callable[..., Fetched]
 

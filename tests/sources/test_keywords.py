@@ -5,10 +5,8 @@ from __future__ import annotations
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import UnknownNameError
-from semsig_gis.core.taxonomy import WILDCARD, ObjectClass, Taxonomy
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.keywords import class_code
+from semsig_gis.core import WILDCARD, ObjectClass, Taxonomy, UnknownNameError
+from semsig_gis.sources import class_code, load_catalog, paper_taxonomy
 
 TAXONOMY = load_catalog("openstreetmap").taxonomy
 WORDS = {

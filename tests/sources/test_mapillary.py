@@ -9,12 +9,17 @@ import pytest
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core.errors import InputError, SourceError
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.clip import parse_area
-from semsig_gis.sources.http.access_token import AccessToken
-from semsig_gis.sources.http.fetch import HttpError, HttpSpec
-from semsig_gis.sources.mapillary import MOST_FEATURES, fetch_layers, read_layers
+from semsig_gis.core import InputError, SourceError
+from semsig_gis.sources import (
+    MOST_FEATURES,
+    AccessToken,
+    HttpError,
+    HttpSpec,
+    fetch_layers,
+    load_catalog,
+    parse_area,
+)
+from semsig_gis.sources.mapillary import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,7 +27,7 @@ if TYPE_CHECKING:
 
     from servers import Seen, Server
 
-    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources import Cache
 
 CATALOG = load_catalog("mapillary")
 AREA = parse_area("2.30,48.85,2.31,48.86")

@@ -23,11 +23,10 @@ from hypothesis import strategies as st
 from sentences import refused
 from servers import Answer, published
 
-from semsig_gis.core.errors import CatalogError, CrsError, SourceError
-from semsig_gis.sources.area import Area
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
+from semsig_gis.core import CatalogError, CrsError, SourceError
+from semsig_gis.sources import Area, ClassBy, LayerSpec, find_field, fold
 from semsig_gis.sources.services.fetch import fetch_layers
-from semsig_gis.sources.services.layers import find_field, fold, read_layers
+from semsig_gis.sources.services.layers import read_layers
 from semsig_gis.sources.services.opendatasoft import _outline
 
 if TYPE_CHECKING:
@@ -35,9 +34,7 @@ if TYPE_CHECKING:
 
     from servers import Seen, Server
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.http.cache import Cache, Fetched
-    from semsig_gis.sources.http.fetch import HttpSpec
+    from semsig_gis.sources import Cache, Fetched, HttpSpec, RawLayer
 
     Fetch = Callable[..., Fetched]
     Read = Callable[..., RawLayer]
@@ -312,7 +309,7 @@ def test_rows_of_one_id_that_are_apart_are_told(read_as: Read) -> None:
     assert xy(layer) == [(2.1, 48.1), (2.0, 48.0)]
     assert (layer.counts.filtered, layer.counts.duplicates) == (1, 2)
     assert layer.notes == (
-        "1 rows have the id of a row that stands elsewhere; the first one's place is used",
+        "1 rows have the id of a row at another place; the place of the first row is used",
     )
 
 

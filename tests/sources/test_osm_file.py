@@ -22,11 +22,17 @@ from osm_xml import node, relation, way, write_osm
 from osmium.osm.mutable import Node, Way
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
-from semsig_gis.sources.osm.elements import TagIndex, has_tags, relation_shape, way_shape
-from semsig_gis.sources.osm.file import read_layers
+from semsig_gis.core import CatalogError, SourceError
+from semsig_gis.sources import (
+    ClassBy,
+    LayerSpec,
+    RowCounts,
+    TagIndex,
+    has_tags,
+    read_layers,
+    relation_shape,
+    way_shape,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

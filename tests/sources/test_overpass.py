@@ -20,29 +20,30 @@ from hypothesis import strategies as st
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core.errors import CatalogError, InputError, SourceError
-from semsig_gis.sources import RowCounts
-from semsig_gis.sources.area import Area
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.clip import parse_area
-from semsig_gis.sources.filters import ANY_VALUE
-from semsig_gis.sources.http.fetch import HttpError, HttpSpec, NotCachedError
-from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.osm import file as osm_file
-from semsig_gis.sources.osm.overpass import (
-    fetch_layers,
+from semsig_gis.core import CatalogError, InputError, SourceError
+from semsig_gis.sources import (
+    ANY_VALUE,
+    Area,
+    HttpError,
+    HttpSpec,
+    LayerSpec,
+    NotCachedError,
+    RowCounts,
     find_place,
+    load_catalog,
     overpass_query,
-    read_layers,
+    parse_area,
     waiting_time,
 )
+from semsig_gis.sources.osm import file as osm_file
+from semsig_gis.sources.osm.overpass import fetch_layers, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from servers import Seen, Server
 
-    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources import Cache
 
     Get = Callable[..., list[Path]]
 

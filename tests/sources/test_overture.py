@@ -12,11 +12,15 @@ import shapely
 from sentences import refused
 from stores import keep_in_bucket
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources import find_files
-from semsig_gis.sources.catalog import load_catalog
-from semsig_gis.sources.clip import clip_layer, parse_area
-from semsig_gis.sources.http.fetch import HttpSpec, NotCachedError
+from semsig_gis.core import CatalogError, SourceError
+from semsig_gis.sources import (
+    HttpSpec,
+    NotCachedError,
+    clip_layer,
+    find_files,
+    load_catalog,
+    parse_area,
+)
 from semsig_gis.sources.overture import fetch_layers, read_layers
 
 if TYPE_CHECKING:
@@ -26,8 +30,7 @@ if TYPE_CHECKING:
     from servers import Server
     from shapely.geometry.base import BaseGeometry
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.http.cache import Cache
+    from semsig_gis.sources import Cache, RawLayer
 
 CATALOG = load_catalog("overture")
 SPECS = CATALOG.layers

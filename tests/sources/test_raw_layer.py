@@ -14,14 +14,15 @@ from hypothesis import strategies as st
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError
-from semsig_gis.core.geometry import crs_label
-from semsig_gis.sources import reader
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec, WidthBy
-from semsig_gis.sources.rows import (
+from semsig_gis.core import CatalogError, crs_label
+from semsig_gis.sources import (
+    ClassBy,
+    LayerSpec,
     RowRules,
     Rows,
+    WidthBy,
     off_the_globe,
+    reader,
     usable_crs,
 )
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from semsig_gis.sources.rows import Sifted
+    from semsig_gis.sources import FilteredRows
 
 
 DATA = Path(__file__).with_name("data")
@@ -66,7 +67,7 @@ def test_only_degrees_have_limits() -> None:
         assert not off_the_globe(xy, CRS.from_epsg(limitless)).any()
 
 
-def sifted(spec: LayerSpec, **columns: Sequence[object]) -> Sifted:
+def apply(spec: LayerSpec, **columns: Sequence[object]) -> FilteredRows:
     """Return what the rules of a layer make of rows with these fields."""
     rules = RowRules(spec, list(columns), filters=True, where="here")
     rows = Rows()
@@ -74,11 +75,11 @@ def sifted(spec: LayerSpec, **columns: Sequence[object]) -> Sifted:
         rows.read += 1
         values = dict(zip(columns, row, strict=True))
         rows.add([values[field] for field in rules.fields], str(rows.read), (0.0, 0.0))
-    return rules.sift(rows)
+    return rules.apply(rows)
 
 
 def table(spec: LayerSpec, **columns: Sequence[object]) -> pd.DataFrame:
-    return sifted(spec, **columns).table
+    return apply(spec, **columns).table
 
 
 @given(st.integers(-(2**53), 2**53))
@@ -93,29 +94,29 @@ def test_what_class_by_does_not_list_is_left_out_by_name() -> None:
     """Waste baskets do not become benches because nobody listed them."""
     by = ClassBy("kind", (("bench", "bench"), ("/stop.*/", "bus_stop")))
     kinds = [*["bin"] * 9, *["box", None] * 2, "bench", "stop 1", "\x1b[31m"]
-    layer = sifted(LayerSpec(name="things", class_name="", class_by=by), kind=kinds)
+    layer = apply(LayerSpec(name="things", class_name="", class_by=by), kind=kinds)
     assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
     assert (layer.filtered, layer.excluded) == (14, 0)
     told = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
     assert layer.notes == (f"left out, unlisted in class_by 'kind': {told}",)
     spec = LayerSpec(name="things", class_name="bench", class_by=by)
     assert (
-        sifted(spec, kind=kinds)
+        apply(spec, kind=kinds)
         .notes[0]
         .endswith('; write otherwise = "class" to take them as bench')
     )
     spec = replace(spec, class_by=replace(by, otherwise=True))
-    assert sifted(spec, kind=kinds).table["class_name"].tolist() == ["bench"] * 14 + [
+    assert apply(spec, kind=kinds).table["class_name"].tolist() == ["bench"] * 14 + [
         "bus_stop",
         "bench",
     ]
-    many = sifted(LayerSpec(name="things", class_name="", class_by=by), kind=[*map(str, range(20))])
+    many = apply(LayerSpec(name="things", class_name="", class_by=by), kind=[*map(str, range(20))])
     assert many.notes[0].endswith("'7' 1, and 12 others")
 
 
 def test_what_class_by_lists_is_never_a_comparison() -> None:
     by = ClassBy("height", (("<2 m", "bench"), ("none", "bus_stop")))
-    layer = sifted(LayerSpec(name="a", class_name="", class_by=by), height=["<2 m", "none", None])
+    layer = apply(LayerSpec(name="a", class_name="", class_by=by), height=["<2 m", "none", None])
     assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
 
 
@@ -126,7 +127,7 @@ def test_what_is_left_out_is_counted_once_by_the_first_reason() -> None:
         where=(("height", (">=2 or none",)),),
         exclusions=(("state", ("gone", "/plan.*/")), ("depth", (">0",))),
     )
-    layer = sifted(
+    layer = apply(
         spec,
         height=[2.5, None, 1.0, 3.0, 3.0, 2.0],
         state=["gone", "planned", "gone", None, "there", ""],

@@ -24,15 +24,10 @@ from stand_ins import (
     sent,
 )
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.sources import reader
-from semsig_gis.sources.area import Area
-from semsig_gis.sources.clip import parse_area
-from semsig_gis.sources.http.fetch import HttpError
-from semsig_gis.sources.layer_spec import LayerSpec
+from semsig_gis.core import CatalogError, SourceError
+from semsig_gis.sources import Area, HttpError, LayerSpec, PagingError, parse_area, reader
 from semsig_gis.sources.services.fetch import fetch_layers
 from semsig_gis.sources.services.layers import read_layers
-from semsig_gis.sources.services.pages import PagingError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,10 +36,7 @@ if TYPE_CHECKING:
     from servers import Server
     from stand_ins import StandIn
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.http.cache import Cache
-    from semsig_gis.sources.http.fetch import HttpSpec
-    from semsig_gis.sources.services.layers import Download
+    from semsig_gis.sources import Cache, Download, HttpSpec, RawLayer
 
     Fetch = Callable[..., Download]
 

@@ -15,28 +15,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.build import build_database
-from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.paper.figures import DATABASE, OCCURRENCES
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic import city as synthetic
-from semsig_gis.sources.synthetic import streets as _city_streets
-from semsig_gis.sources.synthetic.city import (
+from semsig_gis.core import InputError
+from semsig_gis.database import Footprints, ViewpointSpec, build_database
+from semsig_gis.evaluation import DATABASE, OCCURRENCES
+from semsig_gis.objects import build_objects
+from semsig_gis.sources import (
     PARIS_LIKE,
     CitySpec,
+    paper_taxonomy,
     synthetic_city,
     synthetic_streets,
     synthetic_surroundings,
 )
+from semsig_gis.sources.synthetic import city as synthetic
+from semsig_gis.sources.synthetic import streets as _city_streets
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.sources import RawLayer
-    from semsig_gis.sources.synthetic.streets import Network
+    from semsig_gis.sources import Network, RawLayer
 
     City = tuple[RawLayer, ...]
 

@@ -26,10 +26,9 @@ from pyogrio.raw import open_arrow
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, CrsError, SourceError, UnknownNameError
-from semsig_gis.sources.layer_spec import ClassBy, LayerSpec
+from semsig_gis.core import CatalogError, CrsError, SourceError, UnknownNameError
+from semsig_gis.sources import ClassBy, LayerSpec, list_layers, read_layer
 from semsig_gis.sources.vector import file as vector_file
-from semsig_gis.sources.vector import list_layers, read_layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

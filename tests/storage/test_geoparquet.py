@@ -20,10 +20,10 @@ from hypothesis.extra.numpy import arrays
 from pyproj import CRS
 from sentences import assert_sentence, refused
 
-from semsig_gis.core.errors import DatabaseError
-from semsig_gis.storage.geoparquet import (
+from semsig_gis.core import DatabaseError
+from semsig_gis.storage import (
+    bounds_by_group,
     bounds_column,
-    each_bounds,
     geo_metadata,
     groups_meeting,
     hilbert_order,
@@ -213,7 +213,7 @@ def test_groups_and_rows_that_may_meet_a_box_are_found(tmp_path: Path) -> None:
         assert groups_meeting(file, (25, 1, 29, 2)) == []
         assert groups_meeting(file, (31, 5, 32, 9)) == []
     assert rows_meeting(table, (24, 4, 30, 9))["row"].to_pylist() == [2, 3]
-    assert np.concatenate(list(each_bounds(tmp_path / "a.parquet"))).tolist() == places.tolist()
+    assert np.concatenate(list(bounds_by_group(tmp_path / "a.parquet"))).tolist() == places.tolist()
 
 
 def test_a_file_without_bounds_may_meet_any_box(tmp_path: Path) -> None:
@@ -222,5 +222,5 @@ def test_a_file_without_bounds_may_meet_any_box(tmp_path: Path) -> None:
         pq.write_table(table, tmp_path / "a.parquet")
         with pq.ParquetFile(tmp_path / "a.parquet") as file:
             assert groups_meeting(file, (0, 0, 1, 1)) == [0]
-        assert list(each_bounds(tmp_path / "a.parquet")) == []
+        assert list(bounds_by_group(tmp_path / "a.parquet")) == []
         assert rows_meeting(table, (0, 0, 1, 1)) == table

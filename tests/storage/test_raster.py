@@ -11,9 +11,8 @@ from pyproj import CRS, Transformer
 from rasterio.transform import Affine
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError, SourceError
-from semsig_gis.core.geometry import GridSpec
-from semsig_gis.storage.raster import raster_at_cells
+from semsig_gis.core import CrsError, GridSpec, InputError, SourceError
+from semsig_gis.storage import raster_at_cells
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

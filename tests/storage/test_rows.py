@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.rows import parse_rows, read_rows
+from semsig_gis.core import InputError
+from semsig_gis.storage import parse_rows, read_rows
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import MACHINE_PREFIX
-from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
+from semsig_gis.core import MACHINE_PREFIX, InputError
+from semsig_gis.storage import RunKind, finish, partial_folder, read_json, write_json
 
 if TYPE_CHECKING:
     from pathlib import Path

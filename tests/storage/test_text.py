@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from semsig_gis.storage.text import MOST_BYTES, parse_json, read_text, read_whole
+from semsig_gis.storage import MAX_TEXT_BYTES, parse_json, read_text, read_whole
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,7 +24,7 @@ def test_a_pipe_and_a_device_are_not_read(tmp_path: Path) -> None:
 
 def test_a_file_that_is_too_long_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "long.json").open("wb") as file:
-        file.truncate(MOST_BYTES + 1)  # which takes no room on the disk
+        file.truncate(MAX_TEXT_BYTES + 1)  # which takes no room on the disk
     with pytest.raises(OSError, match=r"it has 268,435,457 bytes, and at most 268,435,456 "):
         read_whole(tmp_path / "long.json")
 

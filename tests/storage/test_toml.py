@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.errors import CatalogError
-from semsig_gis.storage.toml import metres, toml_text
+from semsig_gis.core import CatalogError
+from semsig_gis.storage import metres, toml_text
 
 WORDS = st.text(st.characters(codec="utf-8", exclude_categories=["Cs"]), max_size=8)
 PLAIN = st.one_of(st.booleans(), st.integers(-(10**9), 10**9), st.floats(-1e9, 1e9), WORDS)

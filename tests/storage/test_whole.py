@@ -13,8 +13,8 @@ from unittest.mock import Mock
 import pytest
 from sentences import assert_sentence, refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.whole import exchanged, move_folder, whole_file, whole_folder
+from semsig_gis.core import InputError
+from semsig_gis.storage import exchange, move_folder, whole_file, whole_folder
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_a_folder_that_cannot_be_renamed_changes_nothing(
         return rename(self, target)
 
     # Where two folders cannot change places.
-    monkeypatch.setattr("semsig_gis.storage.whole.exchanged", lambda *_: False)
+    monkeypatch.setattr("semsig_gis.storage.whole.exchange", lambda *_: False)
     with monkeypatch.context() as patch, refused(InputError, "Permission denied", "is unchanged"):
         patch.setattr(Path, "rename", denied)
         move_folder(new, old)
@@ -188,9 +188,9 @@ def test_a_folder_that_cannot_be_renamed_changes_nothing(
 def test_two_folders_change_places(tmp_path: Path) -> None:
     new, old = tmp_path / "new", tmp_path / "old"
     new.mkdir()
-    assert not exchanged(new, old)
+    assert not exchange(new, old)
     (old / "a.txt").parent.mkdir()
     (old / "a.txt").write_text("old")
-    assert exchanged(new, old)
+    assert exchange(new, old)
     assert_alone(new / "a.txt", "old")
     assert list(old.iterdir()) == []

@@ -19,11 +19,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from semsig_gis.core.errors import DatabaseError, SourceError
-from semsig_gis.core.parallel import check_workers, finish_tasks
-from semsig_gis.core.resources import announce
-from semsig_gis.database.city import City
-from semsig_gis.database.file import digest
+from semsig_gis.core import DatabaseError, SourceError, announce, check_workers, finish_tasks
+from semsig_gis.database import City, digest
 from semsig_gis.evaluation.experiments.tables import experiment_figures, experiment_markdown
 from semsig_gis.evaluation.figures import district_labels
 from semsig_gis.evaluation.file import open_evaluation, save_evaluation
@@ -37,23 +34,30 @@ from semsig_gis.evaluation.scoring import (
     versions,
 )
 from semsig_gis.evaluation.spec import Case, parse_experiment
-from semsig_gis.localization.distance.memo import DistanceMemo
-from semsig_gis.localization.locator import make_locator
-from semsig_gis.storage.geoparquet import CHECKING_PAGES, require_intact, seal
-from semsig_gis.storage.runs import RunKind, finish, partial_folder, read_json, write_json
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import toml_text
-from semsig_gis.storage.whole import whole_file, write_whole
+from semsig_gis.localization import DistanceMemo, make_locator
+from semsig_gis.storage import (
+    VERIFY_CHECKSUMS,
+    RunKind,
+    add_footer_checksum,
+    check_footer_checksum,
+    finish,
+    partial_folder,
+    read_json,
+    read_text,
+    toml_text,
+    whole_file,
+    write_json,
+    write_whole,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.queries.draw import Query
     from semsig_gis.evaluation.result import Evaluation
     from semsig_gis.evaluation.spec import ExperimentSpec
-    from semsig_gis.localization.answers import Answer
-    from semsig_gis.localization.locator import Locator
+    from semsig_gis.localization import Answer, Locator
 
     # Experiments and the folders where their parts are put, by the folders for their results.
     Running = Mapping[Path, tuple["ExperimentWork", Path]]
@@ -258,7 +262,7 @@ class ExperimentWork:
             for name, scored in self._scored(names, queries):
                 with whole_file(missing[name]) as half:
                     scored.to_parquet(half, write_page_checksum=True)
-                    seal(half)
+                    add_footer_checksum(half)
 
     def _scored(
         self, names: Sequence[str], queries: Sequence[Query]
@@ -299,7 +303,7 @@ class ExperimentWork:
         for distortion, method in product(self.spec.distortions, self.spec.methods):
             parts = [part for part in self.parts if part.distortion == distortion]
             files = [_part_file(place, part, method) for part in parts]
-            tables = [pq.read_table(file, **CHECKING_PAGES) for file in files]
+            tables = [pq.read_table(file, **VERIFY_CHECKSUMS) for file in files]
             scored = pa.concat_tables(tables, promote_options="default").to_pandas()
             for top in self.spec.top:
                 case = Case(distortion=distortion, method=method, top=top)
@@ -351,8 +355,8 @@ def _is_whole(file: Path, *, rows: int) -> bool:
     if not file.is_file():
         return False
     try:
-        require_intact(file)
-        return bool(pq.read_table(file, **CHECKING_PAGES).num_rows == rows)
+        check_footer_checksum(file)
+        return bool(pq.read_table(file, **VERIFY_CHECKSUMS).num_rows == rows)
     except (OSError, ValueError, pa.ArrowException):
         return False
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.symbology import ERROR_BREAKS
-from semsig_gis.core.tables import Table, figure, interval
+from semsig_gis.core import ERROR_BREAKS, Table, figure, interval
 from semsig_gis.evaluation.figures import percentile
 from semsig_gis.evaluation.queries.distortion_text import chain_text
 

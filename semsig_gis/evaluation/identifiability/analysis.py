@@ -14,10 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.checks import MOST_SEED, MOST_WORKERS, require_number
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.resources import announce
-from semsig_gis.core.statistics import fit_shares
+from semsig_gis.core import FULL_TURN, MOST_SEED, MOST_WORKERS, announce, fit_shares, require_number
 from semsig_gis.evaluation.identifiability.lookalikes import (
     LEAST_SUM,
     check_radius,
@@ -32,18 +29,18 @@ from semsig_gis.evaluation.identifiability.trials import (
     try_cells,
     try_without_classes,
 )
-from semsig_gis.observation.view import FULL_VIEW, Photo
+from semsig_gis.observation import FULL_VIEW, Photo
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.identifiability.lookalikes import Lookalikes
     from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
     from semsig_gis.evaluation.identifiability.trials import Trials
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization import LikelihoodIndex
 
 TRIALS = 3000
 CLASS_TRIALS = 400  # without each class

@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.checks import MOST_SEED, MOST_WORKERS, require_number
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.resources import announce
-from semsig_gis.core.text import percent
+from semsig_gis.core import (
+    FULL_TURN,
+    MOST_SEED,
+    MOST_WORKERS,
+    Displayed,
+    InputError,
+    announce,
+    percent,
+    require_number,
+)
 from semsig_gis.evaluation.figures import calibration_bins, finite_or_none
 from semsig_gis.evaluation.identifiability.trials import (
     MOST_TRIALS,
@@ -23,7 +27,7 @@ from semsig_gis.evaluation.identifiability.trials import (
     trial_cells,
     try_cells,
 )
-from semsig_gis.observation.view import Photo
+from semsig_gis.observation import Photo
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.evaluation.identifiability.result import Identifiability
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization import LikelihoodIndex
 
 
 @dataclass(frozen=True, slots=True)

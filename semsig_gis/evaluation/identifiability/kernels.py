@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from semsig_gis.core.jit import compiled
+from semsig_gis.core import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids
+from semsig_gis.core import MOST_METRES, InputError, cell_ids, require_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.identifiability.kernels import Bases, Sample
     from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
 

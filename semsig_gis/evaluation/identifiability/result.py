@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.core.presentation import map_with, plot_with
-from semsig_gis.core.text import percent
-from semsig_gis.database.city import City
-from semsig_gis.localization.likelihood.index import index_fingerprint
-from semsig_gis.localization.noise.model import noise_from_dict
+from semsig_gis.core import (
+    DatabaseError,
+    Displayed,
+    InputError,
+    SemsigError,
+    map_with,
+    percent,
+    plot_with,
+)
+from semsig_gis.database import City
+from semsig_gis.localization import index_fingerprint, noise_from_dict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,9 +29,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import Axes, MapFrame
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.core import Axes, MapFrame
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Noise
 
 
 NAME = "identifiability"

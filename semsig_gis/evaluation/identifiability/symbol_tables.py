@@ -16,19 +16,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import BEARING_UNITS
-from semsig_gis.localization.noise.table import query_bearings
-from semsig_gis.observation.view import FULL_VIEW
+from semsig_gis.core import BEARING_UNITS, FULL_TURN
+from semsig_gis.localization import query_bearings
+from semsig_gis.observation import FULL_VIEW
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import LikelihoodIndex, NoiseTable
+    from semsig_gis.observation import Photo
 
 BINS = 72
 """Bearing steps of five degrees."""

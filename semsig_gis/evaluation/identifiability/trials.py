@@ -10,28 +10,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.threads import each_in_order
+from semsig_gis.core import each_in_order
 from semsig_gis.evaluation.identifiability.lookalikes import city_extent
 from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
 from semsig_gis.evaluation.queries.distortion_text import ready_chain
 from semsig_gis.evaluation.queries.distortions import Detector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
-from semsig_gis.localization.likelihood.association import rerank
-from semsig_gis.localization.likelihood.index import CellScores, build_index
-from semsig_gis.localization.likelihood.posterior import posterior
-from semsig_gis.observation.view import FULL_VIEW, View
+from semsig_gis.localization import CellScores, build_index, posterior, rerank
+from semsig_gis.observation import FULL_VIEW, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.noise.model import Noise, NoiseSpec
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.localization import LikelihoodIndex, Noise, NoiseSpec
+    from semsig_gis.observation import Photo
 
 
 LEANS = 300  # trials, by which likelihoods of signatures are brought near the answers

@@ -13,38 +13,38 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import DatabaseError, InputError
-from semsig_gis.core.parallel import check_workers
-from semsig_gis.database.build import build_database
-from semsig_gis.database.city import City
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.database.summary import database_summary
-from semsig_gis.database.viewpoints import ViewpointSpec
+from semsig_gis.core import DatabaseError, Displayed, InputError, check_workers
+from semsig_gis.database import (
+    City,
+    ObjectStore,
+    ViewpointSpec,
+    build_database,
+    database_summary,
+    open_database,
+    save_database,
+    save_with_store,
+)
 from semsig_gis.evaluation.experiments.run import run_experiments
-from semsig_gis.evaluation.paper import figures as paris
+from semsig_gis.evaluation.paper import published as paris
 from semsig_gis.evaluation.queries.distortion_text import parse_chain
 from semsig_gis.evaluation.queries.draw import QuerySpec, check_count
 from semsig_gis.evaluation.scoring import versions
 from semsig_gis.evaluation.spec import ExperimentSpec
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.localization.locator import parse_method
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import paper_taxonomy
-from semsig_gis.sources.synthetic.city import (
+from semsig_gis.localization import Method, parse_method, score_cells
+from semsig_gis.objects import build_objects
+from semsig_gis.sources import (
     PARIS_LIKE,
     CitySpec,
+    paper_taxonomy,
     synthetic_city,
     synthetic_streets,
 )
-from semsig_gis.storage.runs import RunKind, read_json, write_json
+from semsig_gis.storage import RunKind, read_json, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
 
     Progress = Callable[[str], Callable[[int, int], None] | None]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core import InputError, UnknownNameError, nearest_name
 from semsig_gis.evaluation.queries.distortions import (
     DISTORTIONS,
     BlockedSectors,
@@ -24,13 +24,13 @@ from semsig_gis.evaluation.queries.distortions import (
     RoughRanges,
     distortion_of,
 )
-from semsig_gis.localization.noise.model import NOISES, NoiseMixture, NoiseSpec, named_noise
+from semsig_gis.localization import NOISES, NoiseMixture, NoiseSpec, named_noise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from semsig_gis.evaluation.queries.true_view import CitySights, Sight, Spoiling
-    from semsig_gis.localization.noise.model import Noise
+    from semsig_gis.localization import Noise
 
 
 @runtime_checkable

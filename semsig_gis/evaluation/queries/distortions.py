@@ -14,15 +14,22 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import FULL_TURN, angular_distance, wrap_degrees
-from semsig_gis.core.signature import Signature, distance_units_of
-from semsig_gis.core.taxonomy import MAX_RANGE_M
-from semsig_gis.database.sightings import bearings
+from semsig_gis.core import (
+    FULL_TURN,
+    MAX_RANGE_M,
+    InputError,
+    Signature,
+    UnknownNameError,
+    angular_distance,
+    distance_units_of,
+    nearest_name,
+    require_number,
+    wrap_degrees,
+)
+from semsig_gis.database import bearings
 from semsig_gis.evaluation.queries.true_view import NEAREST_M
-from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
-from semsig_gis.observation.view import CLASSES, Photo
+from semsig_gis.localization import LONGEST_TABLE, noise_tables
+from semsig_gis.observation import CLASSES, Photo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,8 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from semsig_gis.evaluation.queries.true_view import CitySights, Sight, Spoiling
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.localization import Noise, NoiseTable
 
 
 MOST_WIDTH_M = 1000

@@ -14,9 +14,15 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from semsig_gis.core.checks import MOST_SEED, require_number
-from semsig_gis.core.errors import CrsError, InputError, UnknownNameError, nearest_name
-from semsig_gis.database.sightings import visible_objects_at
+from semsig_gis.core import (
+    MOST_SEED,
+    CrsError,
+    InputError,
+    UnknownNameError,
+    nearest_name,
+    require_number,
+)
+from semsig_gis.database import visible_objects_at
 from semsig_gis.evaluation.queries.distortion_text import ready_chain
 from semsig_gis.evaluation.queries.distortions import DISTORTIONS
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
@@ -26,8 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.database import ObjectStore, SignatureDatabase
     from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
 
 SeenFrom = Literal["cells", "anywhere"]

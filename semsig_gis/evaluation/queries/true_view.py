@@ -13,19 +13,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, Signature
-from semsig_gis.observation.view import CLASSES, FULL_VIEW, View
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    FULL_TURN,
+    Displayed,
+    Signature,
+    wrap_degrees,
+)
+from semsig_gis.observation import CLASSES, FULL_VIEW, View
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.observation.view import Photo
+    from semsig_gis.core import Taxonomy
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.observation import Photo
 
     Spoiling = Callable[["Sight", np.random.Generator], "Sight"]
     """What a distortion does to what is seen, with all chances from a generator."""

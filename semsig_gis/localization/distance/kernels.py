@@ -1,8 +1,8 @@
-"""The loops behind `matching.metrics.edit`, compiled.
+"""Compiled loops of the metrics and of their fusion.
 
-Bit ``8 i + k`` of word ``w`` of a plane belongs to sequence ``8 (stripe i + w) + k`` of its block:
-when the eight bits of an octet are spread to eight bytes, the loop over the words writes them one
-after the other.
+Bit ``8 i + k`` of word ``w`` of a bit plane belongs to sequence ``8 (stripe i + w) + k`` of its
+block, where ``stripe`` is the number of words in a plane. With this layout, the loop that spreads
+the eight bits of an octet to eight bytes writes to consecutive addresses.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.jit import compiled
+from semsig_gis.core import compiled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _NONE, _ALL = np.uint64(0), np.uint64(0xFFFF_FFFF_FFFF_FFFF)
 _OCTET, _TOP = np.uint64(0xFF), np.uint64(7)
-_COPIES = np.uint64(0x0101_0101_0101_0101)  # times an octet: the octet in every byte
+_COPIES = np.uint64(0x0101_0101_0101_0101)  # multiplied by an octet: the octet in every byte
 _OWN_BITS = np.uint64(0x8040_2010_0804_0201)  # bit k of byte k
 _BELOW_TOP = np.uint64(0x7F7F_7F7F_7F7F_7F7F)
 _TOP_BITS = np.uint64(0x8080_8080_8080_8080)
@@ -33,10 +33,10 @@ def pack(  # noqa: PLR0917
     per_position: int,
     planes: NDArray[np.uint64],
 ) -> None:
-    """Set the bits of all sequences in `planes`, which holds zeros of shape (p, stripe).
+    """Set the bits of all sequences in `planes`, which contains zeros, shape (p, stripe).
 
-    `values` and `offsets` are the sequences in CSR form, `digits`, shape (256, 2), gives the two
-    planes of each value, and `bounds`, shape (blocks + 1,), the first plane of each block.
+    `values` and `offsets` are the sequences in CSR form, `digits`, shape (256, 2), the two planes
+    of each value, and `bounds`, shape (blocks + 1,), the first plane of each block.
     """
     stripe = planes.shape[1]
     for index in range(len(offsets) - 1):
@@ -44,6 +44,7 @@ def pack(  # noqa: PLR0917
         octet, k = divmod(place, 8)
         i, w = divmod(octet, stripe)
         bit = np.uint64(1) << np.uint64(8 * i + k)
+        # Sequences end at the last position of their block.
         row = bounds[block + 1] - per_position * (offsets[index + 1] - offsets[index])
         for entry in range(offsets[index], offsets[index + 1]):
             planes[row, w] |= bit
@@ -65,15 +66,15 @@ def scan(  # noqa: PLR0917
 ) -> None:
     """Fill `result`, shape (queries, d), with distances to the sequences of all blocks.
 
-    `lengths` are those of the d sequences of the blocks that `bounds` lists; `query_digits`, shape
-    (entries, 2), holds the two planes of each value of the queries, one query after the other, and
-    query i begins at ``ends[i]``. `normalized` divides by the longer length.
+    `lengths`, shape (d,), are those of the sequences. `query_digits`, shape (entries, 2), has the
+    two planes of each value of the concatenated queries; query i is ``ends[i]:ends[i + 1]``.
+    `normalized` divides by the longer length.
     """
     stripe = planes.shape[1]
     longest = 0
     for query in range(len(ends) - 1):
         longest = max(longest, ends[query + 1] - ends[query])
-    bits = 0  # of the largest sum of steps
+    bits = 0  # that the largest sum of steps needs
     while 2 * longest >> bits:
         bits += 1
     plus, minus = np.empty((longest, stripe), np.uint64), np.empty((longest, stripe), np.uint64)
@@ -90,8 +91,8 @@ def scan(  # noqa: PLR0917
                 planes, bounds[block], bounds[block + 1], per_position, digits, plus, minus, spare
             )
             _add(plus, minus, len(digits), spare[0], sums)
-            # Without a query the cost is the length of the sequence; the steps lead down from
-            # there. What is +1 and what is not -1 add up to the steps and the query's length.
+            # The cost starts at the length of the sequence; the steps down the last column follow.
+            # The sum counts "+1" and "not -1", which is the steps plus the query's length.
             for place in range(len(own)):
                 costs[place] = own[place] - len(digits)
             _spread(sums, spread, costs)
@@ -116,16 +117,19 @@ def _step(  # noqa: PLR0917
     minus: NDArray[np.uint64],
     top: NDArray[np.uint64],
 ) -> None:
-    """Fill the tables of costs of one block; leave the steps down their last column."""
+    """Fill the cost tables of one block; `plus` and `minus` get the steps of the last column."""
     stripe = planes.shape[1]
+    # Each step down the first column, before any value of the sequences, is +1.
     for i in range(len(digits)):
         for w in range(stripe):
             plus[i, w], minus[i, w] = _ALL, _NONE
     top_plus, top_minus = top[0], top[1]
     for row in range(low, high, per_position):
+        # Steps along the top are +1 where the sequence has an entry, otherwise 0.
         for w in range(stripe):
             top_plus[w], top_minus[w] = planes[row, w], _NONE
         for i in range(len(digits)):
+            # The values are equal where both digits are set; the recurrence is in `BitPlanes`.
             first, second = planes[row + digits[i, 0]], planes[row + digits[i, 1]]
             side_plus, side_minus = plus[i], minus[i]
             for w in range(stripe):
@@ -150,15 +154,16 @@ def _add(
     carry: NDArray[np.uint64],
     sums: NDArray[np.uint64],
 ) -> None:
-    """Count, for each sequence, the steps that are +1 and those that are not -1, in binary."""
+    """Set `sums` to the number of steps that are +1 or not -1 per sequence, one plane per bit."""
     stripe = plus.shape[1]
     for bit in range(len(sums)):
         for w in range(stripe):
             sums[bit, w] = _NONE
     for i in range(length):
-        one, other, digit = plus[i], minus[i], sums[0]
+        # Full adder for the lowest bit, then half adders that pass the carry on.
+        plus_row, minus_row, digit = plus[i], minus[i], sums[0]
         for w in range(stripe):
-            a, b, c = one[w], ~other[w], digit[w]
+            a, b, c = plus_row[w], ~minus_row[w], digit[w]
             digit[w] = a ^ b ^ c
             carry[w] = (a & b) | (c & (a ^ b))
         for bit in range(1, len(sums)):
@@ -171,9 +176,10 @@ def _add(
 
 @compiled  # pragma: no cover - coverage does not see machine code
 def _spread(sums: NDArray[np.uint64], spread: NDArray[np.uint64], costs: NDArray[np.int32]) -> None:
-    """Add the sums, whose bits lie in planes, to the costs of the sequences."""
+    """Add the sums, one plane per bit, to the costs of the sequences."""
     stripe = sums.shape[1]
     each = spread.view(np.uint8)
+    # Eight planes at a time make one byte per sequence.
     for byte in range(0, len(sums), 8):
         for octet in range(8 * stripe):
             spread[octet] = _NONE
@@ -181,6 +187,7 @@ def _spread(sums: NDArray[np.uint64], spread: NDArray[np.uint64], costs: NDArray
             digit, power = sums[bit], np.uint64(bit - byte)
             for i in range(8):
                 shift, target = np.uint64(8 * i), spread[i * stripe : (i + 1) * stripe]
+                # Copy the octet to eight bytes, keep bit k of byte k, and reduce it to 0 or 1.
                 for w in range(stripe):
                     own = (((digit[w] >> shift) & _OCTET) * _COPIES) & _OWN_BITS
                     marks = ((own + _BELOW_TOP) | own) & _TOP_BITS
@@ -193,9 +200,10 @@ def _spread(sums: NDArray[np.uint64], spread: NDArray[np.uint64], costs: NDArray
 def count_steps(
     first: NDArray[np.float32], counts: NDArray[np.int64], step: float, cells: NDArray[np.int64]
 ) -> None:
-    """Add to ``cells[i]`` the number of cells whose score is i steps.
+    """Add to ``cells[i]`` the number of cells with a score of i steps.
 
-    `first` holds the scores, whole steps, of d distinct sequences and `counts` their cells.
+    `first`, shape (d,), has the scores of distinct sequences, multiples of `step`, and `counts` the
+    numbers of their cells.
     """
     for place in range(len(first)):
         cells[int(np.rint(first[place] / step))] += counts[place]
@@ -210,10 +218,10 @@ def fuse(  # noqa: PLR0917
     step: float,
     scores: NDArray[np.float32],
 ) -> None:
-    """Fill `scores`, shape (n,), with the sum of the type and angle distances of every cell.
+    """Fill `scores`, shape (n,), with the fused type and angle distances of every cell.
 
-    `left` and `right` hold what each distinct sequence adds, in steps; `types` and `angles`, shape
-    (n,), say which sequences a cell has.
+    `left` and `right` are the weighted distances of the distinct sequences, in steps; `types` and
+    `angles`, shape (n,), are the rows of the sequences of each cell.
     """
     for cell in range(len(types)):
         scores[cell] = np.rint(left[types[cell]] + right[angles[cell]]) * step
@@ -228,10 +236,10 @@ def put_behind(  # noqa: PLR0917
     least: np.float32,
     scores: NDArray[np.float32],
 ) -> None:
-    """Fill `scores` with `fused`, and rank the cells that the first stage drops behind the rest.
+    """Fill `scores` with `fused` for cells that pass stage one; rank all others behind them.
 
-    `cut` is the worst score of the first stage that is kept, `worst` the worst fused score of a
-    kept cell, and `least` the best score that a dropped cell may have. Arrays have shape (n,).
+    `cut` is the worst score of stage one that passes, `worst` the worst fused score of a cell that
+    passes, and `least` the lowest score for a cell that does not. Arrays have shape (n,).
     """
     for cell in range(len(first)):
         behind = max(worst + (first[cell] - cut), least)
@@ -244,6 +252,6 @@ def add_quotients(
     quotients: NDArray[np.float64],
     total: NDArray[np.float64],
 ) -> None:
-    """Add ``quotients[counts]`` to `total`, without an array for the quotients in between."""
+    """Add ``quotients[counts]`` to `total`, without a temporary array."""
     for row in range(len(counts)):
         total[row] += quotients[counts[row]]

@@ -1,4 +1,4 @@
-"""Distances that several methods of an experiment share."""
+"""Distances that are shared by several methods of an experiment."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, slots=True)
 class DistanceMemo:
-    """Distances between one batch of queries and one database, and how long each took to measure.
+    """Distances between a batch of queries and a database, and the time to compute each.
 
-    Most methods of an experiment differ only in how they join the same distances. Make another memo
-    for the next batch.
+    Most methods of an experiment combine the same distances in different ways. Use a new memo for
+    each batch.
     """
 
-    _known: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
+    _entries: dict[Hashable, tuple[NDArray[Any], float]] = field(default_factory=dict)
     spared: float = field(default=0.0, init=False)
-    """Seconds that it would have taken to measure again what was known."""
+    """Seconds saved: the time to compute the returned distances again."""
 
     def get(self, key: Hashable, measure: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-        """Return the distances under a key, calling `measure` only if they are not known yet.
+        """Return the distances under a key; call `measure` only if there are none yet.
 
-        The key must name all that they depend on. Do not write to the result.
+        The key must identify everything that they depend on. Do not write to the result.
         """
-        if key in self._known:
-            distances, seconds = self._known[key]
+        if key in self._entries:
+            distances, seconds = self._entries[key]
             self.spared += seconds
             return distances
         start = time.perf_counter()
         distances = measure()
-        self._known[key] = distances, time.perf_counter() - start
+        self._entries[key] = distances, time.perf_counter() - start
         return distances

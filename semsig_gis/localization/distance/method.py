@@ -1,43 +1,42 @@
-"""What a method is: which measures it takes and how it joins them, or the likelihood."""
+"""Methods by distance: the metrics of types and angles, and their fusion."""
 
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from semsig_gis.core.errors import InputError, SemsigError
+from semsig_gis.core import InputError, SemsigError
 from semsig_gis.localization.distance.metrics import metric
 from semsig_gis.localization.distance.metrics.edit import EditWeights
 
 if TYPE_CHECKING:
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
 
 
 TYPES, ANGLES, BOTH = "types", "angles", "types+angles"
-"""Parts of a query that a method may compare."""
+"""Parts of a query that a method compares."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
     """How the cells are ranked: a single metric, metric fusion or two-stage fusion.
 
-    Fusion is ``alpha * D_types + (1 - alpha) * D_angles``. Two-stage fusion ranks by the types,
-    keeps the best `keep` percent and every cell that ties with the last of them, and ranks those by
-    the fusion; the rest follows in the order of the first stage (paper, section "Retrieval
-    schemes").
+    Fusion is ``alpha * D_types + (1 - alpha) * D_angles``. Two-stage fusion ranks by types, then
+    ranks the best `keep` percent, and all cells that tie with the last of them, by fusion. The
+    others follow in the order of the first stage (paper, section "Retrieval schemes").
 
     Parameters
     ----------
     types, angles : str, optional
-        The measures for the sequences of types and of angle levels (see
-        `matching.metrics.METRICS`); None for none.
+        The metrics for the sequences of types and of angle levels (see
+        `localization.distance.metrics.METRICS`); None for none.
     alpha : float
-        Share of the types in a fusion, 0 to 1; the angles get the rest.
+        Weight of the types in a fusion, 0 to 1; the weight of the angles is ``1 - alpha``.
     keep : float, optional
-        Percent of the cells, above 0 and up to 100, that the types pass on to the second stage
-        of a two-stage fusion; None for a plain fusion.
+        Percentage of the cells, above 0 and up to 100, that pass the first stage of a two-stage
+        fusion; None for a plain fusion.
     normalized : bool
-        True to bring each distance to [0, 1] before the fusion, False for the raw scale.
+        True to scale each distance to [0, 1] before the fusion, False for the raw scale.
     weights : EditWeights
         Costs of the edit distance.
 
@@ -46,7 +45,7 @@ class Method:
     InputError
         If a value is out of range, or the parts do not fit together.
     UnknownNameError
-        If there is no measure of that name.
+        If there is no metric of this name.
 
     Examples
     --------
@@ -55,7 +54,7 @@ class Method:
     ('edit+jaccard:5%', True)
     """
 
-    noise: ClassVar[None] = None  # none is assumed, so no chances are told
+    noise: ClassVar[None] = None  # distances assume no noise and give no probabilities
     refined: ClassVar[bool] = False
 
     types: str | None = "edit"
@@ -88,14 +87,14 @@ class Method:
 
     @classmethod
     def parse(cls, text: str) -> Method:
-        """Read a method from the text that `str` writes.
+        """Read a method from text, as `str` writes it.
 
-        It is ``types+angles`` (``edit+jaccard``), or one part (``types:edit``,
+        The form is ``types+angles`` (``edit+jaccard``), or one part (``types:edit``,
         ``angles:histogram``), then any of ``:5%`` (two-stage), ``:alpha=0.7``, ``:raw`` and
-        ``:weights=2/1/1`` (insert, delete, substitute). Raises UnknownNameError or InputError if it
-        cannot be read.
+        ``:weights=2/1/1`` (insert, delete, substitute). Raises UnknownNameError or InputError for
+        other text.
         """
-        misread = (
+        unreadable = (
             f"method {text!r} cannot be read; give two measures as 'edit+jaccard' (types, angles) "
             "or one as 'types:edit' or 'angles:histogram', optionally followed by ':5%' for two "
             "stages, ':alpha=0.7', ':raw' or ':weights=2/1/1'."
@@ -109,7 +108,7 @@ class Method:
         elif head.count("+") == 1:
             types, angles = head.split("+")
         else:
-            raise InputError(misread)
+            raise InputError(unreadable)
         values: dict[str, Any] = {}
         for option in options:
             try:
@@ -117,9 +116,9 @@ class Method:
             except SemsigError:
                 raise
             except (TypeError, ValueError) as error:
-                raise InputError(misread) from error
+                raise InputError(unreadable) from error
             if key in values:
-                raise InputError(misread)
+                raise InputError(unreadable)
             values[key] = value
         return cls(types=types, angles=angles, **values)
 
@@ -141,14 +140,14 @@ class Method:
 
     @property
     def measures(self) -> dict[str, str]:
-        """The measure of each part that is compared, by ``"types"`` and ``"angles"``."""
+        """The metric of each compared part, by ``"types"`` and ``"angles"``."""
         parts = {TYPES: self.types, ANGLES: self.angles}
         return {part: name for part, name in parts.items() if name is not None}
 
     def used(self, query: Signature) -> str:
-        """Return which parts of a query the method compares: types, angles or types+angles.
+        """Return the parts of a query that the method compares: types, angles or types+angles.
 
-        A fusion falls back to the part that the query has. Raises InputError if the query has no
+        A fusion uses one part if the query has only this one. Raises InputError if the query has no
         part that the method compares.
         """
         present = {TYPES: query.codes is not None, ANGLES: query.bearings is not None}
@@ -164,11 +163,11 @@ class Method:
 
 
 FUSION: Method = Method()
-"""Metric fusion of two edit distances in equal shares."""
+"""Metric fusion of two edit distances with equal weights."""
 
 
 def _parse_option(option: str) -> tuple[str, Any]:
-    """Return the field of a method that an option of its text sets, and the value."""
+    """Return the field name and the value of an option in the text of a method."""
     key, _, value = option.partition("=")
     if option == "raw":
         return "normalized", False
@@ -177,5 +176,5 @@ def _parse_option(option: str) -> tuple[str, Any]:
     if key == "alpha":
         return "alpha", float(value)
     if key == "weights":
-        return "weights", EditWeights(*(int(one) for one in value.split("/")))
+        return "weights", EditWeights(*map(int, value.split("/")))
     raise ValueError(option)

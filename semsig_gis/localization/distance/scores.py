@@ -1,4 +1,4 @@
-"""Distances of all cells to a query."""
+"""Score all cells for queries, by distance."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import WILDCARD
+from semsig_gis.database import PartitionedDatabase
 from semsig_gis.localization.distance.memo import DistanceMemo
 from semsig_gis.localization.distance.method import ANGLES, BOTH, FUSION, TYPES
 from semsig_gis.localization.distance.metrics import metric
@@ -23,24 +23,22 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SequenceTable, SignatureDatabase
     from semsig_gis.localization.distance.method import Method
 
     _SecondStage = Callable[[NDArray[np.int64]], NDArray[np.float32]]
 
 _Value = TypeVar("_Value", bound=np.generic)
 
-# Equal scores must come out equal, however they were added up, or ties are broken by rounding.
-# Real differences between scores are far larger than this step, and float32 holds its multiples
-# exactly up to 256.
+# Scores are rounded to this step, or rounding errors would break ties. Differences between scores
+# are far larger than the step, and float32 represents its multiples exactly up to 256.
 _SCORE_STEP = 2.0**-16
-_BATCH_BYTES = 32 << 20  # distances to distinct sequences held at once
-# For fewer queries, measuring what the first stage kept beats measuring all sequences at once.
+_BATCH_BYTES = 32 << 20  # memory for distances to distinct sequences
+# With fewer queries, angle distances are faster for the cells of stage two than for all sequences.
 _MANY_QUERIES = 8
-_BATCH_QUERIES = 128  # RapidFuzz compares queries of like length together, so it wants many
-_CELLS_AT_ONCE = 1 << 16  # scores of so many cells stay in a near cache
+_BATCH_QUERIES = 128  # RapidFuzz compares queries of similar length together: larger is faster
+_CHUNK_CELLS = 1 << 16  # their scores fit the second-level cache
 
 
 def score_cells(
@@ -50,26 +48,26 @@ def score_cells(
     *,
     memo: DistanceMemo | None = None,
 ) -> Iterator[NDArray[np.float32]]:
-    """Give the distance of each query to every cell, one query after the other.
+    """Yield the distances of each query to all cells, one query after the other.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     queries : sequence of Signature
-        What to search for. An empty query is compared like any other.
+        The queries; they may be empty.
     method : Method
         How the cells are ranked.
     memo : DistanceMemo, optional
-        Distances of these very queries to this database that other methods have needed; what is
-        measured is added, a number for each query and distinct sequence.
+        Distances of the same queries to this database, computed for other methods. New distances
+        are added, one number for each query and distinct sequence.
 
     Yields
     ------
     ndarray of float32, shape (n,)
         Distances of one query to the cells, in the order of the database; lower is better.
-        Equal scores are exactly equal: all are multiples of 2 ** -16. Memory stays bounded
-        whatever the number of queries.
+        All are multiples of 2 ** -16, so that ties are exact. Memory does not grow with the number
+        of queries.
 
     Raises
     ------
@@ -85,7 +83,7 @@ def score_cells(
     True 0.0
     True 0.0
     """
-    # Checked here, not when the first score is asked for. A run compares the same parts.
+    # Errors are raised here, not at the first score. Queries of a run compare the same parts.
     runs = [(part, list(run)) for part, run in itertools.groupby(queries, key=method.used)]
     return itertools.chain.from_iterable(
         _score_run(database, run, method, part, memo) for part, run in runs
@@ -95,11 +93,12 @@ def score_cells(
 def score_parts(
     database: SignatureDatabase | PartitionedDatabase, query: Signature, method: Method
 ) -> Iterator[tuple[SignatureDatabase, NDArray[np.float32]]]:
-    """Score a query part by part, as if the parts were one database."""
+    """Yield the parts of a database with the scores that they have in the whole database."""
     if not isinstance(database, PartitionedDatabase):
         yield database, next(iter(score_cells(database, [query], method)))
         return
     two_stage = method.keep is not None and method.used(query) == BOTH
+    # Which cells pass stage one depends on the cells of all parts.
     gate = _gate_of_parts(database, query, method) if two_stage else None
     for part in database.parts():
         if gate is None:
@@ -117,7 +116,7 @@ def _score_run(
     used: str,
     memo: DistanceMemo | None,
 ) -> Iterator[NDArray[np.float32]]:
-    """Score queries that use the same parts, batch by batch."""
+    """Yield the scores of queries that use the same parts, computed in batches."""
     distinct = sum(len(_table(database, part)) for part in used.split("+"))
     size = min(_BATCH_QUERIES, max(1, _BATCH_BYTES // (4 * max(1, distinct))))
     for low in range(0, len(queries), size):
@@ -140,21 +139,24 @@ def _score_both(
     method: Method,
     memo: DistanceMemo | None,
 ) -> Iterator[NDArray[np.float32]]:
-    """Score a batch of queries by types and angles, in one stage or two."""
+    """Yield the scores of a batch of queries by types and angles, in one stage or two."""
     types, angles = database.type_sequences, database.angle_sequences
     by_types = _distances(method, TYPES, codes, types, memo=memo)
-    # The kernel for weights of 1 measures all sequences sooner than others measure some.
+    # The unit-weight edit kernel is faster on all sequences than other metrics on some.
     slow = method.angles != "edit" or method.weights != EditWeights()
     if method.keep is not None and slow and len(codes) < _MANY_QUERIES:
-        for first, one in zip(by_types, levels, strict=True):
-            yield _two_stage(method, first, types, angles, partial(_some, method, one, angles))
+        for first, query_levels in zip(by_types, levels, strict=True):
+            second_stage = partial(_angle_distances, method, query_levels, angles)
+            yield _two_stage(method, first, types, angles, second_stage)
         return
     by_angles = _distances(method, ANGLES, levels, angles, memo=memo)
-    for place, (first, second) in enumerate(zip(by_types, by_angles, strict=True)):
+    for row, (first, second) in enumerate(zip(by_types, by_angles, strict=True)):
         if len(codes) >= _MANY_QUERIES:
-            query = codes[place].tobytes(), levels[place].tobytes()
-            kept = DistanceMemo() if memo is None else memo
-            yield _joined(method, first, types, second, angles, query=query, memo=kept)
+            query = codes[row].tobytes(), levels[row].tobytes()
+            query_memo = DistanceMemo() if memo is None else memo
+            yield _score_compiled(
+                method, first, types, second, angles, query=query, memo=query_memo
+            )
         elif method.keep is None:
             yield _fused(method, first, types.inverse, second, angles.inverse)
         else:
@@ -162,11 +164,11 @@ def _score_both(
 
 
 def _table(database: SignatureDatabase, part: str) -> SequenceTable:
-    """Return the distinct sequences of one part; the other part's are not looked for."""
+    """Return the distinct sequences of one part; the others may not be computed yet."""
     return database.type_sequences if part == TYPES else database.angle_sequences
 
 
-def _joined(
+def _score_compiled(
     method: Method,
     by_types: NDArray[np.float32],
     types: SequenceTable,
@@ -176,12 +178,12 @@ def _joined(
     query: tuple[bytes, bytes],
     memo: DistanceMemo,
 ) -> NDArray[np.float32]:
-    """Return what `_fused` or `_two_stage` gives, compiled: it pays for many queries."""
-    from semsig_gis.localization.distance import kernels  # noqa: PLC0415 - loads a compiler
+    """Return the result of `_fused` or `_two_stage` from compiled kernels, for many queries."""
+    from semsig_gis.localization.distance import kernels  # noqa: PLC0415 - numba takes 0.25 s
 
-    def known(what: Hashable, work_out: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-        kind = method.types, method.angles, method.normalized, method.weights
-        return memo.get((what, *kind, *query), work_out)
+    def cached(name: Hashable, compute: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        metrics = method.types, method.angles, method.normalized, method.weights
+        return memo.get((name, *metrics, *query), compute)
 
     def fuse() -> NDArray[np.float32]:
         left, right = _shares(method, by_types, by_angles)
@@ -197,11 +199,11 @@ def _joined(
         kernels.count_steps(_on_steps(by_types), types.counts, _SCORE_STEP, cells)
         return cells.cumsum()
 
-    # The percentage that is kept changes none of these.
-    fused = known(("fused", method.alpha), fuse)
-    first = known("first", lambda: _spread(_on_steps(by_types), types))
+    # These are the same for every percentage `keep`.
+    fused = cached(("fused", method.alpha), fuse)
+    first = cached("first", lambda: _spread(_on_steps(by_types), types))
     if method.normalized:
-        cut = _cut_at(method, known("cells up to each step", count))
+        cut = _cut_at(method, cached("cells up to each step", count))
     else:
         cut = _cut(method, _on_steps(by_types), types)
     worst = fused.compress(first <= cut).max()
@@ -219,46 +221,46 @@ def _two_stage(
     *,
     gate: _Gate | None = None,
 ) -> NDArray[np.float32]:
-    """Re-rank the cells that are best by type; the others follow in their order.
+    """Return the scores of two-stage fusion.
 
-    `second_stage` gives the distances to the distinct angle sequences that it is asked for. The
-    gate is that of all cells, if these are only a part of them.
+    `second_stage` returns the angle distances of rows of distinct angle sequences. A `gate` is
+    given if the cells are one part of a database.
     """
     first = _on_steps(by_types)
     cut = _cut(method, first, types) if gate is None else gate.cut
-    kept = np.flatnonzero(_spread(first <= cut, types))
-    second = second_stage(angles.inverse[kept])
-    fused = _fused(method, by_types, types.inverse[kept], second, np.arange(len(kept)))
+    passing = np.flatnonzero(_spread(first <= cut, types))
+    second = second_stage(angles.inverse[passing])
+    fused = _fused(method, by_types, types.inverse[passing], second, np.arange(len(passing)))
     worst = fused.max() if gate is None else gate.worst
-    # What is not kept follows in the order of the first stage.
+    # Other cells follow in the order of the first stage.
     scores = _spread(np.maximum(worst + (first - cut), _next(worst)), types)
-    scores[kept] = fused
+    scores[passing] = fused
     return scores
 
 
 def _next(worst: np.float32) -> np.float32:
-    """Return what is behind every kept cell even where the gap is lost in rounding."""
+    """Return the next larger score, behind `worst` even if the difference is rounded to 0."""
     return np.float32(np.nextafter(worst, np.float32(np.inf)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Gate:
-    """What the second stage needs to know of all cells: who passes, and how the last one ranks."""
+    """The worst score of stage one that passes, and the worst fused score, of all cells."""
 
     cut: np.float32
     worst: np.float32
 
 
-def _kept(method: Method, cells: int) -> int:
-    """Return how many of so many cells the types pass on, without those that tie with the last."""
-    # Exact: 7 % of 100 cells are 7, though 100 * 0.07 is a little more.
+def _passing_count(method: Method, cells: int) -> int:
+    """Return the number of cells that pass stage one, ties not counted."""
+    # Exact fractions: 7 % of 100 cells are 7, although 100 * 0.07 is slightly more.
     return math.ceil(Fraction(str(method.keep)) * cells / 100)
 
 
 def _cut(method: Method, first: NDArray[np.float32], types: SequenceTable) -> np.float32:
-    """Return the worst score of the first stage that passes, given that of each sequence."""
-    if not method.normalized:  # raw distances may be negative, or large
-        count = _kept(method, len(types.inverse))
+    """Return the worst score of stage one that passes, from the scores of the sequences."""
+    if not method.normalized:  # raw distances can be negative or large: no bins
+        count = _passing_count(method, len(types.inverse))
         each = _spread(first, types)
         return np.float32(np.partition(each, count - 1)[count - 1])
     steps = np.rint(first / _SCORE_STEP).astype(np.int64)
@@ -266,15 +268,15 @@ def _cut(method: Method, first: NDArray[np.float32], types: SequenceTable) -> np
 
 
 def _cut_at(method: Method, cells: NDArray[Any]) -> np.float32:
-    """Return the worst score that passes, given how many cells are up to each whole step."""
-    count = _kept(method, int(cells[-1]))
+    """Return the worst score that passes, from the cumulative number of cells by step."""
+    count = _passing_count(method, int(cells[-1]))
     return np.float32(np.searchsorted(cells, count) * _SCORE_STEP)
 
 
 def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Method) -> _Gate:
-    """Find the gate of all parts: of each score of the first stage, how many and the worst."""
-    count = _kept(method, len(database))
-    # By distance in the first stage: how many cells, and the worst of them after the second.
+    """Return the gate of all parts, which are read one after the other."""
+    count = _passing_count(method, len(database))
+    # For each score of stage one: the number of cells, and their worst fused score.
     levels: NDArray[np.float32] = np.zeros(0, np.float32)
     sizes: NDArray[np.float64] = np.zeros(0)
     worst: NDArray[np.float32] = np.zeros(0, np.float32)
@@ -283,16 +285,18 @@ def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Meth
         by_types, second_stage = _stages(part, query, method)
         types = part.type_sequences
         first = _spread(_on_steps(by_types), types)
-        # The cut only falls, so that no cell beyond it has to be measured by angles.
+        # The cut can only get lower, so cells beyond it need no angle distances.
         near = np.flatnonzero(first <= cut)
         second = second_stage(part.angle_sequences.inverse[near])
         fused = _fused(method, by_types, types.inverse[near], second, np.arange(len(near)))
-        known = np.append(worst, fused)
-        each = np.append(sizes, np.ones(len(near)))
+        # Merge the levels of this part with those of the parts before.
+        all_fused = np.append(worst, fused)
+        counts = np.append(sizes, np.ones(len(near)))
         levels, rows = np.unique(np.append(levels, first[near]), return_inverse=True)
-        sizes = np.bincount(rows, each).astype(np.float64, copy=False)
+        sizes = np.bincount(rows, counts).astype(np.float64, copy=False)
         worst = np.full(len(levels), -np.inf, np.float32)
-        np.maximum.at(worst, rows, known)
+        np.maximum.at(worst, rows, all_fused)
+        # Levels behind the cut are not needed.
         enough = np.flatnonzero(sizes.cumsum() >= count)
         if len(enough):
             passed = slice(enough[0] + 1)
@@ -304,24 +308,24 @@ def _gate_of_parts(database: PartitionedDatabase, query: Signature, method: Meth
 def _stages(
     database: SignatureDatabase, query: Signature, method: Method
 ) -> tuple[NDArray[np.float32], _SecondStage]:
-    """Measure a query by types, and return how to measure it by angles."""
+    """Return the type distances of a query, and a function for its angle distances."""
     types, angles = database.type_sequences, database.angle_sequences
     codes = [] if query.codes is None else [query.codes]
     by_types = _distances(method, TYPES, codes, types)[0]
     levels = query.levels(database.spec.levels)
-    return by_types, partial(_some, method, levels, angles)
+    return by_types, partial(_angle_distances, method, levels, angles)
 
 
-def _some(
+def _angle_distances(
     method: Method,
     query_levels: NDArray[np.uint8],
     angles: SequenceTable,
     rows: NDArray[np.int64],
 ) -> NDArray[np.float32]:
-    """Measure only the distinct angle sequences of some rows, each once."""
-    only, place = np.unique(rows, return_inverse=True)
+    """Return the angle distances of some rows of sequences, each computed once."""
+    only, inverse = np.unique(rows, return_inverse=True)
     distances = _distances(method, ANGLES, [query_levels], angles, only=only)[0]
-    return np.asarray(distances[place])
+    return np.asarray(distances[inverse])
 
 
 def _distances(
@@ -333,15 +337,15 @@ def _distances(
     only: NDArray[np.int64] | None = None,
     memo: DistanceMemo | None = None,
 ) -> NDArray[np.float32]:
-    """Measure one part of some queries against distinct sequences, as the method says."""
+    """Return the distances of one part of queries to distinct sequences, by the metric of it."""
     name = method.measures[part]
     wild = part == TYPES and any((sequence == WILDCARD).any() for sequence in sequences)
     measure = metric(name, weights=method.weights, wildcard=WILDCARD if wild else None)
-    find = partial(measure, sequences, table, normalized=method.normalized, only=only)
+    compute = partial(measure, sequences, table, normalized=method.normalized, only=only)
     if memo is None:
-        return find()
+        return compute()
     queries = tuple(sequence.tobytes() for sequence in sequences)
-    return memo.get((part, name, method.normalized, method.weights, queries), find)
+    return memo.get((part, name, method.normalized, method.weights, queries), compute)
 
 
 def _fused(
@@ -351,36 +355,36 @@ def _fused(
     by_angles: NDArray[np.float32],
     angles: NDArray[np.int64],
 ) -> NDArray[np.float32]:
-    """Return the weighted sums of two distances of cells, given which distances each cell has."""
+    """Return the fused distances of cells; `types` and `angles` are rows of the distances."""
     left, right = _shares(method, by_types, by_angles)
     scores = np.empty(len(types), np.float32)
-    total, other = np.empty(_CELLS_AT_ONCE), np.empty(_CELLS_AT_ONCE, right.dtype)
-    for low in range(0, len(types), _CELLS_AT_ONCE):
-        high = min(low + _CELLS_AT_ONCE, len(types))
-        some, more = total[: high - low], other[: high - low]
-        left.take(types[low:high], out=some, mode="wrap")
-        some += right.take(angles[low:high], out=more, mode="wrap")
-        np.rint(some, out=some)
-        np.multiply(some, _SCORE_STEP, out=scores[low:high], casting="same_kind")
+    total, other = np.empty(_CHUNK_CELLS), np.empty(_CHUNK_CELLS, right.dtype)
+    for low in range(0, len(types), _CHUNK_CELLS):
+        high = min(low + _CHUNK_CELLS, len(types))
+        chunk, right_chunk = total[: high - low], other[: high - low]
+        left.take(types[low:high], out=chunk, mode="wrap")
+        chunk += right.take(angles[low:high], out=right_chunk, mode="wrap")
+        np.rint(chunk, out=chunk)
+        np.multiply(chunk, _SCORE_STEP, out=scores[low:high], casting="same_kind")
     return scores
 
 
 def _shares(
     method: Method, by_types: NDArray[np.float32], by_angles: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """Return what each of two distances adds to a fusion, in steps."""
-    # In steps from the start: a factor that is a power of two changes no digit.
+    """Return the weighted distances of types and of angles, in steps."""
+    # Division by a step that is a power of two is exact.
     left = method.alpha / _SCORE_STEP * by_types.astype(np.float64)
     return left, (1 - method.alpha) / _SCORE_STEP * by_angles
 
 
 def _spread(values: NDArray[_Value], table: SequenceTable) -> NDArray[_Value]:
-    """Give every cell the value of its sequence."""
-    # The indices are in range, and "wrap" is the quickest mode.
+    """Return the value of its sequence for every cell."""
+    # The indices are in range; "wrap" is the fastest mode.
     return values.take(table.inverse, mode="wrap")
 
 
 def _on_steps(scores: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Round to whole steps, so that equal scores come out equal however they were added up."""
+    """Round scores to whole steps, so that ties are exact."""
     steps = np.rint(scores / _SCORE_STEP)
     return np.asarray(steps * _SCORE_STEP, dtype=np.float32)

@@ -1,7 +1,4 @@
-"""Rank the cells of a signature database for a query.
-
-Scores are distances: lower is better. Cells that tie are told as such, never ranked by accident.
-"""
+"""Locate a query by distance: the best cells, with their ties."""
 
 from __future__ import annotations
 
@@ -12,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import EmptyResultError
-from semsig_gis.core.geometry import crs_label
-from semsig_gis.core.presentation import map_with
-from semsig_gis.database.database import join_databases, rows_of_result
-from semsig_gis.database.file import PartitionedDatabase
+from semsig_gis.core import EmptyResultError, crs_label, map_with
+from semsig_gis.database import PartitionedDatabase, join_databases, rows_of_result
 from semsig_gis.localization.answers import (
     Answer,
     Ranking,
@@ -27,21 +21,19 @@ from semsig_gis.localization.answers import (
 from semsig_gis.localization.distance.method import FUSION
 from semsig_gis.localization.distance.scores import score_cells, score_parts
 from semsig_gis.localization.distance.ties import top_candidates
-from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.view import View
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import MapFrame
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import MapFrame, Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.distance.method import Method
     from semsig_gis.localization.requirement import Requirement
-    from semsig_gis.observation.north import North
+    from semsig_gis.observation import North
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -51,19 +43,19 @@ class Localization(Answer):
     Parameters
     ----------
     query, cells, crs, taxonomy, licenses
-        What was searched for, how many cells were searched, and what their database says.
+        The query, the number of cells searched, and the CRS, classes and licences of the database.
     method : Method
         How the cells were ranked.
     used : str
-        Which parts of the query were compared: ``"types"``, ``"angles"`` or ``"types+angles"``.
+        The compared parts of the query: ``"types"``, ``"angles"`` or ``"types+angles"``.
     columns : mapping of str to ndarray
-        Of the best cells, which are the rows of `candidates`, best first, equal distances in the
-        order of the database: ``rank_low`` and ``rank_high`` (the first and last rank, from 1, that
-        the cell can have when ties are broken either way), ``tied`` (how many cells share its
-        distance), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of
-        the database), ``types`` (symbols), ``length`` (objects), ``distance``.
+        The best cells, which are the rows of `candidates`: best first, equal distances in the
+        order of the database. ``rank_low`` and ``rank_high`` (first and last possible rank, from 1,
+        among its ties), ``tied`` (number of cells with the same distance), ``cell`` (row in the
+        database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the database), ``types``
+        (symbols), ``length`` (objects), ``distance``.
     tied_beyond : int
-        How many cells are as good as the last candidate but are not listed.
+        Number of cells that tie with the last candidate but are not listed.
 
     Examples
     --------
@@ -101,13 +93,13 @@ class Localization(Answer):
         return rows_of_result(database, ids, types, what="localization")
 
     def explore(self, database: SignatureDatabase) -> MapFrame:
-        """Show the candidates on a map in a notebook (see `localization_map`)."""
+        """Return a map of the candidates for a notebook (see `localization_map`)."""
         return map_with("localization_map", self, database)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values that JSON can hold, candidates as a list of records.
+        """Return plain values for JSON; ``candidates`` is a list of records.
 
-        They have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84).
+        These have the names of `columns` and ``lon``, ``lat`` (degrees, WGS 84).
         """
         return {
             "query": self.query.to_dict(self.taxonomy),
@@ -125,27 +117,27 @@ class Localization(Answer):
 
 @dataclass(eq=False, kw_only=True)
 class DistanceLocator:
-    """Measures of distance, and the cells that they rank."""
+    """A method by distance with the cells that it searches."""
 
     database: SignatureDatabase | PartitionedDatabase
     method: Method = FUSION
     requirement: Requirement | None = None
     top: int = 100
     north: North = GRID_NORTH
-    _compared: set[str] = field(default_factory=set)  # parts of queries
+    _warm_parts: set[str] = field(default_factory=set)  # `rankings` has compared them before
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
 
     def locate(self, query: Signature, *, top: int | None = None) -> Localization:
-        """List the cells whose signature is most like a query, of all parts of a database."""
+        """Return the cells with the signatures most similar to a query, over all parts."""
         count = top or self.top
         grid_query = self.north.to_grid(query)
         shortlist, part = self._search(grid_query, count)
         present = sorted(shortlist.present)
-        known = grid_query.among(present)
-        if not known.all():  # the last part might have had the class
-            shortlist, part = self._search(grid_query.select(known), count)
+        occurring = grid_query.among(present)
+        if not occurring.all():  # known only after the last part
+            shortlist, part = self._search(grid_query.select(occurring), count)
         columns, tied_beyond = shortlist.ranked()
         if isinstance(self.database, PartitionedDatabase):
             columns["cell"] = self.database.row_numbers(columns["cell_id"])
@@ -171,7 +163,7 @@ class DistanceLocator:
         )
 
     def _search(self, query: Signature, top: int) -> tuple[Shortlist, SignatureDatabase]:
-        """Return the best cells of all parts, and a database of no cells that stands for them."""
+        """Return the best cells of all parts, and an empty database with their CRS and classes."""
         shortlist = Shortlist(top)
         for part, scores in score_parts(self.database, query, self.method):
             shortlist.present.update(part.present_codes.tolist())
@@ -197,11 +189,11 @@ class DistanceLocator:
         database = self.database
         if isinstance(database, PartitionedDatabase):
             database = join_databases(list(database.parts()))
-        # What the database works out once and keeps is no part of the time of a query.
+        # Cached arrays of the database are computed before the time is measured.
         parts = self.method.used(queries[0])
-        if parts not in self._compared:
+        if parts not in self._warm_parts:
             next(iter(score_cells(database, queries[:1], self.method)))
-            self._compared.add(parts)
+            self._warm_parts.add(parts)
         rows = iter(score_cells(database, queries, self.method, memo=memo))
         for _ in queries:
             start, spared = time.perf_counter(), memo.spared if memo else 0.0
@@ -211,59 +203,60 @@ class DistanceLocator:
 
 
 def _unused_notes(query: Signature, method: Method) -> tuple[str, ...]:
-    """Return what to say of what is known of a view but means nothing to a measure of distance."""
+    """Return a note on the parts of a view that a distance does not use."""
     if not isinstance(query, View):
         return ()
-    known = {
+    parts = {
         "ranges": query.ranges is not None,
         "scores": query.scores is not None,
         "sectors": any(photo.sectors for photo in query.photos),
         "errors of north": any(photo.north_sigma for photo in query.photos),
     }
-    unused = [name for name, there in known.items() if there]
+    unused = [name for name, present in parts.items() if present]
     if not unused:
         return ()
     return (f"{method} does not use {' and '.join(unused)}; the method likelihood does.",)
 
 
 class Shortlist:
-    """The best `top` cells of a search, gathered from one part of a database after the other.
+    """The best `top` cells of a search, collected over the parts of a database.
 
-    `listed` has their columns, best first, equal distances in the order of columns and rows of the
-    grid; `present` the class codes that some cell sees; `cells` how many cells were looked at.
+    `columns` are theirs, best first, equal distances in the order of the grid; `present` are the
+    class codes that occur; `cells` is the number of cells searched.
     """
 
     def __init__(self, top: int) -> None:
-        self.listed: dict[str, NDArray[Any]] = {}
+        self.columns: dict[str, NDArray[Any]] = {}
         self.present: set[int] = set()
         self.cells = 0
         self._top = top
-        # How many cells have each distance, up to that of the last listed one at least.
+        # Number of cells by distance, at least up to the last listed distance.
         self._sizes: Counter[float] = Counter()
 
     def add(self, database: SignatureDatabase, scores: NDArray[np.float32]) -> None:
-        """Take the best cells of a part, given the distances of all its cells."""
+        """Add the best cells of a part, from the distances of all its cells."""
         better, level = top_candidates(scores, min(self._top, len(scores)))
         better = better[np.argsort(scores[better], kind="stable")]
         cells = np.concatenate([better, level])
+        # All ties with the last are counted, also those that are not listed.
         values, sizes = np.unique(scores[cells], return_counts=True)
         self._sizes.update(dict(zip(values.tolist(), sizes.tolist(), strict=True)))
         cells = cells[: self._top]
         part = candidate_columns(database, cells)
         part["distance"] = scores[cells].astype(np.float64)
         if self.cells:
-            both = {name: np.append(self.listed[name], part[name]) for name in part}
+            both = {name: np.append(self.columns[name], part[name]) for name in part}
             best = np.lexsort((both["cell_id"], both["distance"]))[: self._top]
             part = {name: column[best] for name, column in both.items()}
-        self.listed = part
+        self.columns = part
         self.present.update(database.present_codes.tolist())
         self.cells += len(database)
 
     def ranked(self) -> tuple[dict[str, NDArray[Any]], int]:
-        """Return the columns and the number of ties beyond them, as in `Localization`."""
+        """Return the columns with ranks, and the number of ties beyond, as in `Localization`."""
         values = np.array(sorted(self._sizes))
         sizes = np.array([self._sizes[value] for value in values.tolist()])
-        place = np.searchsorted(values, self.listed["distance"])
-        high, tied = np.cumsum(sizes)[place], sizes[place]
+        rows = np.searchsorted(values, self.columns["distance"])
+        high, tied = np.cumsum(sizes)[rows], sizes[rows]
         ranks = {"rank_low": high - tied + 1, "rank_high": high, "tied": tied}
-        return {**ranks, **self.listed}, int(high[-1]) - len(high)
+        return {**ranks, **self.columns}, int(high[-1]) - len(high)

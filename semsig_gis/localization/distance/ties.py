@@ -1,7 +1,7 @@
-"""Score a ranking in which cells tie: expectations over all orders of the tied, exactly.
+"""Exact expectations of errors and ranks over all orders of tied cells.
 
-Equal scores are common (a street with three lamps looks like thousands of others), so neither an
-error nor a rank may depend on the order in which an array happens to hold the cells.
+Ties are common (a street with three lamps looks like thousands of others), so errors and ranks must
+not depend on the order of the cells in an array.
 """
 
 from __future__ import annotations
@@ -11,58 +11,59 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-THRESHOLDS = (
+THRESHOLDS: tuple[float, ...] = (
     *(0, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 80, 90, 100),
     *(150, 200, 300, 400, 500, 1000, 2000, 5000),
 )
-"""Errors in metres whose probability is kept for every query, in the columns ``p0``, ``p5``..."""
+"""Errors in metres; the columns ``p0``, ``p5``... of a query are their probabilities."""
 
-NEAR_PLACES = (1, 5, 10, 20)
-"""Numbers N of best places of which one may be near, in the columns ``near1``, ``near5``..."""
+NEAR_PLACES: tuple[int, ...] = (1, 5, 10, 20)
+"""Numbers N of best places; the columns ``near1``, ``near5``... say whether one is near."""
 
 NEAR_METRES = 25
-"""How near, in metres, as recall@N is told in visual place recognition."""
+"""Distance in metres that counts as near; recall@N in visual place recognition uses it."""
 
-BLOCK = 256  # cells of which only the best is looked at first, far from each other
-FEW = 4  # times as many blocks: then it pays to look at some of them alone
+_STRIDE_CELLS = 256  # a first pass reduces groups of this many cells, far from each other
+_MOST_GROUP_SHARE = 4  # above 1 / 4 of the groups, reading single groups is not faster
 
 
 def best_cells(scores: NDArray[np.float32], count: int) -> NDArray[np.intp]:
     """Return the rows of the `count` best cells and of all that tie with the last, ascending.
 
-    Lower scores are better. The best of each block of cells are looked at first: at least `count`
-    cells are no worse than the last of the best blocks, so few others need to be ordered.
+    Lower scores are better. The minima of groups of cells give an upper limit for the score of the
+    last one, so that only few cells are sorted.
     """
-    blocks = len(scores) // BLOCK
-    if blocks < count:
-        some = np.arange(len(scores))
+    groups = len(scores) // _STRIDE_CELLS
+    if groups < count:
+        rows = np.arange(len(scores))
     else:
-        least = scores[: blocks * BLOCK].reshape(BLOCK, blocks).min(axis=0)
-        enough = np.partition(least, count - 1)[count - 1]
-        best = np.flatnonzero(least <= enough)
-        if FEW * len(best) < blocks:
-            inside = (best + np.arange(BLOCK)[:, None] * blocks).ravel()
-            some = np.concatenate([inside, np.arange(blocks * BLOCK, len(scores))])
-            some = some[scores[some] <= enough]
+        # At least `count` cells have no higher score than the minimum of the `count`-th best group.
+        minima = scores[: groups * _STRIDE_CELLS].reshape(_STRIDE_CELLS, groups).min(axis=0)
+        limit = np.partition(minima, count - 1)[count - 1]
+        best = np.flatnonzero(minima <= limit)
+        if _MOST_GROUP_SHARE * len(best) < groups:
+            inside = (best + np.arange(_STRIDE_CELLS)[:, None] * groups).ravel()
+            rows = np.concatenate([inside, np.arange(groups * _STRIDE_CELLS, len(scores))])
+            rows = rows[scores[rows] <= limit]
         else:
-            some = np.flatnonzero(scores <= enough)
-    cut = np.partition(scores[some], count - 1)[count - 1]
-    return np.asarray(some[scores[some] <= cut])
+            rows = np.flatnonzero(scores <= limit)
+    cut = np.partition(scores[rows], count - 1)[count - 1]
+    return np.asarray(rows[scores[rows] <= cut])
 
 
 def top_candidates(
     scores: NDArray[np.float32], top: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the cells that are surely among the `top` best, and those that tie for what is left.
+    """Return the cells certainly among the `top` best, and the cells that tie for the other ranks.
 
-    Lower scores are better. Both are row numbers in array order; fewer than `top` cells are sure.
+    Lower scores are better. Both are row numbers in array order; the first are fewer than `top`.
     """
     cut = scores.min() if top == 1 else np.partition(scores, top - 1)[top - 1]
     return np.flatnonzero(scores < cut), np.flatnonzero(scores == cut)
@@ -71,50 +72,50 @@ def top_candidates(
 def expected_best(
     better: ArrayLike, tied: ArrayLike, *, slots: int, thresholds: Sequence[float] = THRESHOLDS
 ) -> tuple[float, NDArray[np.float64]]:
-    """Return the expected smallest error, and the chance that it is within each threshold.
+    """Return the expected smallest error, and the probability of at most each threshold.
 
-    All `better` candidates count, and `slots` (1 to g) of the g `tied` ones, drawn without
+    The candidates are all `better` ones and `slots` (1 to g) of the g `tied` ones, drawn without
     replacement. Errors and thresholds are in metres.
 
     With h of the g tied errors at most x, all draws are beyond x with probability C(g - h, slots) /
-    C(g, slots). As h grows by one, that is multiplied by (g - h - slots) / (g - h), which gives the
-    whole distribution of the smallest draw.
+    C(g, slots). From h to h + 1, this is multiplied by (g - h - slots) / (g - h); the products are
+    the distribution of the smallest draw.
     """
-    nearest = _nearest(better)
+    nearest = _smallest(better)
     errors = np.asarray(tied, dtype=np.float64)
     limits = np.asarray(thresholds, dtype=np.float64)
-    if slots == errors.size:  # all are in
+    if slots == errors.size:  # all are candidates
         expected = min(nearest, float(errors.min()))
-        drawn = (limits >= expected).astype(np.float64)
+        within = (limits >= expected).astype(np.float64)
     elif slots == 1:
         expected = float(np.minimum(errors, nearest).mean())
-        drawn = _count_within(errors, limits) / errors.size
+        within = _count_within(errors, limits) / errors.size
     else:
         ordered = np.sort(errors)
-        left = np.arange(ordered.size, 0, -1, dtype=np.float64)
-        steps = np.maximum(left - slots, 0.0) / left
-        beyond = np.concatenate([[1.0], np.cumprod(steps)])  # by the number of errors at most x
+        others = np.arange(ordered.size, 0, -1, dtype=np.float64)  # g - h
+        steps = np.maximum(others - slots, 0.0) / others
+        beyond = np.concatenate([[1.0], np.cumprod(steps)])  # index: h
         chances = beyond[:-1] - beyond[1:]
         expected = float((chances * np.minimum(ordered, nearest)).sum())
-        drawn = 1.0 - beyond[np.searchsorted(ordered, limits, side="right")]
-    return expected, np.where(limits >= nearest, 1.0, drawn)
+        within = 1.0 - beyond[np.searchsorted(ordered, limits, side="right")]
+    return expected, np.where(limits >= nearest, 1.0, within)
 
 
 def _count_within(errors: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Count the errors that are at most each limit; there are many errors and few limits."""
+    """Return the number of errors up to each limit, for many errors and few limits."""
     order = np.argsort(limits)
-    places = np.searchsorted(limits[order], errors)
+    bins = np.searchsorted(limits[order], errors)
     counts = np.empty(len(limits), np.int64)
-    counts[order] = np.bincount(places, minlength=len(limits) + 1).cumsum()[:-1]
+    counts[order] = np.bincount(bins, minlength=len(limits) + 1).cumsum()[:-1]
     return counts
 
 
 def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: float) -> float:
-    """Return the chance that the smallest error is at most `metres` when candidates tie at the cut.
+    """Return the probability that the smallest error is at most `metres`.
 
-    The value of `expected_best` for one threshold; faster if `slots` is small.
+    It is the value of `expected_best` for one threshold; faster if `slots` is small.
     """
-    if _nearest(better) <= metres:
+    if _smallest(better) <= metres:
         return 1.0
     errors = np.asarray(tied, dtype=np.float64)
     outside = int(np.count_nonzero(errors > metres))
@@ -124,13 +125,13 @@ def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: flo
     return 1.0 - float(np.prod((outside - draws) / (errors.size - draws)))
 
 
-def _nearest(errors: ArrayLike) -> float:
+def _smallest(errors: ArrayLike) -> float:
     values = np.asarray(errors, dtype=np.float64)
     return float(values.min()) if values.size else math.inf
 
 
 def rank_range(scores: NDArray[np.float32], cell: int) -> tuple[int, int]:
-    """Return the first and the last rank, from 1, that a cell can have among those it ties with."""
+    """Return the first and the last possible rank, from 1, of a cell among its ties."""
     own = scores[cell]
     return int(np.count_nonzero(scores < own)) + 1, int(np.count_nonzero(scores <= own))
 
@@ -138,16 +139,16 @@ def rank_range(scores: NDArray[np.float32], cell: int) -> tuple[int, int]:
 def expected_recall(
     rank_low: ArrayLike, rank_high: ArrayLike, *, cells: int, percent: float
 ) -> NDArray[np.float64]:
-    """Return the chance that each true cell ranks in the top `percent` of the cells, shape (q,).
+    """Return the probability that each true cell ranks in the top `percent` of cells, shape (q,).
 
-    A rank is uniform between its bounds, which count from 1. `percent` is above 0 and at most 100,
-    and the number of cells that it stands for is rounded down.
+    A rank is uniform between its bounds, which count from 1. `percent` is above 0 and at most 100;
+    the number of cells is rounded down.
     """
     if not 0 < percent <= 100:  # noqa: PLR2004
         raise InputError(
             f"A recall at {percent} % was requested; give a percentage above 0 and at most 100."
         )
-    # The small term keeps 0.07 * 100, which is just below 7, from being rounded down to 6.
+    # The small term prevents that 0.07 * 100, slightly below 7, is rounded down to 6.
     count = math.floor(percent * cells / 100 + 1e-9)
     low = np.asarray(rank_low, dtype=np.float64)
     high = np.asarray(rank_high, dtype=np.float64)

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.statistics import binomial_tail
-from semsig_gis.storage.text import parse_json, read_whole
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.core import InputError, binomial_tail
+from semsig_gis.storage import parse_json, read_whole, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -20,23 +20,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN, HALF_TURN, signed_degrees
-from semsig_gis.core.signature import distance_units_of
-from semsig_gis.database.database import visible_objects_in
+from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, distance_units_of, signed_degrees
+from semsig_gis.database import visible_objects_in
 from semsig_gis.localization.likelihood.index import CellScores, own_sigma
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import View
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.sightings import VisibleObjects
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase, VisibleObjects
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable

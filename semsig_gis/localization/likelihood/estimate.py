@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import signed_degrees
+from semsig_gis.core import Displayed, signed_degrees
 from semsig_gis.localization.likelihood.association import align_cells
 from semsig_gis.localization.likelihood.index import own_sigma
 from semsig_gis.localization.likelihood.posterior import Refinement
-from semsig_gis.observation.view import View
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
+    from semsig_gis.core import Signature
     from semsig_gis.localization.likelihood.posterior import Posterior
     from semsig_gis.localization.noise.model import Noise
 

@@ -13,15 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import SOURCE, SOURCE_ID, signed_degrees, wrap_degrees
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.database import visible_objects_in
-from semsig_gis.database.sightings import visible_objects_at
+from semsig_gis.core import SOURCE, SOURCE_ID, WILDCARD, Displayed, signed_degrees, wrap_degrees
+from semsig_gis.database import visible_objects_at, visible_objects_in
 from semsig_gis.localization.likelihood.association import Detections, associate, near_pairs
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables, query_bearings
-from semsig_gis.observation.north import GRID_NORTH
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.observation import GRID_NORTH, Photo, View
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,15 +26,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core.rtree import ObjectIndex
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.sightings import VisibleObjects
+    from semsig_gis.core import ObjectIndex, Signature, Taxonomy
+    from semsig_gis.database import Footprints, SignatureDatabase, VisibleObjects
     from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.objects.table import StreetObjects
-    from semsig_gis.observation.north import North
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.observation import North
 
 UNKNOWN_NAME = "unknown"
 LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other

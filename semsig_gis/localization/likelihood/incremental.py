@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.localization.likelihood.index import LikelihoodIndex, TurnScores
-    from semsig_gis.observation.view import Sector, View
+    from semsig_gis.observation import Sector, View
 
     _Setting = tuple[LikelihoodIndex, tuple[Sector, ...], float]
 

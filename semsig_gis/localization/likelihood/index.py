@@ -16,22 +16,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.geometry import FULL_TURN, crs_label
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
-from semsig_gis.core.threads import share_rows
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    FULL_TURN,
+    Displayed,
+    crs_label,
+    distance_units_of,
+    share_rows,
+)
 from semsig_gis.localization.likelihood.photo import PhotoTable
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
 from semsig_gis.localization.noise.table import database_tables, mean_table
-from semsig_gis.observation.view import View, check_north
+from semsig_gis.observation import View, check_north
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.likelihood.incremental import TurnMemo
     from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable

@@ -14,10 +14,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids, crs_label, to_degrees
-from semsig_gis.core.presentation import map_with
-from semsig_gis.core.text import percent
+from semsig_gis.core import InputError, cell_ids, crs_label, map_with, percent, to_degrees
 from semsig_gis.localization.answers import (
     REGION_SHARE,
     Answer,
@@ -40,17 +37,15 @@ from semsig_gis.localization.likelihood.posterior import (
 )
 from semsig_gis.localization.likelihood.route import route_posteriors
 from semsig_gis.localization.noise.model import cell_noise, place_noise
-from semsig_gis.observation.north import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.display import MapFrame
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.store import ObjectStore
+    from semsig_gis.core import MapFrame, Signature
+    from semsig_gis.database import ObjectStore, SignatureDatabase
     from semsig_gis.localization.distance.memo import DistanceMemo
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
@@ -58,8 +53,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.incremental import TurnMemo
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.posterior import Refinement
-    from semsig_gis.observation.leg import Leg
-    from semsig_gis.observation.north import North
+    from semsig_gis.observation import Leg, North
 
 DISAGREEMENT = 0.01
 """Ratio of a prior (see `posterior.prior_ratio`) at or below which an answer warns of it."""

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.defaults import LIKELIHOOD
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
+from semsig_gis.core import LIKELIHOOD, InputError, UnknownNameError, nearest_name
 from semsig_gis.localization.noise.model import NOISES
-from semsig_gis.observation.view import check_north
+from semsig_gis.observation import check_north
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.geometry import FULL_TURN, cell_ids
-from semsig_gis.core.jit import compiled
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS
-from semsig_gis.core.threads import share_rows
-from semsig_gis.database.sightings import VisibleObjects
+from semsig_gis.core import BEARING_UNITS, DISTANCE_UNITS, FULL_TURN, cell_ids, compiled, share_rows
+from semsig_gis.database import VisibleObjects
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 CELLS_A_PART = 64  # that are worth a thread
 # The cells around a cell, at 3 * (columns + 1) + (rows + 1).

@@ -24,20 +24,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.core.signature import BEARING_UNITS, DISTANCE_UNITS, distance_units_of
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.core.threads import share_rows
+from semsig_gis.core import (
+    BEARING_UNITS,
+    DISTANCE_UNITS,
+    FULL_TURN,
+    WILDCARD,
+    InputError,
+    distance_units_of,
+    share_rows,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sightings import VisibleObjects
+    from semsig_gis.database import VisibleObjects
     from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.observation.view import View
+    from semsig_gis.observation import View
 
 PLACES_A_PART = 32  # that are worth a thread
 FIRST = 128  # places of which the others must not stay too far behind

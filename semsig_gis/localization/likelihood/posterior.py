@@ -14,16 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids, signed_degrees
-from semsig_gis.core.text import percent
-from semsig_gis.database.sightings import visible_objects_at
+from semsig_gis.core import Displayed, InputError, cell_ids, percent, signed_degrees
+from semsig_gis.database import visible_objects_at
 from semsig_gis.localization.likelihood.association import turn_logs
 from semsig_gis.localization.likelihood.index import own_sigma
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
-from semsig_gis.observation.view import View, check_north
+from semsig_gis.observation import View, check_north
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,12 +28,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core.rtree import ObjectIndex
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.occlusion import Footprints
+    from semsig_gis.core import ObjectIndex, Signature
+    from semsig_gis.database import Footprints, SignatureDatabase
     from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 
 LEAST_LOG = -700.0  # whose exponential is a number
@@ -198,7 +193,7 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     >>> bool(np.allclose(again.chances, location.chances, atol=1e-6))
     True
     """
-    from semsig_gis.storage.raster import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+    from semsig_gis.storage import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
 
     chances = raster_at_cells(
         path,

@@ -16,9 +16,7 @@ import geopandas as gpd
 import numpy as np
 import shapely
 
-from semsig_gis.core.checks import MOST_METRES, require_number
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.core.geometry import to_degrees
+from semsig_gis.core import MOST_METRES, CrsError, InputError, require_number, to_degrees
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from pyproj import CRS
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 LEAST_SIGMA_M = 0.01
 FARTHEST = 3.0  # standard deviations of a position, beyond the range of sight, from every cell
@@ -316,7 +314,7 @@ def raster_prior(
     >>> round(float(chances.max() / chances.min()), 6)
     3.0
     """
-    from semsig_gis.storage.raster import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+    from semsig_gis.storage import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
 
     weights = raster_at_cells(
         path,

@@ -11,19 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import Displayed, InputError
 from semsig_gis.localization.noise.fit import LEAST, MOST, drawn_rates
-from semsig_gis.objects.changes import ClassChange
-from semsig_gis.sources.catalog import data_folder
-from semsig_gis.storage.toml import parse_toml, read_values
+from semsig_gis.objects import ClassChange
+from semsig_gis.sources import data_folder
+from semsig_gis.storage import parse_toml, read_values
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.noise.model import Noise, NoiseSpec
 
 MOST_YEARS = 100.0

@@ -16,10 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import DISTANCE_UNITS, distance_units_of
-from semsig_gis.core.statistics import log_interval, poisson_interval, wilson_interval
-from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core import (
+    DISTANCE_UNITS,
+    WILDCARD,
+    InputError,
+    distance_units_of,
+    log_interval,
+    poisson_interval,
+    wilson_interval,
+)
 from semsig_gis.localization.likelihood.association import (
     Detections,
     associate,
@@ -27,16 +32,15 @@ from semsig_gis.localization.likelihood.association import (
     near_pairs,
 )
 from semsig_gis.localization.noise.table import NoiseTable
-from semsig_gis.observation.view import View
+from semsig_gis.observation import View
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.sightings import VisibleObjects
+    from semsig_gis.core import Signature, Taxonomy
+    from semsig_gis.database import VisibleObjects
     from semsig_gis.localization.likelihood.association import Association, Pairs
 
 

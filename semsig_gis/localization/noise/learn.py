@@ -9,13 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import cell_ids
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.core.taxonomy import WILDCARD
-from semsig_gis.database.database import SignatureDatabase, visible_objects_in
-from semsig_gis.database.sightings import visible_objects_at
+from semsig_gis.core import WILDCARD, Displayed, InputError, ObjectIndex, cell_ids
+from semsig_gis.database import SignatureDatabase, visible_objects_at, visible_objects_in
 from semsig_gis.localization.noise.fit import (
     ALL,
     KNOTS,
@@ -29,9 +24,8 @@ from semsig_gis.localization.noise.fit import (
     next_model,
 )
 from semsig_gis.localization.noise.model import NoiseSpec
-from semsig_gis.observation.sentences import RADIUS_M, SEEN, parse_view
-from semsig_gis.observation.view import View
-from semsig_gis.storage.rows import read_rows, row_value
+from semsig_gis.observation import RADIUS_M, SEEN, View, parse_view
+from semsig_gis.storage import read_rows, row_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,14 +33,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.occlusion import Footprints
-    from semsig_gis.database.sightings import VisibleObjects
+    from semsig_gis.core import Signature, Taxonomy
+    from semsig_gis.database import Footprints, VisibleObjects
     from semsig_gis.localization.noise.fit import Evidence
     from semsig_gis.localization.noise.table import NoiseTable
-    from semsig_gis.objects.table import StreetObjects
-    from semsig_gis.storage.rows import Row
+    from semsig_gis.objects import StreetObjects
+    from semsig_gis.storage import Row
 
 MOST_ROUNDS = 500
 SETTLED = 1e-4  # largest change of a log-odds or logarithm

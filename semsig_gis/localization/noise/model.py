@@ -16,12 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.text import percent
-from semsig_gis.storage.toml import read_values, toml_text
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.core import (
+    HALF_TURN,
+    Displayed,
+    InputError,
+    UnknownNameError,
+    nearest_name,
+    percent,
+)
+from semsig_gis.storage import read_values, toml_text, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

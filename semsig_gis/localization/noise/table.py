@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.core.errors import InputError, nearest_name
-from semsig_gis.core.signature import DISTANCE_UNITS
-from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core import DISTANCE_UNITS, WILDCARD, InputError, nearest_name
 from semsig_gis.localization.noise.model import ALL
 
 if TYPE_CHECKING:
@@ -22,9 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.signature import Signature
-    from semsig_gis.core.taxonomy import Taxonomy
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.core import Signature, Taxonomy
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.noise.model import Noise, NoiseSpec
 
 # No chance is quite nought or one: a model that excludes something is wrong one day, and then

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN, signed_degrees
+from semsig_gis.core import FULL_TURN, InputError, require_number, signed_degrees
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import FULL_TURN
+from semsig_gis.core import FULL_TURN, InputError
 from semsig_gis.observation.detectors.pictures import Shot
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from xml.etree import ElementTree as ET
 
 import yaml
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.mapillary import mapillary_images, mapillary_pictures
 from semsig_gis.observation.detectors.pictures import Picture, Shot, bounds, box_of, turned
-from semsig_gis.storage.text import parse_json, read_text
+from semsig_gis.storage import parse_json, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -9,18 +9,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import CatalogError, InputError, UnknownNameError, nearest_name
-from semsig_gis.core.taxonomy import MAX_HEIGHT_M, check_height
-from semsig_gis.sources.catalog import built_in_taxonomy, data_folder
-from semsig_gis.sources.keywords import class_code
-from semsig_gis.storage.text import read_text
-from semsig_gis.storage.toml import check_keys, metres, parse_toml, texts
+from semsig_gis.core import (
+    MAX_HEIGHT_M,
+    CatalogError,
+    InputError,
+    UnknownNameError,
+    check_height,
+    nearest_name,
+)
+from semsig_gis.sources import built_in_taxonomy, class_code, data_folder
+from semsig_gis.storage import check_keys, metres, parse_toml, read_text, texts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from importlib.resources.abc import Traversable
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
 MAP_KEYS = {"labels": dict, "left_out": list}
 MEANING_KEYS = {"class": object, "part": bool, "height_m": object, "height_sigma": object}

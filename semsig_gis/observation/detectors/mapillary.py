@@ -6,7 +6,7 @@ import base64
 import binascii
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.pictures import Picture, Shot, bounds, box_of
 
 if TYPE_CHECKING:

@@ -10,16 +10,22 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from semsig_gis.core.checks import require_number
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.geometry import FULL_TURN, wrap_degrees
-from semsig_gis.core.taxonomy import MAX_RANGE_M, WILDCARD, Taxonomy
+from semsig_gis.core import (
+    FULL_TURN,
+    MAX_RANGE_M,
+    WILDCARD,
+    InputError,
+    Taxonomy,
+    UnknownNameError,
+    require_number,
+    wrap_degrees,
+)
 from semsig_gis.observation.detectors.camera import USUAL_FOV, Camera, Projection
 from semsig_gis.observation.detectors.exif import read_exif
 from semsig_gis.observation.detectors.pictures import Shot
 from semsig_gis.observation.view import CLASSES, MOST_RANGE_ERROR, Photo, View
-from semsig_gis.sources.catalog import built_in_taxonomy
-from semsig_gis.storage.rows import read_rows, row_value
+from semsig_gis.sources import built_in_taxonomy
+from semsig_gis.storage import read_rows, row_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -29,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation.detectors.labels import LabelMap, Meaning
     from semsig_gis.observation.detectors.pictures import Box, Picture
-    from semsig_gis.storage.rows import Row
+    from semsig_gis.storage import Row
 
 Places = Literal["each", "gps", "all"]
 """Which pictures are of one place: none, those within a few metres, or all."""

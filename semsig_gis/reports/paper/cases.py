@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.paper.reproduction import BEST
+from semsig_gis.evaluation import BEST
+from semsig_gis.evaluation import published as paris
 from semsig_gis.reports.shares import Share, share_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.evaluation.paper.reproduction import Reproduction
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation, Reproduction
     from semsig_gis.reports.shares import Figure
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from semsig_gis.evaluation.paper.figures import READ_OFF
-from semsig_gis.evaluation.paper.reproduction import FUSIONS, MANY, PERCENTS, SINGLES, WEIGHTS
+from semsig_gis.evaluation import FUSIONS, MANY, PERCENTS, READ_OFF, SINGLES, WEIGHTS
 from semsig_gis.reports.paper.cases import case_of
 from semsig_gis.reports.report_model import Section
 from semsig_gis.reports.shares import curve_of, plot_of, share_of
@@ -14,7 +13,7 @@ from semsig_gis.reports.shares import curve_of, plot_of, share_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from semsig_gis.evaluation.paper.reproduction import Reproduction
+    from semsig_gis.evaluation import Reproduction
     from semsig_gis.reports.report_model import Number, Plot
     from semsig_gis.reports.shares import Points
 

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.paper.figures import READ_OFF
-from semsig_gis.evaluation.paper.reproduction import (
+from semsig_gis.evaluation import (
     BEST,
+    DISTORTIONS,
     FIRST_STAGE,
     LEVELS,
     OURS,
+    READ_OFF,
     READINGS,
+    machine,
 )
-from semsig_gis.evaluation.queries.distortions import DISTORTIONS
-from semsig_gis.evaluation.result import machine
+from semsig_gis.evaluation import published as paris
 from semsig_gis.reports.paper.cases import case_of, is_alone, level_case, reweighted
 from semsig_gis.reports.paper.comparisons import COMPARISONS, NAMES
 from semsig_gis.reports.report_model import Curve, Number, Plot, Report, Section
@@ -37,8 +37,7 @@ from semsig_gis.reports.tables import short_percent
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from semsig_gis.evaluation.paper.reproduction import Reproduction
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.evaluation import Evaluation, Reproduction
     from semsig_gis.reports.report_model import Scene
     from semsig_gis.reports.shares import Figure, Points
 

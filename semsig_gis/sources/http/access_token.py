@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import InputError
+from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

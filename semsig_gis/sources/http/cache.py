@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING
 
 from filelock import lock_descriptor
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.storage.text import parse_json
-from semsig_gis.storage.whole import whole_file
+from semsig_gis.core import InputError
+from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -6,7 +6,7 @@ import html
 import re
 from typing import Any
 
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 LONGEST = 200
 # OGC services send an OWS ExceptionReport, older ones a ServiceExceptionReport.

@@ -25,7 +25,7 @@ import requests
 import urllib3.exceptions
 
 from semsig_gis import __version__
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.http.cache import Fetched, FileVersion
 from semsig_gis.sources.http.deadline import (

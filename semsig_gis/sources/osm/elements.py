@@ -1,4 +1,4 @@
-"""OpenStreetMap elements of a layer: which it means, by exact tags, and what they stand for."""
+"""OpenStreetMap elements of a layer: selection by exact tags, and their geometry."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from semsig_gis.core.errors import CatalogError
+from semsig_gis.core import CatalogError
 from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.rows import (
     WGS84,
@@ -28,13 +28,15 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec, Role
     from semsig_gis.sources.rows import Position
 
-RING_NODES = 4  # of the smallest, a triangle: the first node comes again at its end
+RING_NODES = 4  # of the smallest ring, a triangle: the first node is also the last
+# Kinds of elements by the first letter of their names, as in "n123".
+KIND_BY_LETTER: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
 
 
 def way_shape(xy: NDArray[np.float64], role: Role) -> BaseGeometry:
-    """Return what a way stands for: an area or a line, of buildings an area, of streets a line.
+    """Return the geometry of a way: an area if it is closed and not a street, else a line.
 
-    Nodes are longitude and latitude, shape (n, 2). A closed way is an area, but for a street.
+    Nodes are longitude and latitude, shape (n, 2). BadFeatureError for a building without area.
     """
     if len(xy) < 2:  # noqa: PLR2004
         raise BadFeatureError("has less than two nodes")
@@ -44,7 +46,7 @@ def way_shape(xy: NDArray[np.float64], role: Role) -> BaseGeometry:
         if role == "buildings":
             raise BadFeatureError("is not closed, as the outline of a building is")
         return shapely.LineString(xy)
-    area = _areas(shapely.Polygon(xy))
+    area = _polygonal_part(shapely.Polygon(xy))
     if role == "buildings":
         return _require_area(area)
     return shapely.LineString(xy) if area.is_empty else area
@@ -59,15 +61,15 @@ def relation_shape(
     """
     area: BaseGeometry = shapely.Polygon()
     for ring in (*_rings(outer), *_rings(inner)):
-        # Parity, so that an island in a hole is inside again.
+        # The symmetric difference counts an island in a hole as inside again.
         area = shapely.symmetric_difference(area, ring)
-    return _require_area(_areas(area))
+    return _require_area(_polygonal_part(area))
 
 
 def feature_shape(geometry: shapely.Geometry, role: Role) -> shapely.Geometry:
-    """Return what a way or multipolygon stands for of which a program has made a shape already.
+    """Return the geometry of a way or multipolygon from the geometry in a file.
 
-    It is as of `way_shape` if it has one outline, whether drawn as a line or an area.
+    A line, or an area without holes, is treated as the way that it was made from.
     """
     parts = shapely.get_parts(geometry)
     if len(parts) == 1 and shapely.get_num_interior_rings(parts[0]) == 0:
@@ -76,7 +78,7 @@ def feature_shape(geometry: shapely.Geometry, role: Role) -> shapely.Geometry:
         if kind != shapely.GeometryType.POINT:
             return way_shape(shapely.get_coordinates(outline), role)
     elif shapely.get_dimensions(geometry) == 2:  # noqa: PLR2004
-        return _require_area(_areas(geometry))
+        return _require_area(_polygonal_part(geometry))
     return geometry
 
 
@@ -85,20 +87,21 @@ def _is_ring(xy: NDArray[np.float64]) -> bool:
 
 
 def _rings(ways: Iterable[NDArray[np.float64]]) -> list[BaseGeometry]:
-    """Return the areas inside the rings that ways are or join to."""
+    """Return the areas inside closed ways, and inside the rings that open ways form."""
     ways = list(ways)
-    closed = [shapely.Polygon(xy) for xy in ways if _is_ring(xy)]
+    closed_ways = [shapely.Polygon(xy) for xy in ways if _is_ring(xy)]
     lines = [shapely.LineString(xy) for xy in ways if not _is_ring(xy) and len(xy) > 1]
-    joined, cuts, dangles, broken = shapely.polygonize_full(lines)
-    if not all(part.is_empty for part in (cuts, dangles, broken)):
+    polygons, cuts, dangles, invalid_rings = shapely.polygonize_full(lines)
+    if not all(part.is_empty for part in (cuts, dangles, invalid_rings)):
         raise BadFeatureError("has ways that do not join to rings")
-    outlines = shapely.get_exterior_ring(shapely.get_parts(joined))
-    filled = [shapely.Polygon(outline) for outline in outlines]
-    return [_areas(ring) for ring in (*closed, *filled)]
+    # polygonize_full makes holes of inner rings; here every ring is an area of its own.
+    outlines = shapely.get_exterior_ring(shapely.get_parts(polygons))
+    rings = [*closed_ways, *map(shapely.Polygon, outlines)]
+    return [_polygonal_part(ring) for ring in rings]
 
 
-def _areas(geometry: shapely.Geometry) -> BaseGeometry:
-    """Return the areas in a geometry, in valid form."""
+def _polygonal_part(geometry: shapely.Geometry) -> BaseGeometry:
+    """Return the areas in a geometry as one valid geometry."""
     parts = shapely.get_parts(shapely.make_valid(geometry))
     return shapely.union_all(parts[shapely.get_dimensions(parts) == 2])  # noqa: PLR2004
 
@@ -110,10 +113,10 @@ def _require_area(area: BaseGeometry) -> BaseGeometry:
 
 
 def has_tags(tags: Mapping[str, str], spec: LayerSpec) -> bool:
-    """Tell whether an element has the tags of the layer; without ``tags``, none has.
+    """Whether an element has the tags of a layer; none has the tags of a layer without ``tags``.
 
-    One of the alternatives must hold, in all its keys. Values compare exactly, so that
-    ``amenity=toilets;bench`` is neither.
+    All keys of one of the alternatives must have an accepted value. Values are compared exactly, so
+    ``amenity=toilets;bench`` is neither toilets nor a bench.
     """
     return any(
         all(
@@ -125,10 +128,10 @@ def has_tags(tags: Mapping[str, str], spec: LayerSpec) -> bool:
 
 
 def has_shape(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bool:
-    """Tell whether an element that has the tags of the layer is of a shape that it wants.
+    """Whether an element with the tags of a layer has the kind of geometry that the layer needs.
 
-    It is not if its kind is not among the layer's ``elements``, if it is a relation but no
-    multipolygon, or the outline of a square where centre lines of streets are wanted.
+    It does not if its kind is not among the layer's ``elements``, if it is a relation but not a
+    multipolygon, or if it is the outline of a square in a layer of streets.
     """
     if kind not in spec.elements:
         return False
@@ -138,64 +141,64 @@ def has_shape(kind: ElementKind, tags: Mapping[str, str], spec: LayerSpec) -> bo
 
 
 def require_tags(spec: LayerSpec) -> tuple[tuple[tuple[str, tuple[str, ...]], ...], ...]:
-    """Return the tags of a layer; CatalogError if it says none."""
+    """Return the tags of a layer; CatalogError if it has none."""
     if not spec.tags:
         raise CatalogError(f'layer {spec.name!r} has no tags; write tags = [{{ key = "value" }}].')
     return spec.tags
 
 
 class TagIndex:
-    """The layers of a catalogue by tag, to find those of an element without trying each."""
+    """Index of the layers of a catalogue by tag, to find the layers of an element quickly."""
 
     def __init__(self, specs: Sequence[LayerSpec]) -> None:
         self._specs = specs
         self._by_tag: dict[tuple[str, str], set[int]] = {}
         for number, spec in enumerate(specs):
             for alternative in require_tags(spec):
-                # An element that lacks the first of the tags need not be looked at.
+                # Every element of this alternative has its first tag, so one tag is enough.
                 key, accepted = alternative[0]
                 for value in accepted:
                     self._by_tag.setdefault((key, value), set()).add(number)
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of which every element of any of the layers has at least one, sorted."""
+        """Sorted keys; every element of a layer has at least one of them."""
         return tuple(sorted({key for key, _ in self._by_tag}))
 
     def layers(self, tags: Mapping[str, str]) -> list[int]:
-        """Return the positions of the layers whose tags an element has, in order."""
+        """Return the numbers of the layers that an element belongs to, in order."""
         candidates: set[int] = set()
         for key, value in tags.items():
-            for looked_up in (value, ANY_VALUE):
-                candidates |= self._by_tag.get((key, looked_up), set())
+            for candidate_value in (value, ANY_VALUE):
+                candidates |= self._by_tag.get((key, candidate_value), set())
         return [number for number in sorted(candidates) if has_tags(tags, self._specs[number])]
 
 
 class ElementLayer:
-    """A layer that is being read, of elements that have its tags."""
+    """A layer during the reading of elements that have its tags."""
 
     def __init__(self, spec: LayerSpec, *, filters: bool, where: str) -> None:
         self.spec = spec
         self.rows = Rows()
-        fields = [field for _, field in spec.fields]  # any key of a tag may be one
+        fields = [field for _, field in spec.fields]  # each is the key of a tag
         where = f"layer {spec.name!r} of {where}"
-        self._rules = RowRules(spec, fields, filters=filters, where=where)
+        self.rules = RowRules(spec, fields, filters=filters, where=where)
 
     def add(
         self, kind: ElementKind, name: str, tags: Mapping[str, str], position: Position | str
     ) -> bool:
-        """Add an element, with what is wrong with it in the place of its position, if it counts."""
+        """Add an element with its position or an error message; return whether it is accepted."""
         self.rows.read += 1
         if not has_shape(kind, tags, self.spec):
             self.rows.filtered += 1
             return False
         text = f"{name} {position}" if isinstance(position, str) else position
-        self.rows.add([tags.get(field) for field in self._rules.fields], name, text)
+        self.rows.add([tags.get(field) for field in self.rules.fields], name, text)
         return True
 
     def raw(self, crs: str | None) -> RawLayer:
-        """Return the layer; elements are in WGS 84, whatever CRS the user states."""
+        """Return the layer in WGS 84; another `crs` of the user only causes a note."""
         system, notes = settle_crs(
-            WGS84, implicit=False, expected=self.spec.crs, given=crs, where=self._rules.file
+            WGS84, implicit=False, expected=self.spec.crs, given=crs, where=self.rules.file
         )
-        return raw_layer(self.rows, self._rules, system, by_file=True, notes=notes)
+        return raw_layer(self.rows, self.rules, system, by_file=True, notes=notes)

@@ -1,7 +1,7 @@
 """OpenStreetMap elements as rows of tables: osmnx, QuackOSM, ohsome, GDAL, Geofabrik and others.
 
-A row has a geometry, tells which element it is or does not, and has its tags in columns of their
-own, in one column of all of them, or as a class of Geofabrik.
+A row has a geometry and may have the id of its element. Its tags are one column each, one column
+with all tags, or a class of Geofabrik.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.errors import CrsError, InputError
+from semsig_gis.core import CrsError, InputError
 from semsig_gis.sources import parquet
 from semsig_gis.sources.catalog import data_folder, load_catalog
 from semsig_gis.sources.filters import as_text
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, feature_shape
+from semsig_gis.sources.osm.elements import KIND_BY_LETTER, ElementLayer, TagIndex, feature_shape
 from semsig_gis.sources.parquet import read_parquet
 from semsig_gis.sources.probe import probe_file
 from semsig_gis.sources.rows import WGS84, BadFeatureError, built_geometries, parse_crs
 from semsig_gis.sources.vector.file import read_tables, spatial_layers
-from semsig_gis.storage.toml import parse_toml
+from semsig_gis.storage import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -37,18 +37,18 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
     from semsig_gis.sources.rows import Position
 
-# What a file is by its name, and what pyosmium calls it.
+# Suffixes of OpenStreetMap files, and the names of their formats in pyosmium.
 FORMATS = {".osm": "xml", ".osm.gz": "xml.gz", ".osm.bz2": "xml.bz2", ".pbf": "pbf"}
-# Columns of all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
+# Columns with all tags of a row: a map, JSON, or text such as '"amenity"=>"bench"'.
 MAPS = ("tags", "other_tags", "@other_tags")
 PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"\s*=>\s*(?:"((?:[^"\\]|\\.)*)"|NULL)')
 ESCAPED = re.compile(r"\\(.)")
-# QuackOSM's, which leaves out the tag `area`, so that a square is told by its shape alone.
+# Column of QuackOSM, which omits the tag `area`: only the shape of a square shows that it is one.
 QUACKOSM = "feature_id"
-# Columns that say which element a row is, such as "node/123" or "n123".
+# Columns with the id of an element, such as "node/123" or "n123".
 NAMES = (QUACKOSM, "@id", "@osmId", "full_id", "osm_id", "osmid", "id")
 NAME = re.compile(r"(n|node|w|way|r|relation)/?(\d+)")
-# Columns of its kind and of its number, of osmnx before and after version 2, QuickOSM and pyrosm.
+# Columns with its kind and its number: osmnx from version 2, before it, QuickOSM, pyrosm, others.
 KINDS_AND_NUMBERS = (
     ("element", "id"),
     ("element_type", "osmid"),
@@ -56,19 +56,19 @@ KINDS_AND_NUMBERS = (
     ("osm_type", "id"),
     ("type", "id"),
 )
-# Of GDAL and Geofabrik, which leave the kind to the geometry; GDAL has ways among areas here.
+# Numbers in tables of GDAL and Geofabrik, without the kind; GDAL has the second one for areas that
+# are ways.
 NUMBER, WAY_NUMBER = "osm_id", "osm_way_id"
-KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
-# Geofabrik's classes.
+# Columns of Geofabrik's classes.
 CLASS, CODE = "fclass", "code"
-# What no element is without and still not told by most tables.
+# Tags that most tables lack.
 TYPE, AREA, MULTIPOLYGON = "type", "area", "multipolygon"
-Name = tuple["ElementKind | None", str]
+ElementName = tuple["ElementKind | None", str]
 
 
 @dataclass(frozen=True, eq=False)
 class FeatureTable:
-    """Rows by column, and where each is, in WGS 84; `notes` are about those that are not there."""
+    """Columns of a table and the positions of its rows in WGS 84; `notes` list unreadable rows."""
 
     columns: Mapping[str, pd.Series[Any]]
     positions: Sequence[Position | str]
@@ -82,81 +82,82 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of vector files or GeoParquet with tags, or of several, one for each of `specs`.
+    """Read the layers of `specs` from vector files or GeoParquet files with tags.
 
     An element in several tables counts once. SourceError if a file cannot be read.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} files"
     tables = (table for file in paths for table in _tables(file, specs, crs=crs))
-    return table_layers(tables, specs, filters=filters, where=where)
+    return _table_layers(tables, specs, filters=filters, where=where)
 
 
 def frame_layers(
     frame: gpd.GeoDataFrame, specs: Sequence[LayerSpec], *, filters: bool = True
 ) -> tuple[RawLayer, ...]:
     """Return the layers of a GeoDataFrame with tags; CrsError if it has no CRS."""
-    return table_layers([frame_table(frame)], specs, filters=filters, where="the table")
+    return _table_layers([_frame_table(frame)], specs, filters=filters, where="the table")
 
 
-def table_layers(
+def _table_layers(
     tables: Iterable[FeatureTable], specs: Sequence[LayerSpec], *, filters: bool, where: str
 ) -> tuple[RawLayer, ...]:
     """Return the layers of tables of elements, one for each of `specs`."""
     layers = [ElementLayer(spec, filters=filters, where=where) for spec in specs]
     index, keys = TagIndex(specs), _keys(specs)
-    seen: set[tuple[int, str]] = set()
+    known_names: set[tuple[int, str]] = set()
     notes: list[str] = []
     for table in tables:
-        tags, unread = _tags(table.columns, keys)
-        names = _names(table.columns, len(tags))
+        tags_by_row, unreadable = _tags(table.columns, keys)
+        names = _names(table.columns, len(tags_by_row))
         maps = set() if QUACKOSM in table.columns else {*MAPS}
-        all_tags = not {AREA, *maps}.isdisjoint(table.columns)
+        has_area_tag = not {AREA, *maps}.isdisjoint(table.columns)
         notes += table.notes
-        if unread:
-            notes.append(f"{unread:,} rows have tags that cannot be read")
-        for row, found in enumerate(tags):
-            matches = index.layers(found)
-            if not matches:
+        if unreadable:
+            notes.append(f"{unreadable:,} rows have tags that cannot be read")
+        for row, tags in enumerate(tags_by_row):
+            numbers = index.layers(tags)
+            if not numbers:
                 continue
             position = table.positions[row]
-            kind, number = names[row]
-            kind = kind or _kind(position)
-            name = f"{kind}/{number}" if number else ""
-            full = _completed(found, kind, position, all_tags=all_tags)
-            for layer in matches:
-                if name and (layer, name) in seen:
+            kind, element_number = names[row]
+            kind = kind or _likely_kind(position)
+            name = f"{kind}/{element_number}" if element_number else ""
+            element_tags = _with_area_tags(tags, kind, position, has_area_tag=has_area_tag)
+            for number in numbers:
+                if name and (number, name) in known_names:
                     continue
-                seen.add((layer, name))
-                place = _place(position, layers[layer].spec)
-                layers[layer].add(kind, name or f"row {row + 1}", full, place)
+                known_names.add((number, name))
+                shape = _element_shape(position, layers[number].spec)
+                layers[number].add(kind, name or f"row {row + 1}", element_tags, shape)
     raw = [layer.raw(None) for layer in layers]
-    # A table seldom holds elements of all layers, and what cannot be read is of none of them.
+    # A table rarely contains elements of all layers, so an empty layer is not worth a note. Rows
+    # that cannot be read belong to no layer; their notes go to the first one.
     raw = [layer if layer.counts.read else replace(layer, notes=()) for layer in raw]
     return (replace(raw[0], notes=(*raw[0].notes, *notes)), *raw[1:]) if raw else ()
 
 
 def has_element_columns(fields: Iterable[str]) -> bool:
-    """Tell whether columns can only be those of elements of OpenStreetMap, with their tags."""
+    """Whether columns certainly belong to elements of OpenStreetMap with their tags."""
     fields = set(fields)
     pairs = (pair for pair in KINDS_AND_NUMBERS if pair != (TYPE, "id"))
-    named = fields & {QUACKOSM, "@id", "@osmId", "full_id", NUMBER}
-    return has_tag_columns(fields) and bool(named or any(fields.issuperset(pair) for pair in pairs))
+    has_names = not fields.isdisjoint({QUACKOSM, "@id", "@osmId", "full_id", NUMBER})
+    return has_tag_columns(fields) and (has_names or any(fields.issuperset(pair) for pair in pairs))
 
 
 def has_tag_columns(fields: Iterable[str]) -> bool:
-    """Tell whether some columns are tags, or hold them."""
+    """Whether some columns are tags or contain tags."""
     fields = set(fields)
     return bool(fields & {*MAPS, *_index().keys} or fields.issuperset((CLASS, CODE)))
 
 
 def frame_fields(frame: gpd.GeoDataFrame) -> list[str]:
-    """Return the columns of a table by name, those of its index among them."""
+    """Return the names of a table's columns and of its index."""
     return [str(name) for name in (*frame.index.names, *frame.columns) if name is not None]
 
 
-def frame_table(frame: gpd.GeoDataFrame) -> FeatureTable:
-    """Return the rows of a GeoDataFrame; CrsError if it has no CRS."""
+def _frame_table(frame: gpd.GeoDataFrame) -> FeatureTable:
+    """Return a GeoDataFrame as a table of elements; CrsError if it has no CRS."""
     levels = [name for name in frame.index.names if name is not None and name not in frame]
     frame = frame.reset_index(level=levels) if levels else frame
     if frame.crs is None:
@@ -178,14 +179,14 @@ def _index() -> TagIndex:
 
 
 def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Iterator[FeatureTable]:
-    """Yield the tables of a file, with the columns that matter."""
+    """Yield the tables of a file with the columns that are needed."""
     names_read = {*_keys(specs), *MAPS, *NAMES, WAY_NUMBER, CLASS, CODE}
     names_read.update(name for pair in KINDS_AND_NUMBERS for name in pair)
     if path.suffix.lower() in parquet.SUFFIXES:
         frame = read_parquet(path, kind="features", columns=names_read)
         if frame.crs is None and crs is not None:
             frame = frame.set_crs(parse_crs(crs))
-        yield frame_table(frame)
+        yield _frame_table(frame)
         return
     # A file that the probe does not open as a vector file is refused here with its error.
     layers = probe_file(path).layers or spatial_layers(path)
@@ -200,7 +201,7 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         }
         positions = rows.positions
         if not table.crs.equals(WGS84, ignore_axis_order=True):
-            positions = _in_degrees(positions, table.crs)
+            positions = _to_wgs84(positions, table.crs)
         notes = table.notes
         if rows.errors:
             number, text = next(iter(rows.errors.items()))
@@ -208,17 +209,18 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         yield FeatureTable(columns, positions, notes)
 
 
-def _in_degrees(positions: Sequence[Position | str], crs: object) -> list[Position | str]:
+def _to_wgs84(positions: Sequence[Position | str], crs: object) -> list[Position | str]:
+    """Return positions in WGS 84; error messages in their places stay."""
     shapes = [None if isinstance(position, str) else position for position in positions]
-    moved = gpd.GeoSeries(built_geometries(shapes), crs=crs).to_crs(WGS84)
+    degrees = gpd.GeoSeries(built_geometries(shapes), crs=crs).to_crs(WGS84)
     return [
         position if isinstance(position, str) else shape
-        for position, shape in zip(positions, moved, strict=True)
+        for position, shape in zip(positions, degrees, strict=True)
     ]
 
 
 def _keys(specs: Sequence[LayerSpec]) -> frozenset[str]:
-    """Return the keys of tags that decide about the layers."""
+    """Return the keys of the tags that the layers use."""
     tags = {key for spec in specs for alternative in spec.tags for key, _ in alternative}
     return frozenset({*tags, *(field for spec in specs for _, field in spec.fields), TYPE, AREA})
 
@@ -226,44 +228,45 @@ def _keys(specs: Sequence[LayerSpec]) -> frozenset[str]:
 def _tags(
     columns: Mapping[str, pd.Series[Any]], keys: frozenset[str]
 ) -> tuple[list[dict[str, str]], int]:
-    """Return the tags of every row that matter, and of how many rows they cannot be read."""
+    """Return the tags of every row with their `keys`, and the number of unreadable rows."""
     size = len(next(iter(columns.values()), ()))
     tags: list[dict[str, str]] = [{} for _ in range(size)]
-    unread = 0
+    unreadable = 0
+    # Columns with all tags, then a column for each tag, then Geofabrik's classes.
     for name in MAPS:
-        for row, value in _known(columns.get(name)):
+        for row, value in _valid_rows(columns.get(name)):
             try:
-                tags[row].update((key, text) for key, text in _parsed(value) if key in keys)
+                tags[row].update((key, text) for key, text in _parse_tags(value) if key in keys)
             except (TypeError, ValueError):
-                unread += 1
+                unreadable += 1
     for key in keys.intersection(columns):
-        if key == TYPE and _says_kinds(columns[key]):
+        if key == TYPE and _has_kinds(columns[key]):
             continue
-        for row, value in _known(columns[key]):
-            tags[row][key] = _text(value)
+        for row, value in _valid_rows(columns[key]):
+            tags[row][key] = _tag_value(value)
     if CLASS in columns and CODE in columns:
-        codes = dict(_known(columns[CODE]))
-        for row, value in _known(columns[CLASS]):
+        codes = dict(_valid_rows(columns[CODE]))
+        for row, value in _valid_rows(columns[CLASS]):
             tags[row].update(_geofabrik_tags(str(value), as_text(codes.get(row, ""))))
-    return tags, unread
+    return tags, unreadable
 
 
-def _known(values: pd.Series[Any] | None) -> Iterator[tuple[int, Any]]:
-    """Yield the rows of a column that have a value, and these."""
+def _valid_rows(values: pd.Series[Any] | None) -> Iterator[tuple[int, Any]]:
+    """Yield the numbers and values of the rows of a column that have a value."""
     if values is None:
         return
     rows = np.flatnonzero(values.notna().to_numpy())
     yield from zip(rows.tolist(), values.iloc[rows].to_list(), strict=True)
 
 
-def _text(value: object) -> str:
-    """Return the value of a tag; of several, as osmnx joins ways, all as OpenStreetMap does."""
+def _tag_value(value: object) -> str:
+    """Return the value of a tag as text; osmnx gives a joined way a list of values."""
     if isinstance(value, list | tuple | set | np.ndarray):
-        return ";".join(as_text(one) for one in value)
+        return ";".join(map(as_text, value))
     return as_text(value)
 
 
-def _parsed(value: object) -> list[tuple[str, str]]:
+def _parse_tags(value: object) -> list[tuple[str, str]]:
     """Return the tags of a map, a list of pairs, JSON, or text such as ``"key"=>"value"``."""
     if isinstance(value, str):
         text = value.strip()
@@ -271,19 +274,22 @@ def _parsed(value: object) -> list[tuple[str, str]]:
             pairs = PAIR.findall(text)
             if text and not pairs:
                 raise ValueError(text)
-            return [(ESCAPED.sub(r"\1", key), ESCAPED.sub(r"\1", said)) for key, said in pairs]
+            return [(ESCAPED.sub(r"\1", key), ESCAPED.sub(r"\1", text)) for key, text in pairs]
         value = json.loads(text)
     if isinstance(value, dict):
         items = list(value.items())
     else:
         pairs = list(value)  # type: ignore[call-overload]
         items = [tuple(pair.values()) if isinstance(pair, dict) else pair for pair in pairs]
-    return [(str(key), _text(said)) for key, said in items if said is not None]
+    return [(str(key), _tag_value(item)) for key, item in items if item is not None]
 
 
 @functools.cache
 def _geofabrik() -> tuple[dict[str, dict[str, str]], dict[str, str]]:
-    """Return the tags of Geofabrik's classes, and the keys whose values classes of roads are."""
+    """Return the tags of Geofabrik's classes, and the keys of its classes by the start of a code.
+
+    A class such as ``residential`` is the value of its key, here ``highway``.
+    """
     source = data_folder() / "geofabrik.toml"
     content = parse_toml(source.read_text(encoding="utf-8"), "geofabrik.toml")
     return content["tags"], content["keys"]
@@ -297,76 +303,76 @@ def _geofabrik_tags(name: str, code: str) -> dict[str, str]:
     return {key: name for start, key in keys.items() if code.startswith(start)}
 
 
-def _says_kinds(values: pd.Series[Any]) -> bool:
-    """Tell whether a column says node, way or relation of every row, and not the tag `type`."""
-    return set(values.dropna().astype(str).str.lower()) <= set(KINDS.values())
+def _has_kinds(values: pd.Series[Any]) -> bool:
+    """Whether all values are node, way or relation, unlike those of the tag `type`."""
+    return set(values.dropna().astype(str).str.lower()) <= set(KIND_BY_LETTER.values())
 
 
-def _names(columns: Mapping[str, pd.Series[Any]], size: int) -> list[Name]:
-    """Return kind and number of the element of every row, as far as it is told."""
-    names: list[Name] = [(None, "")] * size
-    told = (_numbered(columns), _of_pairs(columns), _of_texts(columns))
-    for row, name in itertools.chain.from_iterable(told):
+def _names(columns: Mapping[str, pd.Series[Any]], size: int) -> list[ElementName]:
+    """Return kind and number of the element of every row; (None, "") if the table has no ids."""
+    names: list[ElementName] = [(None, "")] * size
+    sources = (_number_columns(columns), _pair_columns(columns), _name_columns(columns))
+    for row, name in itertools.chain.from_iterable(sources):  # later sources are more exact
         names[row] = name
     return names
 
 
-def _numbered(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, Name]]:
-    """Yield what GDAL, Geofabrik and osm2pgsql say, of whose columns one has the number alone."""
+def _number_columns(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, ElementName]]:
+    """Yield element ids from tables with an id column but no type column (GDAL, osm2pgsql)."""
     among_areas = WAY_NUMBER in columns
-    for row, value in _known(columns.get(NUMBER)):
+    for row, value in _valid_rows(columns.get(NUMBER)):
         number = as_text(value)
-        if number.lstrip("-").isdigit():  # osm2pgsql has relations below zero
+        if number.lstrip("-").isdigit():  # relations of osm2pgsql have numbers below zero
             relation = among_areas or number.startswith("-")
             yield row, ("relation" if relation else None, number.lstrip("-"))
-    for row, value in _known(columns.get(WAY_NUMBER)):
+    for row, value in _valid_rows(columns.get(WAY_NUMBER)):
         if as_text(value).isdigit():
             yield row, ("way", as_text(value))
 
 
-def _of_pairs(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, Name]]:
-    """Yield what two columns say, one of the kind and one of the number."""
-    for kinds, numbers in KINDS_AND_NUMBERS:
-        if kinds in columns and numbers in columns and _says_kinds(columns[kinds]):
-            told = dict(_known(columns[kinds]))
-            for row, value in _known(columns[numbers]):
-                if row in told and as_text(value).isdigit():
-                    yield row, (KINDS[str(told[row])[0].lower()], as_text(value))
+def _pair_columns(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, ElementName]]:
+    """Yield element ids from a column of kinds and a column of numbers."""
+    for kind_column, number_column in KINDS_AND_NUMBERS:
+        if {kind_column, number_column} <= columns.keys() and _has_kinds(columns[kind_column]):
+            kinds = dict(_valid_rows(columns[kind_column]))
+            for row, value in _valid_rows(columns[number_column]):
+                if row in kinds and as_text(value).isdigit():
+                    yield row, (KIND_BY_LETTER[str(kinds[row])[0].lower()], as_text(value))
 
 
-def _of_texts(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, Name]]:
-    """Yield what a column of both says."""
+def _name_columns(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, ElementName]]:
+    """Yield element ids from a column such as ``node/123``."""
     for column in NAMES:
-        for row, value in _known(columns.get(column)):
+        for row, value in _valid_rows(columns.get(column)):
             match = NAME.fullmatch(value) if isinstance(value, str) else None
             if match:
-                yield row, (KINDS[match[1][0]], match[2])
+                yield row, (KIND_BY_LETTER[match[1][0]], match[2])
 
 
-def _kind(position: Position | str) -> ElementKind:
-    """Return the kind of element that a geometry is most likely of."""
+def _likely_kind(position: Position | str) -> ElementKind:
+    """Return the most likely kind of element for a geometry."""
     if isinstance(position, tuple | str) or position is None:
         return "node"
     if shapely.get_dimensions(position) <= 0:
         return "node"
     parts = shapely.get_parts(position)
-    whole = len(parts) == 1 and shapely.get_num_interior_rings(parts[0]) == 0
-    return "way" if whole else "relation"
+    simple = len(parts) == 1 and shapely.get_num_interior_rings(parts[0]) == 0
+    return "way" if simple else "relation"
 
 
-def _completed(
-    tags: dict[str, str], kind: ElementKind, position: Position | str, *, all_tags: bool
+def _with_area_tags(
+    tags: dict[str, str], kind: ElementKind, position: Position | str, *, has_area_tag: bool
 ) -> dict[str, str]:
-    """Add what its geometry says of an element and its table may not: that it is an area."""
+    """Add the tags of an area to an element with an area, if its table lacks such tags."""
     if isinstance(position, tuple | str) or shapely.get_dimensions(position) != 2:  # noqa: PLR2004
         return tags
     if kind == "relation":
         return {TYPE: MULTIPOLYGON, **tags}
-    return tags if all_tags else {AREA: "yes", **tags}
+    return tags if has_area_tag else {AREA: "yes", **tags}
 
 
-def _place(position: Position | str, spec: LayerSpec) -> Position | str:
-    """Return what an element stands for in a layer, or what is wrong with it."""
+def _element_shape(position: Position | str, spec: LayerSpec) -> Position | str:
+    """Return the geometry of an element in a layer, or an error message."""
     if position is None or isinstance(position, tuple | str):
         return position
     try:

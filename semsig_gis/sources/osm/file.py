@@ -1,4 +1,4 @@
-"""OpenStreetMap files through pyosmium, in flat memory; several extracts are read as one."""
+"""OpenStreetMap files through pyosmium, in constant memory; several extracts are read as one."""
 
 from __future__ import annotations
 
@@ -16,14 +16,18 @@ import shapely
 from osmium.filter import KeyFilter
 from osmium.osm import NODE, NOTHING, RELATION, WAY, Node, Relation, Way
 
-from semsig_gis.core.errors import CatalogError, SourceError
-from semsig_gis.core.geometry import HALF_TURN
-from semsig_gis.core.temporary import temporary_folder
+from semsig_gis.core import HALF_TURN, CatalogError, SourceError, temporary_folder
 from semsig_gis.sources.area import Area, join_areas
 from semsig_gis.sources.compression import check_compression_ratio
-from semsig_gis.sources.osm.elements import ElementLayer, TagIndex, relation_shape, way_shape
+from semsig_gis.sources.osm.elements import (
+    KIND_BY_LETTER,
+    ElementLayer,
+    TagIndex,
+    relation_shape,
+    way_shape,
+)
 from semsig_gis.sources.osm.features import FORMATS
-from semsig_gis.sources.osm.merge import age_notes, merge_extracts, readable
+from semsig_gis.sources.osm.merge import age_notes, merge_extracts, read_errors
 from semsig_gis.sources.paths import require_file
 from semsig_gis.sources.rows import BadFeatureError
 
@@ -34,22 +38,21 @@ if TYPE_CHECKING:
     from osmium.osm import Location
 
     from semsig_gis.sources.layer import RawLayer
-    from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
+    from semsig_gis.sources.layer_spec import LayerSpec
     from semsig_gis.sources.rows import Position
 
-KINDS: dict[str, ElementKind] = {"n": "node", "w": "way", "r": "relation"}
-# pyosmium's table of node places that is not in memory.
-PLACES = "sparse_file_array"
-NOWHERE = (math.nan, math.nan)
+# Index of pyosmium for the locations of nodes, in a temporary file.
+LOCATION_INDEX = "sparse_file_array"
+NO_LOCATION = (math.nan, math.nan)
 
 
 class _Outline(NamedTuple):
-    """A way or multipolygon that a layer wants, before the places of its nodes are known."""
+    """A way or multipolygon of a layer, before the locations of its nodes are read."""
 
     layer: ElementLayer
-    row: int  # of the layer
+    row: int  # in the layer
     name: str
-    outer: tuple[int, ...]  # ways; of a way, itself
+    outer: tuple[int, ...]  # ids of the outer ways; for a way, its own id
     inner: tuple[int, ...]
     is_way: bool
 
@@ -61,13 +64,13 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of a file in one of `FORMATS`, or of several extracts, one for each of `specs`.
+    """Read the layers of `specs` from a file in one of `FORMATS`, or from several extracts.
 
-    The file is streamed; where a layer has ways, the places of all nodes are kept meanwhile in an
-    unnamed temporary file, of 16 bytes a node. Nodes are points, ways lines or areas, multipolygons
-    areas; identifiers are such as ``"node/123"``. Elements that are mapped in another way than the
-    layer wants are filtered, clipped and broken ones unreadable. An element in several extracts
-    counts once, by its newest copy. `crs` is only noted.
+    The file is streamed; if a layer has ways, the locations of all nodes are kept in an unnamed
+    temporary file, 16 bytes per node. Nodes become points, ways lines or areas, multipolygons
+    areas; identifiers are such as ``"node/123"``. Elements of another kind than the layer needs
+    count as filtered, clipped and invalid ones as unreadable. An element in several extracts counts
+    once, by its newest copy. `crs` only causes a note.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     files = {path: _file(path) for path in paths}
@@ -82,7 +85,8 @@ def read_layers(
                 "an element identify it; remove it."
             )
     index = TagIndex(specs)
-    with _as_one(files, index) as file, readable(where):
+    with _single_file(files, index) as file, read_errors(where):
+        # First the elements with tags, then the lines of the ways that they need.
         outlines = _scan(file, layers, index)
         ways = {way for outline in outlines for way in (*outline.outer, *outline.inner)}
         lines = _lines(file, ways) if ways else {}
@@ -95,7 +99,7 @@ def read_layers(
 
 
 def _extent(files: Iterable[osmium.io.File]) -> Area | None:
-    """Return the boxes that extracts say they cover; None where one of them does not."""
+    """Return the area of the bounding boxes in the headers of extracts; None if one has none."""
     boxes = []
     for file in files:
         with osmium.io.Reader(file, NOTHING) as reader:
@@ -104,7 +108,7 @@ def _extent(files: Iterable[osmium.io.File]) -> Area | None:
             return None
         low, high = box.bottom_left, box.top_right
         spans = [(low.lon, high.lon)]
-        if high.lon - low.lon > HALF_TURN:  # across the 180th meridian: osmium has swapped its ends
+        if high.lon - low.lon > HALF_TURN:  # across the 180th meridian: osmium swaps the ends
             spans = [(high.lon, HALF_TURN), (-HALF_TURN, low.lon)]
         boxes += [shapely.box(west, low.lat, east, high.lat) for west, east in spans]
     polygon = join_areas(np.array(boxes, dtype=object))
@@ -112,8 +116,8 @@ def _extent(files: Iterable[osmium.io.File]) -> Area | None:
 
 
 @contextlib.contextmanager
-def _as_one(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[osmium.io.File]:
-    """Give the one file there is, or one that several extracts are merged into."""
+def _single_file(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[osmium.io.File]:
+    """Provide the only file, or a temporary file with several extracts merged."""
     if len(files) == 1:
         yield from files.values()
         return
@@ -122,7 +126,7 @@ def _as_one(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[o
 
 
 def _file(path: Path) -> osmium.io.File:
-    """Return a file that exists and is of a known kind."""
+    """Open a file of elements; SourceError if it is missing, empty or of another format."""
     require_file(path, "an OpenStreetMap file")
     name = path.name.lower()
     kind = next((kind for suffix, kind in FORMATS.items() if name.endswith(suffix)), None)
@@ -131,25 +135,25 @@ def _file(path: Path) -> osmium.io.File:
     if path.stat().st_size == 0:
         raise SourceError(f"{path} is empty; download it again.")
     check_compression_ratio(path)
-    # The whole path, because libosmium takes "-" for standard input and "http:" for an address.
+    # An absolute path, because libosmium reads "-" as standard input and "http:" as an address.
     return osmium.io.File(str(path.absolute()), kind)
 
 
 def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex) -> list[_Outline]:
-    """Collect the elements of every layer; return its ways and multipolygons."""
+    """Add the elements of a file to their layers; return the ways and multipolygons."""
     outlines = []
     processor = osmium.FileProcessor(file, NODE | WAY | RELATION)
     for element in processor.with_filter(KeyFilter(*index.keys)):
         if not isinstance(element, Node | Way | Relation) or element.deleted:
             continue
         tags = {tag.k: tag.v for tag in element.tags}
-        kind = KINDS[element.type_str()]
+        kind = KIND_BY_LETTER[element.type_str()]
         name = f"{kind}/{element.id}"
         for layer in (layers[number] for number in index.layers(tags)):
             if isinstance(element, Node):
                 valid = element.location.valid()
-                place = _lonlat(element.location) if valid else "has no valid position"
-                layer.add(kind, name, tags, place)
+                position = _lonlat(element.location) if valid else "has no valid position"
+                layer.add(kind, name, tags, position)
             elif layer.add(kind, name, tags, None):
                 row = len(layer.rows.positions) - 1
                 outlines.append(_Outline(layer, row, name, *_ways(element)))
@@ -157,7 +161,7 @@ def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex)
 
 
 def _ways(element: Way | Relation) -> tuple[tuple[int, ...], tuple[int, ...], bool]:
-    """Return the ways that bound an element, those of its holes, and whether it is a way itself."""
+    """Return the outer and inner ways of an element, and whether it is a way itself."""
     if isinstance(element, Way):
         return (element.id,), (), True
     ways = [member for member in element.members if member.type == "w"]
@@ -168,48 +172,49 @@ def _ways(element: Way | Relation) -> tuple[tuple[int, ...], tuple[int, ...], bo
 def _lines(file: osmium.io.File, numbers: set[int]) -> dict[int, NDArray[np.float64]]:
     """Return longitude and latitude of the nodes of ways; NaN for nodes that the file lacks.
 
-    pyosmium's filters by number would take more than a gigabyte for today's numbers of nodes.
+    The locations of all nodes are stored, because an id filter of pyosmium takes more than a
+    gigabyte for today's ids.
     """
-    places = osmium.NodeLocationsForWays(osmium.index.create_map(PLACES))
-    places.ignore_errors()
+    locations = osmium.NodeLocationsForWays(osmium.index.create_map(LOCATION_INDEX))
+    locations.ignore_errors()
     with osmium.io.Reader(file, NODE) as reader:
-        osmium.apply(reader, places)
+        osmium.apply(reader, locations)
     lines: dict[int, NDArray[np.float64]] = {}
-    unsent: dict[int, list[int]] = {}
-    # A pass of its own, because in some exports the ways stand before their nodes.
-    for way in osmium.FileProcessor(file, WAY).with_filter(places):
+    local_ways: dict[int, list[int]] = {}
+    # A second pass, because some files have ways before their nodes.
+    for way in osmium.FileProcessor(file, WAY).with_filter(locations):
         if not isinstance(way, Way) or way.id not in numbers:
             continue
         nodes = list(way.nodes)
         if any(node.ref < 0 for node in nodes):
-            unsent[way.id] = [node.ref for node in nodes]
+            local_ways[way.id] = [node.ref for node in nodes]
         else:
             lines[way.id] = _line(_lonlat(node.location) for node in nodes)
-    if unsent:
-        # Numbers below zero are those of editors and converters, which pyosmium's table refuses.
-        numbers_below_zero = set(itertools.chain.from_iterable(unsent.values()))
-        places_below_zero = {
+    if local_ways:
+        # Editors and converters use ids below zero, which the index of pyosmium does not accept.
+        local_ids = set(itertools.chain.from_iterable(local_ways.values()))
+        local_locations = {
             node.id: _lonlat(node.location)
             for node in osmium.FileProcessor(file, NODE)
-            if isinstance(node, Node) and node.id in numbers_below_zero
+            if isinstance(node, Node) and node.id in local_ids
         }
-        for number, refs in unsent.items():
-            lines[number] = _line(places_below_zero.get(ref, NOWHERE) for ref in refs)
+        for number, refs in local_ways.items():
+            lines[number] = _line(local_locations.get(ref, NO_LOCATION) for ref in refs)
     return lines
 
 
 def _lonlat(location: Location) -> tuple[float, float]:
-    return (location.lon, location.lat) if location.valid() else NOWHERE
+    return (location.lon, location.lat) if location.valid() else NO_LOCATION
 
 
-def _line(places: Iterable[tuple[float, float]]) -> NDArray[np.float64]:
-    return np.array(list(places), np.float64).reshape(-1, 2)
+def _line(points: Iterable[tuple[float, float]]) -> NDArray[np.float64]:
+    return np.array(list(points), np.float64).reshape(-1, 2)
 
 
 def _position(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> Position | str:
-    """Return what a way or multipolygon stands for, or what is wrong with it."""
+    """Return the geometry of a way or multipolygon, or an error message."""
     try:
-        _require_whole((*outline.outer, *outline.inner), lines)
+        _check_complete((*outline.outer, *outline.inner), lines)
         outer, inner = ([lines[way] for way in ways] for ways in (outline.outer, outline.inner))
         if outline.is_way:
             return way_shape(outer[0], outline.layer.spec.role)
@@ -218,8 +223,8 @@ def _position(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> Po
         return f"{outline.name} {error}"
 
 
-def _require_whole(ways: Sequence[int], lines: Mapping[int, NDArray[np.float64]]) -> None:
-    """Refuse what has ways or nodes that the file lacks, as at the edge of an extract."""
+def _check_complete(ways: Sequence[int], lines: Mapping[int, NDArray[np.float64]]) -> None:
+    """Raise BadFeatureError if the file lacks ways or nodes, as at the edge of an extract."""
     absent = [way for way in ways if way not in lines]
     if absent:
         raise BadFeatureError(

@@ -1,4 +1,4 @@
-"""Several extracts as one file: of every element that counts, the newest and fullest copy."""
+"""Merge several extracts into one file with the newest and most complete copy of each element."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import osmium
 from osmium.filter import EntityFilter, KeyFilter
 from osmium.osm import NODE, RELATION, WAY, Node, Relation, Way
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from semsig_gis.sources.osm.elements import TagIndex
 
 NOT_PLAIN = re.compile(r"[^A-Za-z0-9_]")
-# Kind and number of an element, as pyosmium has them: ("n", 123).
-Name = tuple[str, int]
+# Kind and number of an element in pyosmium: ("n", 123).
+ElementId = tuple[str, int]
 
 
 @contextlib.contextmanager
-def readable(what: object) -> Iterator[None]:
-    """Turn what pyosmium raises on reading a file into a `SourceError`."""
+def read_errors(what: object) -> Iterator[None]:
+    """Raise errors of pyosmium as a `SourceError` that names the file `what`."""
     try:
         yield
     except (osmium.InvalidLocationError, RuntimeError, ValueError) as error:
@@ -39,25 +39,26 @@ def readable(what: object) -> Iterator[None]:
 def merge_extracts(
     files: Mapping[Path, osmium.io.File], index: TagIndex, merged: Path
 ) -> osmium.io.File:
-    """Write what counts in files, and the ways and nodes that it needs, to one file; return that.
+    """Write the elements with tags, and the ways and nodes that they need, to `merged`.
 
-    An element is known by its kind and number. The copy of the highest version is taken, and if
-    that lacks the tags, or is deleted, the element does not count; of copies of one version, that
-    with more nodes or members, as a file may be clipped; then that of the file given first.
+    Of the copies of an element, the one with the highest version is written, also if it lacks the
+    tags, unless it is deleted. Of the same version, the copy with more nodes or members is written,
+    because a file may be clipped, and then the copy of the first file.
     """
     closure = _closure(files, index)
-    best: dict[Name, tuple[int, int, int]] = {}
+    # First pass: the best copy of each element. Second pass: write it.
+    best: dict[ElementId, tuple[int, int, int]] = {}
     for number, (path, file) in enumerate(files.items()):
-        with readable(path):
+        with read_errors(path):
             for element in _elements(file):
                 name = _name(element)
                 if name in closure:
                     rank = (element.version, _size(element), -number)
                     best[name] = max(rank, best.get(name, rank))
-    # As text, because pyosmium's own writers end the process where a disk is full.
+    # Not with a writer of pyosmium, which ends the process if the disk is full.
     with merged.open("w", encoding="ascii") as stream:
         for number, (path, file) in enumerate(files.items()):
-            with readable(path):
+            with read_errors(path):
                 for element in _elements(file):
                     rank = (element.version, _size(element), -number)
                     if not element.deleted and best.get(_name(element)) == rank:
@@ -66,36 +67,39 @@ def merge_extracts(
 
 
 def _line(element: Node | Way | Relation) -> str:
-    """Return an element in OPL, the format of a line for each."""
+    """Return an element as a line of the OPL format."""
     parts = [f"{element.type_str()}{element.id}", f"v{element.version}"]
     if element.tags:
-        parts.append("T" + ",".join(f"{_plain(tag.k)}={_plain(tag.v)}" for tag in element.tags))
+        tags = (f"{_escape(tag.k)}={_escape(tag.v)}" for tag in element.tags)
+        parts.append("T" + ",".join(tags))
     if isinstance(element, Way):
         parts.append("N" + ",".join(f"n{node.ref}" for node in element.nodes))
     elif isinstance(element, Relation):
-        members = (f"{one.type}{one.ref}@{_plain(one.role)}" for one in element.members)
+        members = (
+            f"{member.type}{member.ref}@{_escape(member.role)}" for member in element.members
+        )
         parts.append("M" + ",".join(members))
     elif element.location.valid():
         parts += [f"x{element.location.lon:.7f}", f"y{element.location.lat:.7f}"]
     return " ".join(parts)
 
 
-def _plain(text: str) -> str:
-    """Return text in which all but letters and digits of ASCII are written by their numbers."""
+def _escape(text: str) -> str:
+    """Return text in the escapes of OPL for all but ASCII letters, digits and underscores."""
     return NOT_PLAIN.sub(lambda match: f"%{ord(match[0]):x}%", text)
 
 
-def _closure(files: Mapping[Path, osmium.io.File], index: TagIndex) -> set[Name]:
-    """Return the elements that have the tags of a layer in any file, and those that they need."""
-    closure: set[Name] = set()
+def _closure(files: Mapping[Path, osmium.io.File], index: TagIndex) -> set[ElementId]:
+    """Return the elements with tags of a layer in any file, their ways and their nodes."""
+    closure: set[ElementId] = set()
     for path, file in files.items():
-        with readable(path):
+        with read_errors(path):
             for element in _elements(file, KeyFilter(*index.keys)):
                 if index.layers({tag.k: tag.v for tag in element.tags}):
                     closure.add(_name(element))
                     closure.update(_parts(element))
     for path, file in files.items():
-        with readable(path):
+        with read_errors(path):
             for way in _elements(file, EntityFilter(WAY)):
                 if _name(way) in closure:
                     closure.update(_parts(way))
@@ -106,18 +110,18 @@ def _elements(
     file: osmium.io.File, *filters: KeyFilter | EntityFilter
 ) -> Iterator[Node | Way | Relation]:
     processor = osmium.FileProcessor(file, NODE | WAY | RELATION)
-    for one in filters:
-        processor.with_filter(one)
+    for element_filter in filters:
+        processor.with_filter(element_filter)
     for element in processor:
         if isinstance(element, Node | Way | Relation):
             yield element
 
 
-def _name(element: Node | Way | Relation) -> Name:
+def _name(element: Node | Way | Relation) -> ElementId:
     return element.type_str(), element.id
 
 
-def _parts(element: Node | Way | Relation) -> Iterator[Name]:
+def _parts(element: Node | Way | Relation) -> Iterator[ElementId]:
     """Yield the nodes of a way, or the ways of a relation."""
     if isinstance(element, Way):
         for node in element.nodes:
@@ -135,10 +139,10 @@ def _size(element: Node | Way | Relation) -> int:
 
 
 def age_notes(files: Mapping[Path, osmium.io.File]) -> tuple[str, ...]:
-    """Return a note on extracts of different days, which tell nothing of what was deleted since."""
+    """Return a note if extracts have different dates: an old one may have deleted elements."""
     days = set()
     for path, file in files.items():
-        with readable(path), osmium.io.Reader(file, osmium.osm.NOTHING) as reader:
+        with read_errors(path), osmium.io.Reader(file, osmium.osm.NOTHING) as reader:
             header = reader.header()
         date = header.get("osmosis_replication_timestamp") or header.get("timestamp")
         days |= {date[:10]} if date else set()

@@ -1,4 +1,4 @@
-"""OpenStreetMap from Overpass servers, live or in JSON files, and its places from Nominatim."""
+"""OpenStreetMap elements from Overpass servers or their JSON files, and places from Nominatim."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis.core.errors import InputError, SourceError
+from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.area import Area, join_areas, tiles_of
 from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
@@ -26,6 +26,7 @@ from semsig_gis.sources.http.fetch import (
     read_text,
 )
 from semsig_gis.sources.osm.elements import (
+    KIND_BY_LETTER,
     ElementLayer,
     TagIndex,
     relation_shape,
@@ -33,7 +34,7 @@ from semsig_gis.sources.osm.elements import (
     way_shape,
 )
 from semsig_gis.sources.rows import BadFeatureError
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -47,24 +48,23 @@ if TYPE_CHECKING:
     from semsig_gis.sources.rows import Position
 
 JSON = ("application/json",)
-QUERY_S = 90  # a server gives up a query after so many seconds
-ANSWER_S = 30.0  # for what comes before and after it
+QUERY_S = 90  # time limit of a query on the server
+ANSWER_S = 30.0  # additional time for waiting and for the transfer
 STATUS_S = 10.0
-TILE_BYTES = 2**28  # a tile is parsed in memory
+TILE_BYTES = 2**28  # limit, because a tile is parsed in memory
 MOST_SPLITS = 4
 TOO_SLOW = 504
 TOO_MANY = 429
 NO_SLOT_MARGIN_S = 1.0
-# What means something in a regular expression (POSIX, extended).
+# Characters with a meaning in POSIX extended regular expressions.
 SPECIAL = re.compile(r"[.^$*+?()\[\]{}|\\]")
-KINDS = ("node", "way", "relation")
 LONGEST_REMARK = 300
 EXHAUSTED = ("timed out", "out of memory")
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """The elements of one answer, and what the server remarks on it: as a rule, nothing."""
+    """Elements of an answer, and the remark of the server, which is usually empty."""
 
     elements: list[dict[str, Any]]
     remark: str = ""
@@ -81,12 +81,12 @@ class Document:
 
 
 def load_document(path: Path, *, where: str) -> Document:
-    """Read an answer, complete or not; SourceError if it is not one of an Overpass server."""
+    """Read an answer, complete or not; SourceError if it is not from an Overpass server."""
     try:
         content = parse_json(path.read_bytes())
         elements = [element for element in content["elements"] if _is_element(element)]
         remark = " ".join(str(content.get("remark", "")).split())
-        # as part of a sentence of ours
+        # The remark becomes a part of a sentence.
         return Document(elements, remark.rstrip(".").replace(". ", ", ")[:LONGEST_REMARK])
     except OSError as error:
         raise SourceError(
@@ -99,9 +99,9 @@ def load_document(path: Path, *, where: str) -> Document:
 
 
 def _is_element(element: dict[str, Any]) -> bool:
-    """Tell whether it is an element of the map; one that is and is malformed raises TypeError."""
-    if element["type"] not in KINDS:
-        return False  # such as a count
+    """Whether an item is an element of the map; TypeError if it is a malformed element."""
+    if element["type"] not in KIND_BY_LETTER.values():
+        return False  # for example a count
     tags = element.get("tags", {})
     if isinstance(element["id"], int) and all(isinstance(value, str) for value in tags.values()):
         return True
@@ -115,10 +115,10 @@ def read_layers(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read layers of a file of Overpass JSON, or of the tiles of an area, one for each of `specs`.
+    """Read the layers of `specs` from a file of Overpass JSON, or from the tiles of an area.
 
-    They are as of `sources.osm.file.read_layers`; an element in several tiles counts once.
-    SourceError if a file is not Overpass JSON, or is incomplete by its own remark.
+    The layers are the same as those of `sources.osm.file.read_layers`; an element in several tiles
+    counts once. SourceError if a file is not Overpass JSON or is incomplete by its own remark.
     """
     paths = [Path(path)] if isinstance(path, str | Path) else list(path)
     where = str(paths[0]) if len(paths) == 1 else f"{len(paths)} tiles"
@@ -126,25 +126,25 @@ def read_layers(
     if not layers:
         return ()
     index = TagIndex(specs)
-    seen: set[tuple[str, int]] = set()
-    boxed: collections.Counter[str] = collections.Counter()
+    known_elements: set[tuple[str, int]] = set()
+    centre_counts: collections.Counter[str] = collections.Counter()
     for file in paths:
         document = load_document(file, where=str(file))
         if document.failed:
             raise SourceError(f"{file} is incomplete ({document.remark}); ask for a smaller area.")
-        places = _Positions(document)
+        positions = _ElementPositions(document)
         for element in document.elements:
             name = kind, number = element["type"], element["id"]
-            # what has no tags is there for the positions of others
-            if "tags" in element and name not in seen:
-                seen.add(name)
+            # Elements without tags are only there for the positions of others.
+            if "tags" in element and name not in known_elements:
+                known_elements.add(name)
                 tags = element["tags"]
                 for layer in (layers[place] for place in index.layers(tags)):
-                    place = places.position(element, layer.spec)
-                    added = layer.add(kind, f"{kind}/{number}", tags, place)
-                    boxed[layer.spec.name] += added and _has_only_centre(element)
+                    position = positions.position(element, layer.spec)
+                    accepted = layer.add(kind, f"{kind}/{number}", tags, position)
+                    centre_counts[layer.spec.name] += accepted and _has_only_centre(element)
     raw = (layer.raw(crs) for layer in layers)
-    return tuple(_with_note(layer, boxed[layer.spec.name]) for layer in raw)
+    return tuple(_with_note(layer, centre_counts[layer.spec.name]) for layer in raw)
 
 
 def _has_only_centre(element: dict[str, Any]) -> bool:
@@ -152,19 +152,19 @@ def _has_only_centre(element: dict[str, Any]) -> bool:
     return "center" in element and not any("geometry" in part for part in parts)
 
 
-def _with_note(layer: RawLayer, boxed: int) -> RawLayer:
-    """Tell of elements whose centroid is not known, and how to get it."""
-    if not boxed or layer.spec.role != "objects":
+def _with_note(layer: RawLayer, centres: int) -> RawLayer:
+    """Add a note to a layer with elements that have no geometry, only a centre."""
+    if not centres or layer.spec.role != "objects":
         return layer
-    note = f"{boxed:,} elements have only the middle of their box; ask for `out geom`"
+    note = f"{centres:,} elements have only the middle of their box; ask for `out geom`"
     return dataclasses.replace(layer, notes=(*layer.notes, note))
 
 
-class _Positions:
-    """The positions of the elements of a document.
+class _ElementPositions:
+    """Geometries of the elements of a document.
 
-    A way has its nodes' positions (``out geom``), only its centre (``out center``), or names nodes
-    that are elements of their own (``out; >; out skel``).
+    A way has the positions of its nodes (``out geom``), only its centre (``out center``), or the
+    ids of nodes that are separate elements (``out; >; out skel``).
     """
 
     def __init__(self, document: Document) -> None:
@@ -174,7 +174,7 @@ class _Positions:
                 self._by_kind[element["type"]][element["id"]] = element
 
     def position(self, element: dict[str, Any], spec: LayerSpec) -> Position | str:
-        """Return what an element stands for, or what is wrong with it."""
+        """Return the geometry of an element in a layer, or an error message."""
         try:
             return self._shape(element, spec)
         except BadFeatureError as error:
@@ -189,16 +189,14 @@ class _Positions:
             return _point(element["center"])
         if element["type"] == "way":
             return way_shape(self._line(element), spec.role)
-        parts = list(self._bounds(element))
-        outer = [line for line, inner in parts if not inner]
-        return relation_shape(outer, [line for line, inner in parts if inner])
-
-    def _bounds(self, relation: dict[str, Any]) -> Iterator[tuple[NDArray[np.float64], bool]]:
-        """Yield the ways of a multipolygon, and whether each bounds a hole."""
-        for member in relation.get("members", ()):
+        outer: list[NDArray[np.float64]] = []
+        inner: list[NDArray[np.float64]] = []
+        for member in element.get("members", ()):
             if member.get("type") == "way":
                 way = member if "geometry" in member else self._by_kind["way"].get(member["ref"])
-                yield self._line(way or {}), member.get("role") == "inner"
+                lines = inner if member.get("role") == "inner" else outer
+                lines.append(self._line(way or {}))
+        return relation_shape(outer, inner)
 
     def _line(self, way: dict[str, Any]) -> NDArray[np.float64]:
         """Return longitude and latitude of the nodes of a way, shape (n, 2)."""
@@ -221,7 +219,7 @@ def _point(place: dict[str, Any]) -> tuple[float, float]:
 
 
 def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAULT_HTTP) -> Area:
-    """Return the first place of that name that has an outline, from a Nominatim server."""
+    """Return the first place with a name and an outline, from a Nominatim server."""
     name = " ".join(name.split())
     if not name:
         raise InputError("the name of the place is empty; write one such as 'Helsinki'.")
@@ -240,10 +238,10 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
         outline = _outline(place)
         if outline is not None:
             return Area(outline, str(place.get("display_name", name)))
-    found = f"has no outline ({places[0].get('display_name')})" if places else "is unknown"
+    problem = f"has no outline ({places[0].get('display_name')})" if places else "is unknown"
     raise InputError(
-        f"place {name!r} {found} at {host}; write the name of a city or district, or its bounding "
-        "box as west,south,east,north."
+        f"place {name!r} {problem} at {host}; write the name of a city or district, or its "
+        "bounding box as west,south,east,north."
     )
 
 
@@ -258,7 +256,7 @@ def _places(path: Path, host: str) -> list[dict[str, Any]]:
 
 
 def _outline(place: dict[str, Any]) -> shapely.Polygon | shapely.MultiPolygon | None:
-    """Return the outline of a place; None where it has none, or not a valid one."""
+    """Return the outline of a place; None if it has none or an invalid one."""
     try:
         geometry = shapely.from_geojson(json.dumps(place.get("geojson")))
     except shapely.errors.ShapelyError:
@@ -269,13 +267,13 @@ def _outline(place: dict[str, Any]) -> shapely.Polygon | shapely.MultiPolygon | 
 def overpass_query(
     specs: Sequence[LayerSpec], bounds: tuple[float, float, float, float], *, timeout: int = QUERY_S
 ) -> str:
-    """Return the Overpass QL for the elements of layers, by their ``tags`` and ``elements``.
+    """Return the Overpass QL query for the elements of layers, by their ``tags`` and ``elements``.
 
-    Bounds are west, south, east and north in degrees. Values are exact; ways and multipolygons come
-    with their positions, nothing with the names of mappers.
+    Bounds are west, south, east and north in degrees. Values match exactly. The answer has the
+    geometry of ways and multipolygons, and no names of mappers.
     """
     west, south, east, north = bounds
-    # a dict keeps the order, and an element asked for by two layers is asked for once
+    # A dict removes the repeats of several layers and keeps the order.
     lines = dict.fromkeys(line for spec in specs for line in _statements(spec))
     box = f"{south:.7f},{west:.7f},{north:.7f},{east:.7f}"
     head = f"[out:json][timeout:{timeout}][bbox:{box}];"
@@ -286,7 +284,7 @@ def _statements(spec: LayerSpec) -> Iterator[str]:
     for alternative in require_tags(spec):
         filters = "".join(_filter(key, values) for key, values in alternative)
         for kind in spec.elements:
-            # of the relations, readers take multipolygons only
+            # The reader accepts only multipolygons among the relations.
             areas = '["type"="multipolygon"]' if kind == "relation" else ""
             yield f"{kind}{filters}{areas};"
 
@@ -315,13 +313,13 @@ def fetch_layers(
     tile_deg: float = 0.1,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Fetch the elements of layers in an area, and a little more, as files for `read_layers`.
+    """Fetch the elements of layers in an area, and some around it, as files for `read_layers`.
 
-    There is a file for each tile of at most `tile_deg` degrees; one that is too much for the
-    servers is split into four. Endpoints are such as ``"https://overpass-api.de/api"``; one that
-    fails is asked last from then on. The answers of all servers count as the same, so that a run
-    that was interrupted goes on from the cache. `progress` takes the tiles done and those there
-    are, which may grow. SourceError if no server gives a tile.
+    Each tile of at most `tile_deg` degrees is a file; a tile that is too large for the servers is
+    split into four. An endpoint is for example ``"https://overpass-api.de/api"``; one that fails
+    becomes the last one to try. The cache does not distinguish the servers, so that a later run
+    continues an interrupted one. `progress` takes the number of finished tiles and of all tiles,
+    which may grow. SourceError if no server answers for a tile.
     """
     if not endpoints:
         raise InputError("there is no Overpass server to ask; name one in endpoints.")
@@ -345,7 +343,7 @@ def fetch_layers(
 
 
 class _Servers:
-    """Servers that mirror one another, in the order in which they are asked."""
+    """Servers with the same data, in the order of the attempts."""
 
     def __init__(self, addresses: list[str], cache: Cache, spec: HttpSpec) -> None:
         connect, read = spec.timeout
@@ -358,7 +356,7 @@ class _Servers:
         )
 
     def answer(self, query: str, *, last: bool) -> Path | None:
-        """Return the file of the answer; None where a smaller question, unless `last`, may do."""
+        """Return the file of the answer; None, unless `last`, if a smaller tile may work."""
         failures: list[SourceError] = []
         for address in tuple(self._addresses):
             try:
@@ -369,7 +367,7 @@ class _Servers:
             except SourceError as error:
                 failures.append(error)
                 if isinstance(error, NotCachedError):
-                    break  # the same for all of them
+                    break  # it is the same for all servers
                 self._addresses.remove(address)
                 self._addresses.append(address)
                 continue
@@ -392,7 +390,7 @@ class _Servers:
     def _ask(self, address: str, query: str) -> Path:
         def check(path: Path) -> None:
             document = load_document(path, where=f"the answer of {host_of(address)}")
-            # One that is incomplete by its size is kept: the next run need not learn it again.
+            # An answer that is too large is cached, so that the next run splits the tile at once.
             if document.failed and not document.exhausted:
                 raise HttpError(f"{host_of(address)} failed ({document.remark}); try again later.")
 
@@ -414,7 +412,7 @@ class _Servers:
         try:
             status = read_text(f"{address}/status", spec=short)
         except SourceError:
-            return  # a server without it says by its answer that it is busy
+            return  # without a status page, the answer to the query shows that a server is busy
         wait = waiting_time(status)
         if wait > spec.longest_wait_s:
             raise HttpError(
@@ -427,7 +425,7 @@ class _Servers:
 
 
 def waiting_time(status: str) -> float:
-    """Return the seconds until a slot is free, by the page ``/api/status``; 0 if none is said."""
+    """Return the seconds until a slot is free, from the page ``/api/status``; 0 if not stated."""
     free = re.search(r"^(\d+) slots? available now", status, re.MULTILINE)
     if free and int(free[1]):
         return 0.0
@@ -436,7 +434,7 @@ def waiting_time(status: str) -> float:
 
 
 def _may_be_size(failure: SourceError) -> bool:
-    # Offline, the parts of a tile that was split are there, and the tile may not be.
+    # Offline, the cache may have only the quarters of a tile.
     return isinstance(failure, TooLargeError | NotCachedError) or (
         isinstance(failure, HttpError) and failure.status == TOO_SLOW
     )

@@ -8,7 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
 from semsig_gis.sources.services.layers import Download
 from semsig_gis.sources.services.pages import ServiceQuery, geojson_page, json_object

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urljoin, urlsplit
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
 from semsig_gis.sources.services.layers import Download, PositionReader
 from semsig_gis.sources.services.pages import HTML, NOT_FOUND, Page, ServiceQuery, json_object

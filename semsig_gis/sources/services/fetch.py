@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError
 from semsig_gis.sources.services import arcgis, ckan, ogc_features, opendatasoft, socrata, wfs
 from semsig_gis.sources.services.pages import Client, PagingError

@@ -11,7 +11,7 @@ import shapely
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CrsError
+from semsig_gis.core import CrsError
 from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:

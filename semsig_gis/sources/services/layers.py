@@ -15,7 +15,7 @@ import shapely
 import shapely.geometry
 from shapely.errors import ShapelyError
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import KNOWN_NAMES, SHAPE_NAMES
 from semsig_gis.sources.numbers import decimal
 from semsig_gis.sources.rows import (
@@ -28,7 +28,7 @@ from semsig_gis.sources.rows import (
 )
 from semsig_gis.sources.services.table import open_table
 from semsig_gis.sources.vector import file as vector_file
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

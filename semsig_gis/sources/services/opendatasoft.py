@@ -7,11 +7,11 @@ from urllib.parse import quote
 
 import shapely
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
 from semsig_gis.sources.services.pages import NOT_FOUND, ServiceQuery
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

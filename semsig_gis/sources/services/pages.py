@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from urllib.parse import urlsplit
 
-from semsig_gis.core.errors import CatalogError, SourceError, nearest_name
+from semsig_gis.core import CatalogError, SourceError, nearest_name
 from semsig_gis.sources.http.errors import error_text
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
@@ -23,7 +23,7 @@ from semsig_gis.sources.http.fetch import (
 from semsig_gis.sources.rows import RowRules, require_field
 from semsig_gis.sources.services.gml import parse_xml
 from semsig_gis.sources.services.layers import settle_fields
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -7,7 +7,7 @@ import functools
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from semsig_gis.core.errors import CatalogError, SourceError
+from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
 from semsig_gis.sources.services.pages import (

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from semsig_gis.core.errors import CrsError, SourceError
+from semsig_gis.core import CrsError, SourceError
 from semsig_gis.sources.csv_file import open_csv
 from semsig_gis.sources.http.errors import error_text
 from semsig_gis.sources.paths import require_file
@@ -25,7 +25,7 @@ from semsig_gis.sources.services.gml import (
     read_feature,
     stated_crs,
 )
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import host_of
 from semsig_gis.sources.services.gml import ID, features, local_name
 from semsig_gis.sources.services.layers import Download, find_field

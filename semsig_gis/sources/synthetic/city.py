@@ -1,7 +1,7 @@
-"""A synthetic city, for demonstrations, tests and benchmarks that need no data: no real place.
+"""Generate a synthetic city for demonstrations, tests and benchmarks without data.
 
-It is calibrated: of `PARIS_LIKE`, a signature database (30 m, cells of 10 m, viewpoints
-``"streets"``) has about the figures that the paper prints for Paris.
+It is calibrated: the signature database of `PARIS_LIKE` (30 m, cells of 10 m, viewpoints
+``"streets"``) has about the figures of the paper for Paris.
 """
 
 from __future__ import annotations
@@ -15,81 +15,81 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from semsig_gis.core.checks import MOST_SEED, require_number
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import CLASS_NAME, SOURCE_ID
+from semsig_gis.core import CLASS_NAME, MOST_SEED, SOURCE_ID, InputError, require_number
 from semsig_gis.sources.catalog import paper_taxonomy
 from semsig_gis.sources.layer import RawLayer, RowCounts
 from semsig_gis.sources.layer_spec import LayerSpec
-from semsig_gis.sources.synthetic.streets import counted, furnish, lay_streets
+from semsig_gis.sources.synthetic.streets import expand_counts, furnish, lay_streets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.geometry import Bounds
+    from semsig_gis.core import Bounds
     from semsig_gis.sources.layer_spec import GeometryKind, Role
     from semsig_gis.sources.synthetic.streets import Network
 
     Ints = NDArray[np.int64]
     Objects = NDArray[np.object_]
 
-PARK_SHARE = 0.015  # of the faces
-SQUARE_SHARE = 0.015  # of the faces, among the smaller ones
+PARK_SHARE = 0.015  # share of the faces
+SQUARE_SHARE = 0.015  # share of the faces; squares are among the smaller ones
 HOUSE_DEPTH_M = 12.0
 FRONTAGE_M = 20.0
-LEAST_BLOCK_M2 = 80.0  # smaller remains of faces are not built on
+LEAST_BLOCK_M2 = 80.0  # smaller parts of faces have no houses
 LEAST_HOUSE_M2 = 10.0
-ARC_CHORDS = 8  # to a quarter of a circle, where streets end round
-LEAST_HOUSES = 5  # around a block, so that each takes less than half a turn
+ARC_CHORDS = 8  # chords per quarter of a circle, at the round ends of streets
+LEAST_HOUSES = 5  # per block, so that the angle of each house is less than 180 degrees
 
 
 def open_ground(network: Network, rng: np.random.Generator) -> tuple[Ints, Ints]:
-    """Choose the faces, by number, that are not built on: parks, then squares."""
+    """Choose the faces without houses; return the numbers of parks and of squares."""
     by_area = np.argsort(shapely.area(network.faces))
     small, large = np.array_split(by_area, 2)
     parks, squares = (
-        rng.choice(some, int(len(network.faces) * share + rng.uniform()), replace=False)
-        for some, share in ((large, PARK_SHARE), (small, SQUARE_SHARE))
+        rng.choice(faces, int(len(network.faces) * share + rng.uniform()), replace=False)
+        for faces, share in ((large, PARK_SHARE), (small, SQUARE_SHARE))
     )
     return parks, squares
 
 
 def cut_back(faces: Objects, network: Network) -> Objects:
-    """Return what of each face is farther from every centre line than its street's half-width."""
-    # An arc of chords lies inside the circle: a little wider, it holds the whole of it.
+    """Return the faces without the streets, which reach a half-width from their centre line."""
+    # Chords lie inside their circle: enlarge the radius, so that they enclose it.
     radius = network.half_width / math.cos(math.pi / (4 * ARC_CHORDS))
     streets = shapely.buffer(network.lines, radius, quad_segs=ARC_CHORDS)
     face, street = shapely.STRtree(streets).query(faces, predicate="intersects")
     order = np.argsort(face, kind="stable")
     face, street = face[order], street[order]
-    turn = np.arange(len(face)) - np.searchsorted(face, face)
-    left = faces.copy()
-    for number in range(int(turn.max(initial=-1)) + 1):
-        now = turn == number
-        left[face[now]] = shapely.difference(left[face[now]], streets[street[now]])
-    return left
+    # Subtract one street from every face at a time; `step` is the number of a face's street.
+    step = np.arange(len(face)) - np.searchsorted(face, face)
+    remainder = faces.copy()
+    for number in range(int(step.max(initial=-1)) + 1):
+        pair = step == number
+        remainder[face[pair]] = shapely.difference(remainder[face[pair]], streets[street[pair]])
+    return remainder
 
 
 def build_houses(network: Network, built: Objects, rng: np.random.Generator) -> Objects:
-    """Build a ring of houses around every block, with a courtyard where there is room for one."""
+    """Build a ring of houses around each block, with a courtyard if there is room."""
     blocks = shapely.get_parts(cut_back(built, network))
     blocks = blocks[shapely.area(blocks) >= LEAST_BLOCK_M2]
     rings = shapely.difference(blocks, shapely.buffer(blocks, -HOUSE_DEPTH_M, join_style="mitre"))
     outlines = shapely.get_exterior_ring(blocks)
     counts = np.maximum((shapely.length(outlines) / FRONTAGE_M).astype(np.int64), LEAST_HOUSES)
-    block, number = counted(counts)
-    # Party walls run from the middle of the block through a point of its outline.
+    block, number = expand_counts(counts)
+    # A wall between two houses runs from the middle of the block through a point of its outline.
     share = (number + rng.uniform(-0.25, 0.25, size=len(block))) / counts[block] % 1.0
     wall = shapely.get_coordinates(
         shapely.line_interpolate_point(outlines[block], share, normalized=True)
     )
+    # The wall that follows each wall around its block.
     following = np.arange(1, len(block) + 1)
     last = np.cumsum(counts) - 1
     following[last] = last + 1 - counts
     middle = shapely.get_coordinates(shapely.centroid(blocks))[block]
-    # Far enough out that the chord leaves no corner of the block outside.
+    # Extend the walls, so that the wedge between two walls contains the corners of the block.
     beyond = middle + 8.0 * (wall - middle)
     wedges = shapely.polygons(np.stack([middle, beyond, beyond[following]], axis=1))
     houses: Objects = shapely.get_parts(shapely.intersection(rings[block], wedges))
@@ -97,7 +97,7 @@ def build_houses(network: Network, built: Objects, rng: np.random.Generator) -> 
 
 
 CRS = "EPSG:32631"
-# On the zone's central meridian, where north is north.
+# On the central meridian of the zone, where grid north is true north.
 CENTRE = (500_000.0, 5_400_000.0)
 SIZE_LIMITS = (100, 20_000)
 MOST_CENTRE_M = 1e8
@@ -134,23 +134,23 @@ class CitySpec:
         least, most = SIZE_LIMITS
         require_number("size of the city", self.size, least=least, most=most, unit="metres")
         require_number("seed of the city", self.seed, least=0, most=MOST_SEED)
-        if not all(abs(one) <= MOST_CENTRE_M for one in self.centre):
+        if not all(abs(coordinate) <= MOST_CENTRE_M for coordinate in self.centre):
             raise InputError(f"centre of the city is {self.centre}; give x and y in metres.")
 
 
 PARIS_LIKE = CitySpec(size=9690.0)
-"""A synthetic city with as many cells, and objects of each class in them, as the paper's Paris.
+"""A synthetic city with the numbers of cells and of objects per class of the paper's Paris.
 
 It is a square of 9,690 m.
 """
 
 
 def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
-    """Make up the street objects of a city, of the paper's eleven classes.
+    """Generate the street objects of a city, of the eleven classes of the paper.
 
-    Lights and trees are even along a street, trees with gaps, the rhythm of each street its own.
-    Junctions where avenues meet have signals, and some where streets join an avenue. All other
-    classes are scattered at a rate that is ten times higher on avenues.
+    Lights and trees are regularly spaced along a street, trees with gaps, and each street has its
+    own spacing. Junctions of avenues have signals, and some junctions of a street and an avenue.
+    All other classes are scattered, with a rate that is ten times higher on avenues.
 
     Parameters
     ----------
@@ -160,9 +160,10 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
     Returns
     -------
     tuple of RawLayer
-        One layer a class, in EPSG:32631. A class that is rarer than the city is large has an
-        empty layer. ``source_id`` is edge, side and number along it, such as ``"57R4"`` (``RR``
-        in a second row of trees), or ground and number there, such as ``"p3-41"``.
+        One layer per class, in EPSG:32631. In a small city, the layer of a rare class may be
+        empty. ``source_id`` is edge, side and number along the edge, such as ``"57R4"`` (``RR`` in
+        a second row of trees), or number of the park or square and of the object in it, such as
+        ``"p3-41"``.
 
     Examples
     --------
@@ -174,8 +175,8 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
     spec = spec or CitySpec()
     network = lay_streets(spec.size, _random(spec, "streets"))
     parks, squares = (
-        cut_back(network.faces[some], network)
-        for some in open_ground(network, _random(spec, "open ground"))
+        cut_back(network.faces[numbers], network)
+        for numbers in open_ground(network, _random(spec, "open ground"))
     )
     layers = []
     for name in (item.name for item in paper_taxonomy().classes):
@@ -188,7 +189,7 @@ def synthetic_city(spec: CitySpec | None = None) -> tuple[RawLayer, ...]:
 
 
 def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawLayer]:
-    """Make up the buildings and the streets of a city.
+    """Generate the buildings and the streets of a city.
 
     Parameters
     ----------
@@ -198,9 +199,9 @@ def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawL
     Returns
     -------
     buildings, streets : RawLayer
-        Footprints (polygons) and centre lines of the city that `synthetic_city` makes of the same
-        specification, in EPSG:32631. The streets have one more column, ``half_width``: metres
-        from the centre line to the houses. Their ``source_id`` is the edge that objects name.
+        Footprints (polygons) and centre lines of the city that `synthetic_city` returns for the
+        same specification, in EPSG:32631. The streets also have the column ``half_width``: metres
+        from the centre line to the houses. Their ``source_id`` is the edge in the ids of objects.
 
     Examples
     --------
@@ -220,7 +221,7 @@ def synthetic_surroundings(spec: CitySpec | None = None) -> tuple[RawLayer, RawL
 
 
 def synthetic_streets(spec: CitySpec) -> RawLayer:
-    """Make up the streets alone, those of `synthetic_surroundings`."""
+    """Generate only the streets of `synthetic_surroundings`."""
     return _streets(spec, lay_streets(spec.size, _random(spec, "streets")))
 
 
@@ -239,15 +240,15 @@ def _square(spec: CitySpec) -> Bounds:
 
 
 def _random(spec: CitySpec, purpose: str) -> np.random.Generator:
-    # A stream for every class, so that a change to one leaves the others where they were.
+    # Each class has its own stream, so that a change of one class does not move the others.
     return np.random.default_rng([spec.seed, *purpose.encode()])
 
 
 def _placed(spec: CitySpec, shapes: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Move shapes from around the middle of the city to where it is, to the centimetre."""
+    """Move shapes to the place of the city, with coordinates rounded to centimetres."""
     exact = shapely.transform(shapes, lambda xy: xy + spec.centre)
     rounded = shapely.transform(exact, lambda xy: np.round(xy, 2))
-    # A sliver may fold over when its corners move.
+    # Rounding may make a thin polygon invalid; then keep the exact one.
     return np.where(shapely.is_valid(rounded), rounded, exact)
 
 

@@ -1,8 +1,8 @@
-"""The streets of the synthetic city and what stands along them: trees, lights, signals, the rest.
+"""Streets of the synthetic city, and the objects along them: trees, lights, signals and others.
 
-Streets are the edges between the faces of a Voronoi diagram. Neighbouring faces form quarters; the
-edges between two quarters are an avenue, all others are streets of their own. What is scattered is
-drawn evenly, so that cities of a size have nearly the same number of each class.
+Streets are the edges between the faces of a Voronoi diagram. Neighbouring faces form quarters. The
+edges between two quarters are one avenue, and each other edge is a street. Random numbers are
+stratified, so that cities of the same size have nearly the same number of objects of each class.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 BLOCK_M = 112.0  # mean distance between the middles of neighbouring faces
 QUARTER_M = 395.0  # and of neighbouring quarters
-JITTER = 0.9  # of a block or quarter, by which the middles leave a regular lattice
-MARGIN = 2  # quarters beyond the square, so that its edge is like its middle
+JITTER = 0.9  # displacement of the middles from a regular lattice, as a share of its step
+MARGIN = 2  # quarters outside the square, so that there is no effect of the edge
 REACH_M = 60.0  # streets that are farther from the square are left out
 
-# Metres from the centre line to the houses; the pavement is the outer part of it.
+# Metres from the centre line to the houses; PAVEMENT is the outer share of it.
 STREET_HALF_WIDTH_M = (5.5, 9.0)
 AVENUE_HALF_WIDTH_M = (11.0, 21.0)
 PAVEMENT = 0.3
@@ -35,14 +35,14 @@ PAVEMENT = 0.3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Network:
-    """Edges of the street network, one entry an edge between two junctions, and the faces.
+    """Edges of the street network between junctions, one entry per edge, and the faces.
 
     `start` is the first junction, in metres from the middle of the city, and `along` the unit
     vector to the second, both of shape (n, 2); `length` is in metres. `junction`, shape (n, 2), has
     the numbers of both ends. `street` is the street or avenue of the edge; avenues come first.
-    `half_width` is metres from the centre line to the houses, and `clear`, shape (n, 2), metres to
-    leave free at either end for what crosses there. `faces` are the polygons that the centre lines
-    enclose.
+    `half_width` is metres from the centre line to the houses, and `clear`, shape (n, 2), metres
+    without objects at each end, for the crossing street. `faces` are the polygons between the
+    centre lines.
     """
 
     start: Floats
@@ -59,8 +59,8 @@ class Network:
         """Return the number of edges."""
         return len(self.length)
 
-    def drawn(self, limits: tuple[float, float], rng: np.random.Generator) -> Floats:
-        """Draw numbers that fill a range evenly for avenues, and for streets; of every edge."""
+    def sample(self, limits: tuple[float, float], rng: np.random.Generator) -> Floats:
+        """Draw a number per street, stratified for avenues and for streets; one entry per edge."""
         avenues = int(self.street[self.avenue].max(initial=-1)) + 1
         streets = int(self.street.max(initial=-1)) + 1 - avenues
         numbers = np.concatenate([_evenly(avenues, limits, rng), _evenly(streets, limits, rng)])
@@ -97,6 +97,7 @@ def lay_streets(size: float, rng: np.random.Generator) -> Network:
     faces = shapely.get_parts(shapely.voronoi_polygons(shapely.multipoints(middles)))
     quarter = shapely.STRtree(np.asarray(shapely.points(quarters))).nearest(shapely.centroid(faces))
 
+    # Keep the edges and the faces near the square.
     ends, sides, corners = _shared_edges(faces)
     far = size / 2 + REACH_M
     square = shapely.box(-far, -far, far, far)
@@ -104,16 +105,19 @@ def lay_streets(size: float, rng: np.random.Generator) -> Network:
     ends, sides = ends[near], sides[near]
     faces = faces[shapely.intersects(faces, square)]
 
-    beside = np.sort(quarter[sides], axis=1)
-    avenue = beside[:, 0] != beside[:, 1]
-    pair, own = np.unique(beside[avenue] @ [len(quarters), 1], return_inverse=True)
+    # An edge between two quarters belongs to the avenue of this pair of quarters.
+    quarter_pair = np.sort(quarter[sides], axis=1)
+    avenue = quarter_pair[:, 0] != quarter_pair[:, 1]
+    pair_key = quarter_pair[avenue] @ [len(quarters), 1]
+    avenues, avenue_number = np.unique(pair_key, return_inverse=True)
+    side_streets = len(ends) - len(avenue_number)
     street = np.empty(len(ends), np.int64)
-    street[avenue] = own
-    street[~avenue] = len(pair) + np.arange(len(ends) - len(own))
+    street[avenue] = avenue_number
+    street[~avenue] = len(avenues) + np.arange(side_streets)
     half_width = np.concatenate(
         [
-            _evenly(len(pair), AVENUE_HALF_WIDTH_M, rng),
-            _evenly(len(ends) - len(own), STREET_HALF_WIDTH_M, rng),
+            _evenly(len(avenues), AVENUE_HALF_WIDTH_M, rng),
+            _evenly(side_streets, STREET_HALF_WIDTH_M, rng),
         ]
     )[street]
 
@@ -133,7 +137,7 @@ def lay_streets(size: float, rng: np.random.Generator) -> Network:
 
 
 def _evenly(count: int, limits: tuple[float, float], rng: np.random.Generator) -> Floats:
-    """Draw one number from each of `count` equal parts of a range, in any order."""
+    """Draw one number from each of `count` equal parts of a range, in random order."""
     low, high = limits
     share = (rng.permutation(count) + rng.uniform(size=count)) / max(count, 1)
     numbers: Floats = low + (high - low) * share
@@ -141,7 +145,7 @@ def _evenly(count: int, limits: tuple[float, float], rng: np.random.Generator) -
 
 
 def _scattered_lattice(reach: float, step: float, turn: float, rng: np.random.Generator) -> Floats:
-    """Return places about `step` apart in the square of twice the reach."""
+    """Return random places at a distance of about `step`, in a square with sides `2 * reach`."""
     most = math.ceil(reach * math.sqrt(2.0) / step)
     axis = np.arange(-most, most + 1)
     lattice = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2) * step
@@ -152,56 +156,59 @@ def _scattered_lattice(reach: float, step: float, turn: float, rng: np.random.Ge
 
 
 def _shared_edges(faces: NDArray[np.object_]) -> tuple[Ints, Ints, Floats]:
-    """Return the edges that two faces share: numbers of corners and faces, and the corners."""
-    # GEOS gives all faces at a corner the same coordinates, to the last bit.
+    """Return the corners and the faces of edges between two faces, and positions of corners."""
+    # GEOS gives all faces at a corner exactly the same coordinates.
     ring, face = shapely.get_coordinates(faces, return_index=True)
     corners, number = np.unique(ring.view(np.complex128).ravel(), return_inverse=True)
+    # Edges between consecutive corners of a face, with the lower corner first.
     inner = face[1:] == face[:-1]
     ends = np.sort(np.stack([number[:-1], number[1:]], axis=1)[inner], axis=1)
+    # Two equal keys are the same edge of two faces.
     key = ends @ [len(corners), 1]
     order = np.argsort(key, kind="stable")
     first = np.flatnonzero(np.diff(key[order]) == 0)
-    one, other = order[first], order[first + 1]
+    edge, twin = order[first], order[first + 1]
     owner = face[:-1][inner]
     xy: Floats = np.stack([corners.real, corners.imag], axis=1)
-    return ends[one], np.stack([owner[one], owner[other]], axis=1), xy
+    return ends[edge], np.stack([owner[edge], owner[twin]], axis=1), xy
 
 
 def _crossing(ends: Ints, avenue: Bools, kerb: Floats) -> Floats:
-    """Return how much of either end of each edge what crosses there takes up."""
+    """Return the width in metres of the crossing street at each end of each edge."""
+    # Widest street at each junction: of all streets, and of streets that are not avenues.
     widest = np.zeros((2, int(ends.max(initial=0)) + 1))
     for end in (0, 1):
         np.maximum.at(widest[0], ends[:, end], kerb)
         np.maximum.at(widest[1], ends[~avenue, end], kerb[~avenue])
     any_street, side_street = widest[:, ends]
-    # An avenue is not interrupted by itself, only by the streets that join it.
+    # An avenue is interrupted only by the streets that join it, not by itself.
     clear: Floats = np.where(avenue[:, None] & (side_street > 0), side_street, any_street)
     return clear + 1.0
 
 
 # --- Objects ------------------------------------------------------------------------------------
 
-# The numbers below are calibrated together: the signatures of PARIS_LIKE then hold each class as
-# often as the paper's. Change one, and its test tells which counts have left their range.
-# Metres between neighbours in a row; one rhythm a street.
+# The numbers below are calibrated together, so that each class is as frequent in the signatures of
+# PARIS_LIKE as in the paper. After a change, the test of PARIS_LIKE shows counts out of range.
+# Metres between neighbours in a row; each street has its own spacing.
 STREET_LIGHT_SPACING_M = (15.0, 32.0)
 AVENUE_LIGHT_SPACING_M = (6.0, 11.0)
 TREE_SPACING_M = (4.5, 7.0)
 LIGHT_JITTER_M = 0.3  # either way
 TREE_JITTER_M = 0.5
 
-ALTERNATING_SHARE = 0.25  # of the streets, whose lights change sides
+ALTERNATING_SHARE = 0.25  # share of the streets with lights on alternating sides
 TREE_LINED_AVENUES = 0.57  # share of the avenues
 TREE_LINED_STREETS = 0.02  # and of the streets
-DOUBLE_ROW_HALF_WIDTH_M = 17.0  # tree-lined avenues as wide as this have two rows a side
-TREE_GAPS = (0.0, 0.3)  # share of the trees of a row that are missing; one a street
-ONE_SIDED_SHARE = 0.2  # of the tree-lined streets, with trees on one side alone
+DOUBLE_ROW_HALF_WIDTH_M = 17.0  # tree-lined avenues from this width have two rows per side
+TREE_GAPS = (0.0, 0.3)  # share of missing trees in a row; each street has its own
+ONE_SIDED_SHARE = 0.2  # share of the tree-lined streets with trees on one side only
 PARK_TREE_SPACING_M = 12.0
 SQUARE_LIGHT_SPACING_M = 18.0
 SIGNALLED_CORNERS = 0.115  # share of the corners of an avenue and a street
-THROUGH = 2  # edges of an avenue that passes a corner; where more meet, there always are signals
+THROUGH = 2  # avenue edges at a corner that an avenue passes; with more edges there are signals
 
-# Objects a kilometre of avenue.
+# Objects per kilometre of avenue.
 RATES = {
     "bench": 15.75,
     "indicator": 4.2,
@@ -214,7 +221,7 @@ RATES = {
 }
 AVENUE_TO_STREET_RATE = 10.0
 
-# Metres from the kerb to the objects of a class; others stand at the last.
+# Metres from the kerb to the objects of a class, and of other classes.
 SETBACKS_M = {"alignment_tree": 1.0, "street_light": 0.5, "traffic_light": 0.3}
 SETBACK_M = 0.8
 SECOND_ROW_M = 3.0
@@ -222,7 +229,7 @@ SECOND_ROW_M = 3.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Furniture:
-    """Objects of one class: metres from the middle of the city, shape (k, 2), and identifiers."""
+    """Objects of a class: metres from the middle of the city, shape (k, 2), and identifiers."""
 
     xy: Floats
     ids: NDArray[np.str_]
@@ -236,7 +243,7 @@ def furnish(
     squares: NDArray[np.object_],
     rng: np.random.Generator,
 ) -> Furniture:
-    """Place the objects of one class; parks and squares, polygons, have trees and lights too."""
+    """Place the objects of a class; the polygons `parks` have trees, `squares` have lights."""
     if class_name == "alignment_tree":
         return _joined(*_trees(network, rng), _on_ground(parks, PARK_TREE_SPACING_M, rng))
     if class_name == "street_light":
@@ -253,19 +260,16 @@ def _joined(*parts: Furniture) -> Furniture:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Row:
-    """Places along edges, one entry an object."""
+    """Places along edges, one entry per object."""
 
     edge: Ints
     number: Ints
     t: Floats  # metres from the first junction
 
-    def only(self, kept: Bools) -> _Row:
-        return _Row(self.edge[kept], self.number[kept], self.t[kept])
-
-    def beside(
+    def objects(
         self, network: Network, side: Floats, setback: float, *, second: bool = False
     ) -> Furniture:
-        """Return objects outside the kerb, on the right where `side` is 1, else on the left."""
+        """Return objects outside the kerb, on the right if `side` is 1, on the left if -1."""
         offset = side * (network.kerb[self.edge] + setback)
         letters = np.where(side > 0, "R", "L").tolist()
         ids = [
@@ -280,28 +284,28 @@ class _Row:
 def _row(
     network: Network, edges: Ints, spacing: Floats, jitter: float, rng: np.random.Generator
 ) -> _Row:
-    """Return objects evenly spaced on edges, by the spacing of every edge, shape (n,)."""
+    """Return regularly spaced objects on edges; `spacing` in metres per edge, shape (n,)."""
     gap = spacing[edges]
     begin = network.clear[edges, 0] + rng.uniform(size=len(edges)) * gap
     room = network.length[edges] - network.clear[edges, 1] - begin
     counts = np.maximum(np.floor(room / gap).astype(np.int64) + 1, 0)
-    owner, number = counted(counts)
+    owner, number = expand_counts(counts)
     shift = rng.uniform(-jitter, jitter, size=len(owner))
     return _Row(edges[owner], number, begin[owner] + number * gap[owner] + shift)
 
 
-def counted(counts: Ints) -> tuple[Ints, Ints]:
-    """Return who owns each of the things counted, and its number with its owner."""
+def expand_counts(counts: Ints) -> tuple[Ints, Ints]:
+    """Return the owner of each object and its number at its owner, from counts per owner."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _trees(network: Network, rng: np.random.Generator) -> list[Furniture]:
-    spacing = network.drawn(TREE_SPACING_M, rng)
-    gaps = network.drawn(TREE_GAPS, rng)
+    spacing = network.sample(TREE_SPACING_M, rng)
+    gaps = network.sample(TREE_GAPS, rng)
     share = np.where(network.avenue, TREE_LINED_AVENUES, TREE_LINED_STREETS)
-    lined = network.drawn((0.0, 1.0), rng) < share
-    one_sided = network.drawn((0.0, 1.0), rng) < ONE_SIDED_SHARE
+    lined = network.sample((0.0, 1.0), rng) < share
+    one_sided = network.sample((0.0, 1.0), rng) < ONE_SIDED_SHARE
     double = lined & network.avenue & (network.half_width >= DOUBLE_ROW_HALF_WIDTH_M)
     parts = []
     for edges, side, second in (
@@ -311,37 +315,37 @@ def _trees(network: Network, rng: np.random.Generator) -> list[Furniture]:
         (double & ~one_sided, -1.0, True),
     ):
         row = _row(network, np.flatnonzero(edges), spacing, TREE_JITTER_M, rng)
-        missing = rng.uniform(size=len(row.t)) < gaps[row.edge]
-        row = row.only(~missing)
+        present = rng.uniform(size=len(row.t)) >= gaps[row.edge]
+        row = _Row(row.edge[present], row.number[present], row.t[present])
         setback = SETBACKS_M["alignment_tree"] + second * SECOND_ROW_M
-        parts.append(row.beside(network, np.full(len(row.t), side), setback, second=second))
+        parts.append(row.objects(network, np.full(len(row.t), side), setback, second=second))
     return parts
 
 
 def _lights(network: Network, rng: np.random.Generator) -> list[Furniture]:
-    street_spacing = network.drawn(STREET_LIGHT_SPACING_M, rng)
-    avenue_spacing = network.drawn(AVENUE_LIGHT_SPACING_M, rng)
-    alternating = network.drawn((0.0, 1.0), rng) < ALTERNATING_SHARE
-    lit_side = np.sign(network.drawn((-1.0, 1.0), rng))
+    street_spacing = network.sample(STREET_LIGHT_SPACING_M, rng)
+    avenue_spacing = network.sample(AVENUE_LIGHT_SPACING_M, rng)
+    alternating = network.sample((0.0, 1.0), rng) < ALTERNATING_SHARE
+    lit_side = np.sign(network.sample((-1.0, 1.0), rng))
     setback = SETBACKS_M["street_light"]
 
     edges = np.flatnonzero(~network.avenue)
     row = _row(network, edges, street_spacing, LIGHT_JITTER_M, rng)
-    turned = alternating[row.edge] & (row.number % 2 == 1)
-    parts = [row.beside(network, lit_side[row.edge] * np.where(turned, -1.0, 1.0), setback)]
+    opposite = alternating[row.edge] & (row.number % 2 == 1)
+    parts = [row.objects(network, lit_side[row.edge] * np.where(opposite, -1.0, 1.0), setback)]
     edges = np.flatnonzero(network.avenue)
     for side in (-1.0, 1.0):
         row = _row(network, edges, avenue_spacing, LIGHT_JITTER_M, rng)
-        parts.append(row.beside(network, np.full(len(row.t), side), setback))
+        parts.append(row.objects(network, np.full(len(row.t), side), setback))
     return parts
 
 
 def _signals(network: Network, rng: np.random.Generator) -> list[Furniture]:
-    """Put a light on the right of every approach to a signalled junction."""
+    """Put a traffic light on the right of each approach to a junction with signals."""
     junctions = int(network.junction.max()) + 1
     avenues = np.bincount(network.junction[network.avenue].ravel(), minlength=junctions)
     signalled = avenues > THROUGH
-    # Bresenham's rule spreads them: one whenever the sum passes a whole number.
+    # Spread the signals evenly: a corner has one if the running sum passes a whole number.
     corner = np.flatnonzero(avenues == THROUGH)
     sums = np.arange(len(corner) + 1) * SIGNALLED_CORNERS + rng.uniform()
     signalled[corner] = np.diff(np.floor(sums)) > 0
@@ -352,31 +356,33 @@ def _signals(network: Network, rng: np.random.Generator) -> list[Furniture]:
         edge = np.flatnonzero(signalled[network.junction[:, end]] & passable)
         t = network.clear[edge, 0] if end == 0 else network.length[edge] - network.clear[edge, 1]
         row = _Row(edge, np.full(len(edge), end), t)
-        parts.append(row.beside(network, np.full(len(edge), side), SETBACKS_M["traffic_light"]))
+        parts.append(row.objects(network, np.full(len(edge), side), SETBACKS_M["traffic_light"]))
     return parts
 
 
 def _scattered(network: Network, rate: float, rng: np.random.Generator) -> Furniture:
-    """Scatter objects at a rate a kilometre of avenue, evenly over all streets."""
+    """Scatter objects over all streets; `rate` is objects per kilometre of avenue."""
     free = np.maximum(network.length - network.clear.sum(axis=1), 0.0)
     per_metre = rate / 1000.0 / np.where(network.avenue, 1.0, AVENUE_TO_STREET_RATE)
+    # Expected number of objects up to each edge.
     expected = np.concatenate([[0.0], np.cumsum(free * per_metre)])
     count = int(expected[-1] + rng.uniform())
-    drawn = (np.arange(count) + rng.uniform(size=count)) * (expected[-1] / max(count, 1))
-    edge = np.searchsorted(expected, drawn, side="right") - 1
-    t = network.clear[edge, 0] + (drawn - expected[edge]) / per_metre[edge]
-    number = counted(np.bincount(edge, minlength=len(network)))[1]
+    # One object in each of `count` equal parts of the sum.
+    position = (np.arange(count) + rng.uniform(size=count)) * (expected[-1] / max(count, 1))
+    edge = np.searchsorted(expected, position, side="right") - 1
+    t = network.clear[edge, 0] + (position - expected[edge]) / per_metre[edge]
+    number = expand_counts(np.bincount(edge, minlength=len(network)))[1]
     side = rng.choice([-1.0, 1.0], size=count)
-    return _Row(edge, number, t).beside(network, side, SETBACK_M)
+    return _Row(edge, number, t).objects(network, side, SETBACK_M)
 
 
 def _on_ground(grounds: NDArray[np.object_], spacing: float, rng: np.random.Generator) -> Furniture:
-    """Place objects about `spacing` apart all over open ground."""
+    """Place objects at a distance of about `spacing` metres all over open ground."""
     bounds = shapely.bounds(grounds).reshape(-1, 4)
     cells = np.ceil((bounds[:, 2:] - bounds[:, :2]) / spacing).astype(np.int64)
-    owner, number = counted(cells.prod(axis=1))
+    owner, number = expand_counts(cells.prod(axis=1))
     lattice = np.stack(np.divmod(number, cells[owner, 1]), axis=1) + 0.5
     xy = bounds[owner, :2] + (lattice + rng.uniform(-0.2, 0.2, size=lattice.shape)) * spacing
     inside = shapely.contains_xy(grounds[owner], *xy.T)
-    ids = [f"p{one}-{each}" for one, each in zip(owner[inside], number[inside], strict=True)]
+    ids = [f"p{ground}-{item}" for ground, item in zip(owner[inside], number[inside], strict=True)]
     return Furniture(xy[inside], np.array(ids, dtype=np.str_))

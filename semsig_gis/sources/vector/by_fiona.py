@@ -1,4 +1,4 @@
-"""Rows of a vector file one by one, through fiona, which says of each what is wrong with it."""
+"""Read a vector file row by row with fiona, and report the error of each bad row."""
 
 from __future__ import annotations
 
@@ -23,80 +23,82 @@ if TYPE_CHECKING:
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
 
-# A reader that fails so often without a good row between does not move on.
-FAILURES_IN_A_ROW = 1_000
+# After this number of failures in succession, the reader does not advance any more.
+MOST_FAILURES = 1_000
 
-# fiona's loggers; a filter acts on the very logger that emits, not on those below it.
+# Loggers of fiona: a filter acts only on the logger of a message, not on its parents.
 LOGGERS = ("fiona._env", "fiona._err", "fiona.collection", "fiona.ogrext")
-_heard: contextvars.ContextVar[list[logging.LogRecord] | None] = contextvars.ContextVar(
-    "_heard", default=None
+_records: contextvars.ContextVar[list[logging.LogRecord] | None] = contextvars.ContextVar(
+    "_records", default=None
 )
 
 
-def _hear(record: logging.LogRecord) -> bool:
-    heard = _heard.get()
-    if heard is None:
+def _capture(record: logging.LogRecord) -> bool:
+    records = _records.get()
+    if records is None:
         return True
-    heard.append(record)
+    records.append(record)
     return False
 
 
-# A filter and not a handler: another user of fiona in the process keeps its messages, and two
-# threads that read at once do not hear each other.
+# A filter and not a handler: other users of fiona in the process keep their messages, and threads
+# that read at the same time do not capture each other's messages.
 for _name in LOGGERS:
-    logging.getLogger(_name).addFilter(_hear)
+    logging.getLogger(_name).addFilter(_capture)
 
 
 @contextlib.contextmanager
-def _listening() -> Iterator[list[logging.LogRecord]]:
-    """Collect the messages of the block in the list that is given."""
-    heard: list[logging.LogRecord] = []
-    token = _heard.set(heard)
+def _captured_records() -> Iterator[list[logging.LogRecord]]:
+    """Collect the log records of the block in a list."""
+    records: list[logging.LogRecord] = []
+    token = _records.set(records)
     try:
-        yield heard
+        yield records
     finally:
-        _heard.reset(token)
+        _records.reset(token)
 
 
 def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, tuple[str, ...]]:
-    """Return the rows of a layer of `count` rows, what is wrong with bad ones, and notes."""
+    """Return the rows of a layer of `count` rows with errors of bad rows, and notes."""
     options: dict[str, Any] = {"enabled_drivers": [member.driver]}
-    if member.driver != GEOJSON:  # whose driver cannot select
+    if member.driver != GEOJSON:  # its driver cannot select fields
         options["include_fields"] = list(fields)
-    with _listening() as heard:
+    with _captured_records() as records:
         try:
             source = fiona.open(member.address, layer=member.layer, **options)
         except Exception as error:
             raise unreadable(member, error) from error
         with source:
-            # GDAL parses GeoJSON whole: what it says then belongs to no row.
-            rows = _rows(source, fields, count, heard if member.driver != GEOJSON else [])
-    blank = any(record.getMessage().startswith("Failed to decode") for record in heard)
-    return rows, (NOT_UTF8,) if blank else ()
+            # GDAL parses a GeoJSON file as a whole, so that its messages do not belong to a row.
+            rows = _rows(source, fields, count, records if member.driver != GEOJSON else [])
+    undecoded = any(record.getMessage().startswith("Failed to decode") for record in records)
+    return rows, (NOT_UTF8,) if undecoded else ()
 
 
 def _rows(
     source: Iterable[fiona.Feature],
     fields: Sequence[str],
     count: int,
-    heard: list[logging.LogRecord],
+    records: list[logging.LogRecord],
 ) -> Rows:
     rows = Rows()
     damage = ""
     features = iter(source)
     failures = 0
-    while failures < FAILURES_IN_A_ROW:
-        said = len(heard)
+    while failures < MOST_FAILURES:
+        start = len(records)
         try:
             feature = next(features, None)
-        except Exception as error:  # noqa: BLE001 - of many kinds, and one must not stop the rest
+        except Exception as error:  # noqa: BLE001 - any error; the other rows are read
             failures += 1
             rows.read += 1
             rows.errors[rows.read] = f"cannot be read ({error})"
             continue
         failures = 0
+        # Keep the first error that GDAL reports without an exception.
         if not damage:
-            errors = (r for r in itertools.islice(heard, said, None) if r.levelno >= logging.ERROR)
+            new_records = itertools.islice(records, start, None)
+            errors = (record for record in new_records if record.levelno >= logging.ERROR)
             damage = next((record.getMessage().rstrip(".") for record in errors), "")
         if feature is None:
             break
@@ -105,13 +107,13 @@ def _rows(
         rows.closed += feature.geometry is not None and _has_open_ring(feature.geometry)
         try:
             position = _position(feature.geometry)
-            # From the first damage on, GDAL gives null for what it cannot read.
+            # After the first damage, GDAL returns null for geometries that it cannot read.
             place: Position | str = (damage or None) if position is None else position
         except BadFeatureError as error:
             place = str(error)
         rows.add([properties[field] for field in fields], feature.id, place)
     if damage or failures:
-        rows.lose(count, damage or OUT_OF_REACH)
+        rows.mark_unreadable(count, damage or OUT_OF_REACH)
     return rows
 
 
@@ -120,17 +122,17 @@ def _position(geometry: fiona.Geometry | None) -> Position:
         return None
     if geometry.type == "Point":
         x, y = geometry.coordinates[:2]
-        # A GeoPackage writes an empty point as one of NaN.
+        # An empty point in a GeoPackage has NaN coordinates.
         return shapely.Point() if math.isnan(x) and math.isnan(y) else (x, y)
     try:
-        with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+        with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
             return shapely.geometry.shape(geometry)
     except (AttributeError, TypeError, ValueError, shapely.errors.ShapelyError) as error:
         raise BadFeatureError(f"its {geometry.type} is not valid ({error})") from error
 
 
 def _has_open_ring(geometry: fiona.Geometry) -> bool:
-    """Tell whether a ring of a polygon does not end where it begins; shapely closes it untold."""
+    """Whether a ring of a polygon is not closed; shapely closes it without a message."""
     if geometry.type not in {"Polygon", "MultiPolygon"}:
         return False
     parts = [geometry.coordinates] if geometry.type == "Polygon" else geometry.coordinates

@@ -1,4 +1,4 @@
-"""Layers of a vector file through pyogrio: what they are, and all their rows at once."""
+"""Describe and read layers of vector files with pyogrio, all rows at once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pyogrio
 import shapely
 from pyogrio.raw import open_arrow, read
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.csv_layer import NO_GEOMETRY
 from semsig_gis.sources.rows import Rows
 from semsig_gis.sources.vector.member import (
@@ -35,27 +35,27 @@ if TYPE_CHECKING:
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
 
-KINDS = dict(enumerate(("Point", "LineString", "Polygon", "MultiPoint", "MultiLineString",
+GEOMETRY_TYPES = dict(enumerate(("Point", "LineString", "Polygon", "MultiPoint", "MultiLineString",
                         "MultiPolygon"), start=1))  # fmt: skip
-"""The kinds of geometry by their numbers in well-known binary."""
+"""Geometry types by their codes in well-known binary."""
 POINT = 1
-RING = 4  # coordinates of the shortest ring
-DIMENSIONS = 0xE0000000  # the bits that say of a third and a fourth
-LARGEST_STEP = 65_536
+SHORTEST_RING = 4  # coordinates
+DIMENSION_BITS = 0xE0000000  # the flags of Z, M and SRID
+MOST_STEP_ROWS = 65_536
 LATIN = "ISO-8859-1"
-# A reader that fails so often without a good row between does not move on, and each of these
-# opens the file anew.
-FAILURES_IN_A_ROW = 20
+# After this number of failures in succession, the reader does not advance any more. Each attempt
+# opens the file again.
+MOST_FAILURES = 20
 CRS_SEARCH = "USE_OSR_FIND_MATCHES"
-# In FlatGeobuf, GDAL's faster way leaves it to chance where a missing geometry begins and ends.
+# GDAL's faster reader of FlatGeobuf returns random offsets for missing geometries.
 pyogrio.set_gdal_config_options({"OGR_FLATGEOBUF_STREAM_BASE_IMPL": True})
 
 
 @dataclass(frozen=True, slots=True)
 class LayerDescription:
-    """What GDAL says of a layer: kind of geometry, fields, CRS (empty if none), rows, bounds.
+    """Description of a layer by GDAL: geometry type, fields, CRS (empty if none), rows, bounds.
 
-    `bounds` are west, south, east, north in the unit of the CRS, None where nothing has a geometry.
+    `bounds` are west, south, east, north in the unit of the CRS, None without a geometry.
     """
 
     geometry: str
@@ -69,17 +69,17 @@ _lock = threading.RLock()
 
 
 @contextlib.contextmanager
-def _listening(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
-    """Collect the warnings of GDAL in the block, one thread at a time: Python has one list.
+def _captured_warnings(*, crs: bool = False) -> Iterator[list[warnings.WarningMessage]]:
+    """Collect the warnings of GDAL in the block, for one thread at a time.
 
-    Only if `crs`, GDAL looks for the CRS of a shapefile in all of PROJ's, which takes 50 ms.
+    With `crs`, GDAL compares the CRS of a shapefile with the database of PROJ, which takes 50 ms.
     """
-    with _lock, warnings.catch_warnings(record=True) as heard:
+    with _lock, warnings.catch_warnings(record=True) as captured:
         warnings.simplefilter("always")
         before = pyogrio.get_gdal_config_option(CRS_SEARCH)
         pyogrio.set_gdal_config_options({CRS_SEARCH: before if crs else False})
         try:
-            yield heard
+            yield captured
         finally:
             pyogrio.set_gdal_config_options({CRS_SEARCH: before})
 
@@ -88,7 +88,7 @@ def describe(member: Member) -> LayerDescription:
     """Describe a layer of a file; SourceError if it cannot be opened, or is of another kind."""
     member.require_sound()
     try:
-        with _listening(crs=True):
+        with _captured_warnings(crs=True):
             info = pyogrio.read_info(
                 member.address,
                 layer=member.layer,
@@ -112,7 +112,7 @@ def layer_names(member: Member) -> list[str]:
     """Return the names of the layers of a file."""
     member.require_sound()
     try:
-        with _listening():
+        with _captured_warnings():
             names = [str(name) for name, _ in pyogrio.list_layers(member.address)]
     except Exception as error:
         raise unreadable(member, error) from error
@@ -122,19 +122,20 @@ def layer_names(member: Member) -> list[str]:
 
 
 def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None:
-    """Return the rows of a layer of `count` rows, None if anything in it could be damaged.
+    """Return the rows of a layer of `count` rows, or None if a row may be damaged.
 
-    GDAL gives a missing geometry for one that it cannot read, and here does not say which it is.
+    GDAL returns a missing geometry also for a damaged one, without a distinction.
     """
     if count == 0:
         return Rows()
     try:
-        with _listening() as heard:
+        with _captured_warnings() as captured:
             names, values, shapes = _read(member, fields, 0, count)
         positions = _positions(shapes)
-    except Exception:  # noqa: BLE001 - of many kinds; the rows are read one by one then
+    except Exception:  # noqa: BLE001 - any error; the rows are read one by one then
         return None
-    if heard or (member.driver != GEOJSON and not all(shapes)):
+    # A warning, a missing geometry or a point of NaN may be damage.
+    if captured or (member.driver != GEOJSON and not all(shapes)):
         return None
     if member.driver != CONTAINER and any(map(_is_nowhere, positions)):
         return None
@@ -148,44 +149,45 @@ def read_whole(member: Member, fields: Sequence[str], count: int) -> Rows | None
 
 
 def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, tuple[str, ...]]:
-    """Return the rows of a layer of `count` rows, what is wrong with bad ones, and notes.
+    """Return the rows of a layer of `count` rows with errors of bad rows, and notes.
 
-    Rows are read in steps, which shrink where one fails, down to the rows that cannot be read.
+    Rows are read in blocks. A block that fails is divided until a single row fails.
     """
     rows = Rows()
-    blank: list[str] = []
-    meant = _null_shapes(member)
+    undecoded: list[str] = []
+    null_rows = _null_shapes(member)
     step, failures = count, 0
     while rows.read < count:
         step = min(step, count - rows.read)
         try:
-            with _listening():
-                names, values, shapes = _read(member, fields, rows.read, step, undecoded=blank)
-        except Exception as error:  # noqa: BLE001 - of many kinds, and one must not stop the rest
+            with _captured_warnings():
+                names, values, shapes = _read(member, fields, rows.read, step, undecoded=undecoded)
+        except Exception as error:  # noqa: BLE001 - any error; the other rows are read
             if step > 1:
                 step = max(1, step // 8)
                 continue
             rows.read += 1
             rows.errors[rows.read] = str(error).rstrip(".")
             failures += 1
-            if failures == FAILURES_IN_A_ROW:
-                rows.lose(count, OUT_OF_REACH)
+            if failures == MOST_FAILURES:
+                rows.mark_unreadable(count, OUT_OF_REACH)
             continue
         for name, row, shape in zip(names, values, shapes, strict=True):
             rows.read += 1
-            place = _place(rows, shape, null=meant is None or rows.read in meant)
+            place = _place(rows, shape, null=null_rows is None or rows.read in null_rows)
             empty = member.driver == CONTAINER and _is_nowhere(place)
             rows.add(row, name, shapely.Point() if empty else place)
-        step, failures = min(8 * step, LARGEST_STEP), 0
-    return rows, (NOT_UTF8,) if blank else ()
+        # After a success, try larger blocks again.
+        step, failures = min(8 * step, MOST_STEP_ROWS), 0
+    return rows, (NOT_UTF8,) if undecoded else ()
 
 
 def first_rows_of(member: Member, fields: Sequence[str], count: int) -> Iterator[dict[str, Any]]:
-    """Yield the values of the first rows of a layer, without those that cannot be read."""
+    """Yield the values of the first readable rows of a layer."""
     try:
-        with _listening():
+        with _captured_warnings():
             values = _read(member, fields, 0, count)[1]
-    except Exception:  # noqa: BLE001 - a load reports it; here the other rows will do
+    except Exception:  # noqa: BLE001 - any error; the readable rows are enough here
         values = read_each(member, fields, count)[0].values
     for value in values:
         yield dict(zip(fields, value, strict=True))
@@ -200,19 +202,19 @@ def _read(
     undecoded: list[str] | None = None,
     encoding: str | None = None,
 ) -> tuple[list[str], list[Sequence[Any]], list[bytes]]:
-    """Return names, values and well-known binary of rows, all of them; else an error is raised.
+    """Return names, values and well-known binary of `size` rows; raise if a row cannot be read.
 
-    Text that is not UTF-8 is an error, too, or None with its field added to `undecoded`. That of a
-    shapefile which does not state its encoding is Latin-1 then, for fiona as well.
+    Text that is not UTF-8 raises; with a list `undecoded` it becomes None and its field is added to
+    the list. A shapefile without a stated encoding is read as Latin-1 then, as fiona does.
     """
-    what: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
-    what |= {"skip_features": start}
+    options: dict[str, Any] = {"layer": member.layer, "columns": list(fields), "encoding": encoding}
+    options |= {"skip_features": start}
     with open_arrow(
-        member.address, return_fids=True, batch_size=size, use_pyarrow=True, **what
+        member.address, return_fids=True, batch_size=size, use_pyarrow=True, **options
     ) as (_, reader):
         table: Any = next(reader, ())
-    if len(table) != size:  # as Arrow's way ends at an error without a word, have it said
-        read(member.address, max_features=size, **what)
+    if len(table) != size:  # Arrow stops without a message; the other reader raises the error
+        read(member.address, max_features=size, **options)
         raise ValueError("cannot be read")
     columns = []
     for field in fields:
@@ -220,31 +222,27 @@ def _read(
             column = table.column(field)
             columns.append([_plain(value) for value in column.to_pylist()])
         except (KeyError, UnicodeDecodeError) as error:
-            if encoding is None and _encoding(member) == LATIN:
+            info = {} if encoding else pyogrio.read_info(member.address, layer=member.layer)
+            if info.get("encoding") == LATIN:
                 return _read(member, fields, start, size, encoding=LATIN)
             if undecoded is None or isinstance(error, KeyError):
                 raise
             undecoded.append(field)
-            columns.append([_text(value) for value in column.cast("binary").to_pylist()])
+            columns.append([_decoded(value) for value in column.cast("binary").to_pylist()])
     names = [str(number) for number in table.column(0).to_pylist()]
     rows: list[Sequence[Any]] = [*zip(*columns, strict=True)] if columns else [()] * size
-    # In a table without geometry that is another column, and nobody asks for places.
+    # The last column is the geometry; in a table without geometry nobody uses it.
     return names, rows, table.column(table.num_columns - 1).to_pylist()
 
 
-def _encoding(member: Member) -> str:
-    encoding: str = pyogrio.read_info(member.address, layer=member.layer)["encoding"]
-    return encoding
-
-
 def _plain(value: object) -> object:
-    """Return dates and times as ISO 8601 writes them, without a time zone."""
+    """Return dates and times as text in ISO 8601 without a time zone, others unchanged."""
     if isinstance(value, dt.datetime):
         return value.replace(tzinfo=None).isoformat()
     return value.isoformat() if isinstance(value, dt.date | dt.time) else value
 
 
-def _text(value: bytes | None) -> str | None:
+def _decoded(value: bytes | None) -> str | None:
     try:
         return None if value is None else value.decode()
     except UnicodeDecodeError:
@@ -252,10 +250,10 @@ def _text(value: bytes | None) -> str | None:
 
 
 def _positions(shapes: Sequence[bytes]) -> list[Position]:
-    """Return what well-known binary says; GEOSException if any of it is not valid."""
+    """Return the positions of well-known binary; GEOSException if a geometry is not valid."""
     positions: list[Position] = [_point(shape) for shape in shapes]
     others = [row for row, shape in enumerate(shapes) if shape and positions[row] is None]
-    with np.errstate(invalid="ignore"):  # NaN is looked for in all geometries at once
+    with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
         built = shapely.force_2d(shapely.from_wkb([shapes[row] for row in others]))
     for row, geometry in zip(others, built, strict=True):
         positions[row] = geometry
@@ -263,7 +261,10 @@ def _positions(shapes: Sequence[bytes]) -> list[Position]:
 
 
 def _point(shape: bytes) -> Position:
-    """Return the coordinates of a point, of which shapely takes one without x for empty."""
+    """Return the coordinates of a point, else None.
+
+    Shapely is not used, because it returns a point with x = NaN as empty.
+    """
     if not shape or _kind(shape) != POINT:
         return None
     x, y = struct.unpack_from("<2d" if shape[0] else ">2d", shape, 5)
@@ -271,17 +272,17 @@ def _point(shape: bytes) -> Position:
 
 
 def _is_nowhere(position: Position | str) -> bool:
-    """Tell whether GDAL gives a point as one of NaN: in a GeoPackage it is empty, else damaged."""
+    """Whether a point has NaN coordinates: in a GeoPackage it is empty, else damaged."""
     return isinstance(position, tuple) and math.isnan(position[0]) and math.isnan(position[1])
 
 
 def _kind(shape: bytes) -> int:
     (code,) = struct.unpack_from("<I" if shape[0] else ">I", shape, 1)
-    return int(code & ~DIMENSIONS) % 1000
+    return int(code & ~DIMENSION_BITS) % 1000
 
 
 def _place(rows: Rows, shape: bytes, *, null: bool) -> Position | str:
-    """Return the position of a row, or what is wrong with it."""
+    """Return the position of a row, or the text of its error."""
     if not shape:
         return None if null else "its geometry is damaged"
     try:
@@ -290,17 +291,18 @@ def _place(rows: Rows, shape: bytes, *, null: bool) -> Position | str:
         with np.errstate(invalid="ignore"):
             closed = shapely.from_wkb(shape, on_invalid="fix")
         rings = shapely.get_rings(shapely.get_parts(closed))
-        if not len(rings) or (shapely.get_num_coordinates(rings) < RING).any():
-            return f"its {KINDS.get(_kind(shape), 'geometry')} is not valid ({error})"
+        if not len(rings) or (shapely.get_num_coordinates(rings) < SHORTEST_RING).any():
+            return f"its {GEOMETRY_TYPES.get(_kind(shape), 'geometry')} is not valid ({error})"
         rows.closed += 1
         return shapely.force_2d(closed)
 
 
 def _null_shapes(member: Member) -> set[int] | None:
-    """Return the rows of a shapefile whose geometry is null and not damaged; None if not needed."""
+    """Return the rows of a shapefile with a null geometry; None for other formats."""
     if member.driver != SHAPEFILE:
         return None
-    with member.open() as stream, member.beside(".shx").open() as index:
+    with member.open() as stream, member.sibling(".shx").open() as index:
         content, starts = stream.read(), np.frombuffer(index.read()[100:], dtype=">i4")[::2]
+    # The geometry type follows the 8 bytes of the header of a record; 0 is null.
     kinds = ((row, content[8 + 2 * start : 12 + 2 * start]) for row, start in enumerate(starts, 1))
     return {row for row, kind in kinds if kind == bytes(4)}

@@ -1,7 +1,7 @@
-"""Vector files: one driver of GDAL a suffix, whole layers at once, bad rows counted.
+"""Read vector files, each suffix with one driver of GDAL; count and report bad rows.
 
-pyogrio reads a layer whole. Where anything in it could be damaged, fiona reads it again row by row
-and says what is wrong with which; where fiona is not installed, pyogrio does that, too.
+pyogrio reads a layer as a whole. If a row may be damaged, fiona reads the layer again row by row
+and reports the error of each row; without fiona, pyogrio does it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core.errors import SourceError, UnknownNameError, nearest_name
-from semsig_gis.core.geometry import crs_label
+from semsig_gis.core import SourceError, UnknownNameError, crs_label, nearest_name
 from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.rows import (
     WGS84,
@@ -25,6 +24,7 @@ from semsig_gis.sources.rows import (
     settle_crs,
     usable_crs,
 )
+from semsig_gis.sources.vector import by_pyogrio
 from semsig_gis.sources.vector.by_pyogrio import (
     describe,
     first_rows_of,
@@ -32,7 +32,7 @@ from semsig_gis.sources.vector.by_pyogrio import (
     read_whole,
 )
 from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
-from semsig_gis.storage.text import parse_json
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -50,9 +50,10 @@ WGS84_NAMES = re.compile(r"4326|CRS84|WGS ?84", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class LayerInfo:
-    """What one layer of a file is: its name, kind, CRS, number of rows, and fields.
+    """Name, geometry type, CRS, number of rows and fields of a layer of a file.
 
-    `geometry` is GDAL's word, ``"Point"`` for a CSV file with coordinates; `crs` is a code or name.
+    `geometry` is a term of GDAL, ``"Point"`` for a CSV file with coordinates; `crs` is a code or
+    name.
     """
 
     name: str
@@ -63,7 +64,7 @@ class LayerInfo:
 
 
 def list_layers(path: str | Path) -> tuple[LayerInfo, ...]:
-    """List the layers of a vector file or archive, in its order; SourceError if it is none."""
+    """List the layers of a vector file or archive; SourceError for another file."""
     return tuple(_describe(member) for member in _layers(Path(path)))
 
 
@@ -72,26 +73,26 @@ def read_layer(
 ) -> RawLayer:
     r"""Read one layer of a vector file.
 
-    A row that cannot be read is counted and reported, and the rest are read.
-    The file's own CRS is used; those of `spec` and `crs` are for a file without one. GeoJSON
-    without a ``crs`` member counts as such a file: it is WGS 84 only if no other is given and the
-    coordinates fit.
+    A row that cannot be read is counted and reported, and the other rows are read.
+    The CRS of the file has priority; the CRS of `spec` and `crs` apply to a file without one.
+    GeoJSON without a ``crs`` member is such a file: it is WGS 84 only if no CRS is given and the
+    coordinates are in its range.
 
     Parameters
     ----------
     path : str or Path
         A shapefile, GeoJSON, GeoPackage, FlatGeobuf or CSV file, or an archive of such.
     spec : LayerSpec
-        Which layer and rows are wanted, and what they are.
+        Description of the layer, its rows and their class.
     filters : bool, default True
-        Whether the specification's ``where`` is applied.
+        Whether ``where`` of the specification applies.
     crs : str, optional
-        CRS of a file that states none; it overrides the specification's.
+        CRS of a file that states none; it overrides the CRS of the specification.
 
     Returns
     -------
     RawLayer
-        The features in the CRS of the file, and notes where the file is not as expected.
+        The features in the CRS of the file, and notes on differences from the expectation.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def read_layer(
     UnknownNameError, CatalogError
         If the file does not have the layer, or a field, that `spec` names.
     CrsError
-        If nobody states the CRS, or it is in degrees and most coordinates cannot be.
+        If there is no CRS, or it is in degrees and most coordinates are out of range.
 
     Examples
     --------
@@ -117,8 +118,8 @@ def read_layer(
     """
     where = f"layer {spec.name!r} ({path})"
     member = _pick(Path(path), spec.layer)
-    if (lines := _csv(member, spec, where=where)) is not None:
-        return read_csv_layer(lines, spec, filters=filters, crs=crs, where=where)
+    if (csv := _csv(member, spec, where=where)) is not None:
+        return read_csv_layer(csv, spec, filters=filters, crs=crs, where=where)
     layer = describe(member)
     if layer.geometry == NO_GEOMETRY:
         raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
@@ -129,7 +130,7 @@ def read_layer(
 
 @dataclass(frozen=True, slots=True)
 class TableRows:
-    """The rows of a layer of a file, with the values of some `fields`, in the CRS that holds."""
+    """Rows of a layer with the values of some `fields`, and the CRS of their positions."""
 
     fields: tuple[str, ...]
     rows: Rows
@@ -146,9 +147,8 @@ def read_tables(
 ) -> Iterator[TableRows]:
     """Yield the rows of layers with the fields that `choose` returns; none if it returns none."""
     for member, layer in layers:
-        chosen = choose(layer.fields)
-        if chosen:
-            fields = tuple(field for field in layer.fields if field in chosen)
+        if names := choose(layer.fields):
+            fields = tuple(field for field in layer.fields if field in names)
             yield _read_member(member, layer, fields, expected=None, given=crs, where=str(member))
 
 
@@ -179,27 +179,28 @@ def _read_member(
     given: str | None,
     where: str,
 ) -> TableRows:
-    """Read a layer of a file whose CRS is its own, or `given` by the user, or `expected`."""
+    """Read a layer; its CRS is that of the file, or the `given` one, or the `expected` one."""
     own, implicit = _own_crs(member, layer)
     system, notes = settle_crs(own, implicit=implicit, expected=expected, given=given, where=where)
     rows = read_whole(member, fields, layer.rows)
     if rows is None:
-        rows, more = _read_each(member, fields, layer.rows)
+        rows, more = _row_reader()(member, fields, layer.rows)
         notes += more
     if member.driver == GEOJSON:
-        _refuse_broken(rows, member)
+        _mark_invalid(rows, member)
     return TableRows(fields, rows, system, own is not None and not implicit, notes)
 
 
-def _read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, tuple[str, ...]]:
-    """Read a layer row by row, with fiona where it is installed."""
+def _row_reader() -> Callable[[Member, Sequence[str], int], tuple[Rows, tuple[str, ...]]]:
+    """Return the function that reads a layer row by row, of fiona if it is installed."""
     try:
-        from semsig_gis.sources.vector.by_fiona import read_each  # noqa: PLC0415 - loads slowly
+        # fiona takes 190 ms to import, and is needed only for damaged files.
+        from semsig_gis.sources.vector.by_fiona import read_each  # noqa: PLC0415
     except ModuleNotFoundError as error:
         if error.name != "fiona":
             raise
-        from semsig_gis.sources.vector.by_pyogrio import read_each  # noqa: PLC0415
-    return read_each(member, fields, count)
+        return by_pyogrio.read_each
+    return read_each
 
 
 def read_layers(
@@ -212,7 +213,7 @@ def read_layers(
 def first_rows(
     path: Path, *, limit: int
 ) -> Iterator[tuple[LayerInfo, tuple[Mapping[str, Any], ...], tuple[str, ...]]]:
-    """Yield every layer of a file, its first readable rows, and its coordinate columns if any."""
+    """Yield each layer of a file, its first readable rows, and its columns of coordinates."""
     for member in _layers(path):
         table = _csv(member, None, where=str(member))
         info = _describe(member)
@@ -220,9 +221,9 @@ def first_rows(
             count = min(limit, info.rows)
             yield info, tuple(first_rows_of(member, info.fields, count)), ()
             continue
-        good = (row for row in table.rows() if not isinstance(row, str))
+        readable = (row for row in table.rows() if not isinstance(row, str))
         coordinates = (table.x, table.y) if table.x and table.y else ()
-        yield info, tuple(itertools.islice(good, limit)), coordinates
+        yield info, tuple(itertools.islice(readable, limit)), coordinates
 
 
 def _layers(path: Path) -> tuple[Member, ...]:
@@ -236,23 +237,23 @@ def _layers(path: Path) -> tuple[Member, ...]:
     return tuple(layers)
 
 
-def _pick(path: Path, wanted: str | None) -> Member:
-    """Return the layer that a specification means."""
+def _pick(path: Path, name: str | None) -> Member:
+    """Return the layer of a name, or the only layer; SourceError if there are several."""
     files = members(path)
-    if wanted is None and len(files) == 1 and files[0].driver != CONTAINER:
+    if name is None and len(files) == 1 and files[0].driver != CONTAINER:
         return files[0]
     layers = _layers(path)
-    if wanted is None and len(layers) > 1:
-        # A GeoPackage keeps its styles in a table without geometry, which is never meant.
+    if name is None and len(layers) > 1:
+        # Ignore tables without geometry, such as the styles in a GeoPackage.
         with_geometry = [item for item in layers if _describe(item).geometry != NO_GEOMETRY]
         layers = tuple(with_geometry) or layers
     names = [str(member.layer) for member in layers]
-    matches = [item for item in layers if wanted is None or item.layer == wanted]
+    matches = [item for item in layers if name is None or item.layer == name]
     if len(matches) == 1:
         return matches[0]
-    if wanted is not None and not matches:
+    if name is not None and not matches:
         raise UnknownNameError(
-            f"{path} has no layer {wanted!r}{nearest_name(wanted, names)}; "
+            f"{path} has no layer {name!r}{nearest_name(name, names)}; "
             f"its layers are {', '.join(names)}."
         )
     raise SourceError(
@@ -261,7 +262,7 @@ def _pick(path: Path, wanted: str | None) -> Member:
 
 
 def _csv(member: Member, spec: LayerSpec | None, *, where: str) -> CsvTable | None:
-    """Look at a CSV file, which GDAL does not read here; None for a file of another kind."""
+    """Return the table of a CSV file, which is read without GDAL; None for other formats."""
     if member.driver != CSV:
         return None
     try:
@@ -295,19 +296,19 @@ def _describe(member: Member) -> LayerInfo:
 
 
 def _own_crs(member: Member, layer: LayerDescription) -> tuple[CRS | None, bool]:
-    """Return the CRS of a layer, and whether it is only what GeoJSON means by saying nothing."""
+    """Return the CRS of a layer, and whether it is only the default of GeoJSON."""
     own = usable_crs(layer.crs)
     if member.driver == GEOJSON:
         document = _geojson(member)
         if "crs" not in document:
             return WGS84, True
         if own == WGS84 and not WGS84_NAMES.search(str(document["crs"])):
-            return None, False  # GDAL takes what it does not understand for WGS 84
+            return None, False  # GDAL reads an unknown CRS as WGS 84
     return own, False
 
 
 def _geojson(member: Member) -> dict[str, Any]:
-    """Return what a GeoJSON file holds; SourceError for what GDAL alone takes for JSON."""
+    """Parse a GeoJSON file; SourceError if it is not valid JSON, which GDAL may accept."""
     try:
         with member.open() as stream:
             document = parse_json(stream.read().decode("utf-8-sig", errors="replace"))
@@ -316,8 +317,8 @@ def _geojson(member: Member) -> dict[str, Any]:
     return document if isinstance(document, dict) else {}
 
 
-def _refuse_broken(rows: Rows, member: Member) -> None:
-    """Tell the null geometries of a GeoJSON file from those that GDAL could make nothing of."""
+def _mark_invalid(rows: Rows, member: Member) -> None:
+    """Mark the rows of a GeoJSON file whose geometry is not null but could not be read."""
     null = [row for row, position in enumerate(rows.positions) if position is None]
     if not null:
         return
@@ -325,14 +326,14 @@ def _refuse_broken(rows: Rows, member: Member) -> None:
     listed = document.get("features", [document])
     features = [item for item in listed if isinstance(item, dict) and item.get("type") == "Feature"]
     if len(features) != rows.read:
-        return  # GDAL counts otherwise, so that rows cannot be told apart
+        return  # GDAL counts differently, so that rows cannot be assigned
     for row in null:
-        if not _is_nothing(features[rows.numbers[row] - 1].get("geometry")):
+        if not _is_empty(features[rows.numbers[row] - 1].get("geometry")):
             rows.positions[row] = "its geometry is not valid GeoJSON"
 
 
-def _is_nothing(geometry: object) -> bool:
-    """Tell whether a GeoJSON geometry is null or properly empty."""
+def _is_empty(geometry: object) -> bool:
+    """Whether a GeoJSON geometry is null or valid and empty."""
     if not isinstance(geometry, dict):
         return geometry is None
     return _is_blank(geometry.get("coordinates", geometry.get("geometries")))

@@ -1,4 +1,4 @@
-"""The parts of a vector file, itself or the files in an archive, and whether they are sound."""
+"""Members of a vector file: the file itself, or the vector files in an archive."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from semsig_gis.core.errors import SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
 from semsig_gis.sources.paths import require_file
 
 CSV = "CSV"
 GEOJSON = "GeoJSON"
 SHAPEFILE = "ESRI Shapefile"
-CONTAINER = "GPKG"  # the one driver whose files hold several layers
-# The only drivers that may open a file: GDAL has some eighty, and a few of them follow links.
-DRIVERS = {
+CONTAINER = "GPKG"  # the only driver with several layers in a file
+# The only drivers that may open a file: GDAL has about 80, and some of them follow links.
+DRIVERS: dict[str, str] = {
     ".csv": CSV,
     ".fgb": "FlatGeobuf",
     ".geojson": GEOJSON,
@@ -28,23 +28,23 @@ DRIVERS = {
     ".json": GEOJSON,
     ".shp": SHAPEFILE,
 }
-# What is said of rows by both readers.
+# Messages of both readers.
 NOT_UTF8 = "some text is not UTF-8 and was read as missing"
 OUT_OF_REACH = "out of reach behind unreadable rows"
-# How their files begin, GeoJSON after white space.
-BEGINNINGS = {
+# First bytes of a file by driver, of GeoJSON after white space.
+FIRST_BYTES = {
     "FlatGeobuf": b"fgb",
     GEOJSON: b"{",
     CONTAINER: b"SQLite format 3\0",
     SHAPEFILE: b"\x00\x00\x27\x0a",
 }
-# In an archive beside other data, these hold a legend or metadata.
+# In an archive with other data, these files contain a legend or metadata.
 SIDE_SUFFIXES = frozenset({".csv", ".json"})
 
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One layer of a file, or of the file `inner` of an archive; `layer` is None until known."""
+    """A layer of a file, or of the file `inner` of an archive; None is the first layer."""
 
     file: Path
     inner: str | None
@@ -57,18 +57,18 @@ class Member:
 
     @property
     def address(self) -> str:
-        """What GDAL opens."""
+        """Path that GDAL opens."""
         if self.inner is None:
             file = str(self.file)
-            # pyogrio takes what stands before a '!' for an archive, and a ';' for the end of the
-            # name, but not in GDAL's own forms.
+            # pyogrio takes the part before a '!' for an archive, and a ';' for the end of the name,
+            # except in GDAL's own forms.
             escaped = file.replace("%", "%25").replace("&", "%26")
             return f"/vsicached?file={escaped}" if {"!", ";"} & {*file} else file
-        # GDAL's own form: zip:// is parsed as a URL and loses what follows a '#' or a '?'.
+        # GDAL's own form, because zip:// is parsed as a URL and cut at a '#' or a '?'.
         return f"/vsizip/{{{self.file.resolve().as_posix()}}}/{self.inner}"
 
     def __str__(self) -> str:
-        """Return the name as messages say it."""
+        """Return the name for messages."""
         return str(self.file) if self.inner is None else f"{self.inner} in {self.file}"
 
     def open(self) -> IO[bytes]:
@@ -78,14 +78,14 @@ class Member:
         with zipfile.ZipFile(self.file) as archive:
             return archive.open(self.inner)
 
-    def beside(self, suffix: str) -> Member:
+    def sibling(self, suffix: str) -> Member:
         """Return the file of the same name with another suffix."""
         if self.inner is None:
             return Member(self.file.with_suffix(suffix), None)
         return Member(self.file, str(PurePosixPath(self.inner).with_suffix(suffix)))
 
     def require_sound(self) -> None:
-        """Raise SourceError for content of another kind, which another driver would open."""
+        """Raise SourceError if the content does not match the suffix, or is damaged."""
         try:
             with self.open() as stream:
                 start = stream.read(4096)
@@ -93,19 +93,19 @@ class Member:
             raise unreadable(self, error) from error
         if self.driver == GEOJSON:
             start = start.removeprefix(b"\xef\xbb\xbf").lstrip()
-        if not start.startswith(BEGINNINGS[self.driver]):
+        if not start.startswith(FIRST_BYTES[self.driver]):
             raise not_of_its_kind(self)
         if self.driver == CONTAINER and self.inner is None:
             _refuse_damaged(self.file)
 
 
 def not_of_its_kind(what: object) -> SourceError:
-    """Return the plain sentence for a file whose content belies its name."""
+    """Return the error for a file with content that does not match its suffix."""
     return SourceError(f"{what} is not the kind of file that its name says; download it again.")
 
 
 def unreadable(what: object, error: BaseException) -> SourceError:
-    """Return the plain sentence for what a library raised on opening something."""
+    """Return the error for an exception that a library raised when it opened a file."""
     if isinstance(error, UnicodeDecodeError):
         return SourceError(f"{what} is not UTF-8 text; save it as UTF-8.")
     cause = " ".join(str(error.__cause__ or error).split()).rpartition(" failed: ")[2].rstrip(".")
@@ -115,7 +115,7 @@ def unreadable(what: object, error: BaseException) -> SourceError:
 
 
 def members(path: Path) -> tuple[Member, ...]:
-    """Return the parts of a file that hold layers: itself, or the vector files in an archive."""
+    """Return the members of a file: the file itself, or the vector files in an archive."""
     suffix = path.suffix.lower()
     require_file(path, "a vector file")
     suffixes = {*DRIVERS, ".zip"}
@@ -127,7 +127,7 @@ def members(path: Path) -> tuple[Member, ...]:
     return tuple(Member(path, name) for name in inner)
 
 
-# What zipfile raises at damaged archives.
+# Exceptions of zipfile for damaged archives.
 _ZIP_FAULTS = (
     *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
     *(struct.error, zipfile.BadZipFile, zlib.error),
@@ -135,14 +135,13 @@ _ZIP_FAULTS = (
 
 
 def _archived(path: Path) -> tuple[str, ...]:
-    """Return the names of the vector files in an archive whose checksums hold."""
+    """Return the names of the vector files in an archive; SourceError if it is damaged."""
     try:
         with zipfile.ZipFile(path) as archive:
             items = [item for item in archive.infolist() if not item.is_dir()]
             for item in items:
                 if ratio_too_high(item.compress_size, item.file_size):
-                    what = f"{item.filename} in {path}"
-                    raise decompression_bomb_error(what)
+                    raise decompression_bomb_error(f"{item.filename} in {path}")
             names = [item.filename for item in items]
             broken = archive.testzip()
     except SourceError:
@@ -166,12 +165,12 @@ def _archived(path: Path) -> tuple[str, ...]:
 
 
 def _refuse_damaged(path: Path) -> None:
-    """Refuse a damaged GeoPackage, of which GDAL says things at which its readers crash."""
+    """Refuse a damaged GeoPackage; with the messages of GDAL its readers would crash."""
     try:
         with contextlib.closing(
             sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
-        ) as f:
-            verdict = f.execute("PRAGMA quick_check(1)").fetchone()[0]
+        ) as connection:
+            verdict = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
     except UnicodeDecodeError:
         verdict = "a name in it is not UTF-8 text"
     except sqlite3.Error as error:

@@ -20,20 +20,20 @@ from pandas.testing import assert_frame_equal
 from sentences import refused
 from worlds import CORNER, TOWN, World, contents, save_town
 
-from semsig_gis.core.errors import DatabaseError, InputError, SemsigError
-from semsig_gis.core.temporary import MACHINE_PREFIX
-from semsig_gis.evaluation.experiments import run
-from semsig_gis.evaluation.experiments.run import (
+from semsig_gis.core import MACHINE_PREFIX, DatabaseError, InputError, SemsigError
+from semsig_gis.evaluation import (
+    Districts,
     ExperimentWork,
     Part,
+    evaluate,
     open_results,
+    parse_experiment,
     run_experiment,
     run_experiments,
+    score_queries,
 )
-from semsig_gis.evaluation.scoring import evaluate, score_queries
-from semsig_gis.evaluation.spec import Districts, parse_experiment
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.locator import parse_method
+from semsig_gis.evaluation.experiments import run
+from semsig_gis.localization import Method, parse_method
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -41,8 +41,7 @@ if TYPE_CHECKING:
 
     from distributed import LocalCluster
 
-    from semsig_gis.evaluation.queries.draw import Query
-    from semsig_gis.evaluation.spec import ExperimentSpec
+    from semsig_gis.evaluation import ExperimentSpec, Query
 
 PART_QUERIES = 10
 SPEC = parse_experiment("""

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.sources.catalog import paper_taxonomy
+from semsig_gis.evaluation import published as paris
+from semsig_gis.localization import Method
+from semsig_gis.sources import paper_taxonomy
 
 SIGNATURES = 312_134
 

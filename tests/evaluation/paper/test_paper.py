@@ -9,21 +9,20 @@ import pytest
 from sentences import refused
 from worlds import QUERIES, TOWN, contents, save_town
 
-from semsig_gis.core.errors import InputError, SemsigError
-from semsig_gis.database.file import open_database, save_database
-from semsig_gis.evaluation.paper import figures as paris
-from semsig_gis.evaluation.paper.reproduction import paper_experiments, reproduce, time_queries
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.reports.paper.report import reproduction_report
-from semsig_gis.sources.synthetic.city import CitySpec
+from semsig_gis.core import InputError, SemsigError
+from semsig_gis.database import open_database, save_database
+from semsig_gis.evaluation import paper_experiments, reproduce, time_queries
+from semsig_gis.evaluation import published as paris
+from semsig_gis.localization import Method, score_cells
+from semsig_gis.reports import reproduction_report
+from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.evaluation.paper.reproduction import Reproduction
-    from semsig_gis.reports.report_model import Number, Report
+    from semsig_gis.evaluation import Reproduction
+    from semsig_gis.reports import Number, Report
 
 
 def test_everything_that_the_paper_runs_is_there(snapshot: Callable[[str, str], None]) -> None:

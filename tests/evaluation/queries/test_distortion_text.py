@@ -17,15 +17,9 @@ from sentences import refused
 from sights import CITY, CLASSES, many, paper_errors, rows, seeds, sights
 from worlds import random_town
 
-from semsig_gis.core.errors import CrsError, InputError, UnknownNameError
-from semsig_gis.core.signature import Signature
-from semsig_gis.evaluation.queries.distortion_text import (
+from semsig_gis.core import CrsError, InputError, Signature, UnknownNameError
+from semsig_gis.evaluation import (
     NAMED_DISTORTIONS,
-    chain_text,
-    parse_chain,
-    ready_chain,
-)
-from semsig_gis.evaluation.queries.distortions import (
     BlockedSectors,
     ClassScores,
     CompassBias,
@@ -35,21 +29,24 @@ from semsig_gis.evaluation.queries.distortions import (
     HiddenBehind,
     MissingClasses,
     Obstacles,
+    QuerySpec,
     RoughRanges,
+    chain_text,
     distort,
+    draw_queries,
     named_distortion,
+    parse_chain,
+    ready_chain,
 )
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.localization.noise.model import NOISES, NoiseSpec
+from semsig_gis.localization import NOISES, NoiseSpec
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from semsig_gis.core.errors import SemsigError
-    from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
-    from semsig_gis.evaluation.queries.true_view import Sight
+    from semsig_gis.core import SemsigError
+    from semsig_gis.evaluation import QueryDistortion, Sight
 
 MINE = NoiseSpec(detection=0.7, name="mine")
 KNOWN = {**NOISES, "mine": MINE}

@@ -28,12 +28,11 @@ from sights import (
     sights,
 )
 
-from semsig_gis.core.geometry import angular_distance
-from semsig_gis.core.signature import Signature
-from semsig_gis.evaluation.queries.distortion_text import parse_chain, ready_chain
-from semsig_gis.evaluation.queries.distortions import (
+from semsig_gis.core import Signature, angular_distance
+from semsig_gis.evaluation import (
     DISTORTIONS,
     BlockedSectors,
+    CitySights,
     ClassScores,
     CompassBias,
     Detector,
@@ -44,22 +43,25 @@ from semsig_gis.evaluation.queries.distortions import (
     Obstacles,
     RoughRanges,
     distort,
+    parse_chain,
+    ready_chain,
 )
-from semsig_gis.evaluation.queries.true_view import CitySights
-from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, named_noise
-from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
-from semsig_gis.observation.view import FULL_VIEW, View
+from semsig_gis.localization import (
+    LONGEST_TABLE,
+    NoiseMixture,
+    NoiseSpec,
+    named_noise,
+    noise_tables,
+)
+from semsig_gis.observation import FULL_VIEW, View
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.evaluation.queries.distortion_text import QueryDistortion
-    from semsig_gis.evaluation.queries.distortions import FalseClass
-    from semsig_gis.evaluation.queries.true_view import Sight
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.evaluation import FalseClass, QueryDistortion, Sight
+    from semsig_gis.localization import Noise, NoiseTable
 
 # --- What is seen -----------------------------------------------------------------------------
 

@@ -14,21 +14,17 @@ from noisy_cells import parts_of
 from sentences import refused
 from worlds import CORNER, TAXONOMY, World, random_town
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.taxonomy import Taxonomy
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.database.viewpoints import ViewpointSpec
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.objects.load import assemble, choose_layers, read_files
-from semsig_gis.sources.catalog import load_catalog
+from semsig_gis.core import InputError, Taxonomy
+from semsig_gis.database import ObjectStore, ViewpointSpec, build_database
+from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain
+from semsig_gis.objects import assemble, choose_layers, read_files
+from semsig_gis.sources import load_catalog
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.queries.draw import Query, SeenFrom
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Query, SeenFrom
 
 TOWN = random_town()
 DATABASE = TOWN.database

@@ -8,18 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.geometry import FULL_TURN
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.metrics import METRICS
-from semsig_gis.localization.distance.metrics.edit import EditWeights
-from semsig_gis.localization.likelihood.method import LikelihoodMethod
-from semsig_gis.localization.locator import parse_method
-from semsig_gis.localization.noise.model import NOISES, NoiseSpec
-from semsig_gis.observation.view import LEAST_TURN
+from semsig_gis.core import FULL_TURN, InputError, UnknownNameError
+from semsig_gis.localization import (
+    METRICS,
+    NOISES,
+    EditWeights,
+    LikelihoodMethod,
+    Method,
+    NoiseSpec,
+    parse_method,
+)
+from semsig_gis.observation import LEAST_TURN
 
 if TYPE_CHECKING:
-    from semsig_gis.core.errors import SemsigError
+    from semsig_gis.core import SemsigError
 
 
 TEXTS = """

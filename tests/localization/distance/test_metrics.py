@@ -15,15 +15,15 @@ from hypothesis import strategies as st
 from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.sequences import SequenceTable
-from semsig_gis.localization.distance.metrics import METRICS, edit, metric
-from semsig_gis.localization.distance.metrics.edit import BLOCK, BitPlanes, EditWeights
+from semsig_gis.core import InputError
+from semsig_gis.database import SequenceTable
+from semsig_gis.localization import BLOCK_SEQUENCES, METRICS, BitPlanes, EditWeights, metric
+from semsig_gis.localization.distance.metrics import edit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.localization.distance.metrics import Distances
+    from semsig_gis.localization import Distances
 
     Bytes = NDArray[np.uint8]
 
@@ -201,7 +201,7 @@ def test_the_kernel_and_rapidfuzz_agree(
     measure = partial(edit.distances, queries, table, normalized=normalized)
     expected = measure()
     assert table not in edit._planes
-    monkeypatch.setattr(edit, "_LOADING", 0)
+    monkeypatch.setattr(edit, "_VALUES_OF_LOADING", 0)
     np.testing.assert_array_equal(measure(only=few), expected[:, few])
     assert table not in edit._planes
     np.testing.assert_array_equal(measure(), expected)
@@ -212,7 +212,7 @@ def test_the_kernel_and_rapidfuzz_agree(
 def test_a_large_table_gets_the_kernel_when_it_is_asked_again(
     monkeypatch: pytest.MonkeyPatch, table: SequenceTable
 ) -> None:
-    monkeypatch.setattr(edit, "_LARGE", len(table.values))
+    monkeypatch.setattr(edit, "_LARGE_TABLE_VALUES", len(table.values))
     first = edit.distances([table[3]], table)
     assert table not in edit._planes
     np.testing.assert_array_equal(edit.distances([table[3]], table), first)
@@ -287,9 +287,9 @@ def test_equals_rapidfuzz(*, normalized: bool, seed: int, longest: int, values: 
 
 @scaled
 def test_several_blocks_and_a_thousand_objects(*, normalized: bool) -> None:
-    rows = sorted(random_rows(3, 2 * BLOCK, 30, 11), key=len)
+    rows = sorted(random_rows(3, 2 * BLOCK_SEQUENCES, 30, 11), key=len)
     rows += random_rows(4, 3, 1000, 255)
-    queries = [rows[0], rows[BLOCK], rows[-1], np.tile(rows[-2], 3)[:1000], rows[5][:0]]
+    queries = [rows[0], rows[BLOCK_SEQUENCES], rows[-1], np.tile(rows[-2], 3)[:1000], rows[5][:0]]
     planes = BitPlanes.build(*flat(rows))
     found = planes.edit_distances(queries, normalized=normalized)
     np.testing.assert_array_equal(found, by_rapidfuzz(queries, rows, normalized=normalized))
@@ -317,7 +317,7 @@ def test_neither_sequences_nor_queries() -> None:
 
 @pytest.mark.parametrize(("values", "bits"), [(11, 8), (16, 9), (256, 33)])
 def test_planes_need_few_bits_an_object(values: int, bits: int) -> None:
-    rows = np.resize(np.arange(values), 20 * BLOCK).astype(np.uint8)
+    rows = np.resize(np.arange(values), 20 * BLOCK_SEQUENCES).astype(np.uint8)
     planes = BitPlanes.build(rows, np.arange(0, len(rows) + 1, 20))
     assert planes.planes.nbytes * 8 == bits * len(rows)
     assert not planes.planes.flags.writeable

@@ -10,17 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import METHODS, NOTHING, asked, database_of, random_cells
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.localization.distance.memo import DistanceMemo
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.metrics import metric
-from semsig_gis.localization.distance.scores import _MANY_QUERIES, score_cells
+from semsig_gis.core import InputError, Signature
+from semsig_gis.localization import DistanceMemo, Method, metric, score_cells
+from semsig_gis.localization.distance.scores import _MANY_QUERIES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 CITY = database_of(random_cells(400))

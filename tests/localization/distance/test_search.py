@@ -17,19 +17,14 @@ from pyproj import Transformer
 from sentences import refused
 from worlds import random_town
 
-from semsig_gis.core.errors import EmptyResultError, InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.file import PartitionedDatabase, open_database, save_database
-from semsig_gis.localization.distance.method import Method
-from semsig_gis.localization.distance.scores import score_cells
-from semsig_gis.localization.distance.search import DistanceLocator
-from semsig_gis.localization.locator import localize
-from semsig_gis.localization.requirement import Requirement
+from semsig_gis.core import EmptyResultError, InputError, Signature
+from semsig_gis.database import PartitionedDatabase, open_database, save_database
+from semsig_gis.localization import DistanceLocator, Method, Requirement, localize, score_cells
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 
 CITY = database_of(random_cells(400))

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.localization.distance.ties import (
+from semsig_gis.core import InputError
+from semsig_gis.localization import (
     THRESHOLDS,
     best_cells,
     chance_within,

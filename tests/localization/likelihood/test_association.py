@@ -25,32 +25,35 @@ from noisy_cells import (
 from view_oracle import bearing_density, cell_loglik, random_view
 from worlds import CODES, World, random_town
 
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.database import visible_objects_in
-from semsig_gis.localization.likelihood.association import (
+from semsig_gis.core import ObjectIndex, Signature
+from semsig_gis.database import visible_objects_in
+from semsig_gis.localization import (
     Detections,
+    NoiseMixture,
+    NoiseSpec,
     Pairs,
+    PhotoTable,
     align_cells,
     associate,
     associate_pairs,
+    build_index,
+    cell_noise,
+    database_tables,
+    explain,
+    explain_cell,
+    named_noise,
     near_pairs,
+    photo_loglik,
+    query_bearings,
     rerank,
+    views_aside,
 )
-from semsig_gis.localization.likelihood.explain import explain, explain_cell
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.off_centre import views_aside
-from semsig_gis.localization.likelihood.photo import LOST, PhotoTable, photo_loglik
-from semsig_gis.localization.noise.model import NoiseMixture, NoiseSpec, cell_noise, named_noise
-from semsig_gis.localization.noise.table import database_tables, query_bearings
-from semsig_gis.observation.view import FULL_VIEW, Photo, View
+from semsig_gis.localization.likelihood.photo import LOST
+from semsig_gis.observation import FULL_VIEW, Photo, View
 
 if TYPE_CHECKING:
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.likelihood.association import Association
-    from semsig_gis.localization.likelihood.explain import Explanation
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import Association, Explanation, Noise, NoiseTable
 
 SEEDS = st.integers(0, 10_000)
 GENERIC = named_noise("generic")

@@ -9,9 +9,9 @@ import pytest
 from small_city import small_city
 
 from semsig_gis import build_index, named_noise
+from semsig_gis.localization import TurnMemo
 from semsig_gis.localization.likelihood import incremental as memos
-from semsig_gis.localization.likelihood.incremental import TurnMemo
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.observation import Photo, View
 
 
 @pytest.mark.parametrize("kept", [True, False])

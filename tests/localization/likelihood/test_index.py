@@ -15,18 +15,21 @@ from scipy.stats import binom, poisson
 from view_oracle import cell_loglik, random_view, scene_of, set_loglik, turned_loglik
 from worlds import random_town
 
-from semsig_gis.core.geometry import consecutive
-from semsig_gis.core.signature import Signature
-from semsig_gis.localization.likelihood.index import TURNS, build_index, index_fingerprint
-from semsig_gis.localization.likelihood.kernels import promising_cells
-from semsig_gis.localization.likelihood.off_centre import views_aside
-from semsig_gis.localization.noise.model import cell_noise, named_noise
-from semsig_gis.localization.noise.table import database_tables
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.core import Signature, consecutive
+from semsig_gis.localization import (
+    TURNS,
+    build_index,
+    cell_noise,
+    database_tables,
+    index_fingerprint,
+    named_noise,
+    promising_cells,
+    views_aside,
+)
+from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.noise.model import NoiseSpec
+    from semsig_gis.localization import LikelihoodIndex, NoiseSpec
 
 SEEDS = st.integers(0, 10_000)
 NOISE = named_noise("generic")

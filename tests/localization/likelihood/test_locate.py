@@ -14,27 +14,29 @@ from hypothesis import strategies as st
 from noisy_cells import database_of, noisy_town, parts_of, random_database, turned_query
 from worlds import CODES, CORNER, World, random_town
 
-from semsig_gis.core.rtree import ObjectIndex
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.occlusion import Footprints
-from semsig_gis.database.sightings import visible_objects_at
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.localization.likelihood.answer_rule import AnswerRule
-from semsig_gis.localization.likelihood.estimate import (
+from semsig_gis.core import ObjectIndex, Signature
+from semsig_gis.database import Footprints, ObjectStore, visible_objects_at
+from semsig_gis.localization import (
+    AnswerRule,
+    NoiseSpec,
     PlaceEstimate,
+    Posterior,
+    Refinement,
+    build_index,
     cell_estimate,
+    cell_noise,
+    locate,
+    locate_route,
+    named_noise,
+    position_prior,
+    posterior,
+    refine,
     refined_estimate,
 )
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import locate, locate_route
-from semsig_gis.localization.likelihood.posterior import Posterior, Refinement, posterior, refine
-from semsig_gis.localization.likelihood.priors import position_prior
-from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.observation.leg import Leg
-from semsig_gis.observation.view import View
+from semsig_gis.observation import Leg, View
 
 if TYPE_CHECKING:
-    from semsig_gis.objects.table import StreetObjects
+    from semsig_gis.objects import StreetObjects
 
 WORLD = random_town()
 CITY = WORLD.database

@@ -17,30 +17,31 @@ from noisy_cells import random_database
 from pyproj import CRS
 from sentences import refused
 
-from semsig_gis.core.errors import CrsError, InputError
-from semsig_gis.localization.likelihood.answer_rule import (
+from semsig_gis.core import CrsError, InputError
+from semsig_gis.localization import (
+    LOST,
     AnswerRule,
-    calibrate,
-    open_rule,
-    save_rule,
-)
-from semsig_gis.localization.likelihood.posterior import posterior, prior_ratio
-from semsig_gis.localization.likelihood.priors import (
     KnownPosition,
     area_prior,
+    calibrate,
+    moved_chances,
+    open_rule,
     position_prior,
+    posterior,
+    prior_ratio,
     raster_prior,
+    route_posteriors,
+    save_rule,
     weight_prior,
 )
-from semsig_gis.localization.likelihood.route import LOST, moved_chances, route_posteriors
-from semsig_gis.observation.leg import Leg
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.database import SignatureDatabase
+    from semsig_gis.database import SignatureDatabase
 
 DATABASE = random_database(3, cells=120)
 FLAT = np.zeros(len(DATABASE))

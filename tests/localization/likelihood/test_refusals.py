@@ -11,21 +11,32 @@ import shapely
 from noisy_cells import TAXONOMY, noisy_town, random_database
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.localization.likelihood.answer_rule import AnswerRule, calibrate
-from semsig_gis.localization.likelihood.association import align_cells, rerank
-from semsig_gis.localization.likelihood.explain import explain_cell
-from semsig_gis.localization.likelihood.index import CellScores, build_index
-from semsig_gis.localization.likelihood.locate import locate
-from semsig_gis.localization.likelihood.posterior import posterior, refine
-from semsig_gis.localization.likelihood.priors import area_prior, position_prior, weight_prior
-from semsig_gis.localization.likelihood.route import route_posteriors
-from semsig_gis.localization.noise.learn import Sample, learn_noise
-from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise, place_noise
-from semsig_gis.localization.noise.table import noise_tables
-from semsig_gis.observation.leg import Leg
+from semsig_gis.core import InputError, Signature
+from semsig_gis.database import ObjectStore
+from semsig_gis.localization import (
+    AnswerRule,
+    CellScores,
+    NoiseSpec,
+    Sample,
+    align_cells,
+    area_prior,
+    build_index,
+    calibrate,
+    cell_noise,
+    explain_cell,
+    learn_noise,
+    locate,
+    named_noise,
+    noise_tables,
+    place_noise,
+    position_prior,
+    posterior,
+    refine,
+    rerank,
+    route_posteriors,
+    weight_prior,
+)
+from semsig_gis.observation import Leg
 
 if TYPE_CHECKING:
     from collections.abc import Callable

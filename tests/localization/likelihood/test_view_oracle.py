@@ -20,9 +20,8 @@ from view_oracle import (
     set_loglik,
 )
 
-from semsig_gis.localization.likelihood.association import align_cells
-from semsig_gis.localization.noise.model import NoiseSpec
-from semsig_gis.observation.view import FULL_VIEW, Photo
+from semsig_gis.localization import NoiseSpec, align_cells
+from semsig_gis.observation import FULL_VIEW, Photo
 
 LAMP = Thing(
     chance=0.8,

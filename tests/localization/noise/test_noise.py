@@ -13,27 +13,27 @@ from hypothesis import strategies as st
 from noisy_cells import TAXONOMY, mixtures, noise_specs, random_database
 from sentences import refused
 
-from semsig_gis.core.errors import InputError, UnknownNameError
-from semsig_gis.core.signature import Signature
-from semsig_gis.evaluation.queries.distortions import distort, named_distortion
-from semsig_gis.localization.noise.model import (
+from semsig_gis.core import InputError, Signature, UnknownNameError
+from semsig_gis.evaluation import distort, named_distortion
+from semsig_gis.localization import (
     NOISES,
     NoiseMixture,
     NoiseSpec,
     cell_noise,
+    database_tables,
+    mean_table,
     named_noise,
     noise_from_dict,
+    noise_tables,
     open_noise,
     place_noise,
     save_noise,
 )
-from semsig_gis.localization.noise.table import database_tables, mean_table, noise_tables
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.localization.noise.table import NoiseTable
+    from semsig_gis.localization import Noise, NoiseTable
 
 
 @pytest.mark.parametrize(

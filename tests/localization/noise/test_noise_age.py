@@ -12,26 +12,23 @@ from noisy_cells import TAXONOMY, random_database
 from sentences import refused
 
 from benchmarks._later_city import later_city
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.build import build_database
-from semsig_gis.database.store import ObjectStore
-from semsig_gis.evaluation.queries.distortion_text import parse_chain
-from semsig_gis.evaluation.queries.draw import QuerySpec, draw_queries
-from semsig_gis.evaluation.scoring import score_queries, scored_tables
-from semsig_gis.localization.likelihood.index import build_index
-from semsig_gis.localization.likelihood.locate import LikelihoodLocator
-from semsig_gis.localization.noise.age import (
+from semsig_gis.core import InputError
+from semsig_gis.database import ObjectStore, build_database
+from semsig_gis.evaluation import QuerySpec, draw_queries, parse_chain, score_queries, scored_tables
+from semsig_gis.localization import (
     Drift,
+    LikelihoodLocator,
+    NoiseSpec,
     aged_noise,
+    build_index,
+    cell_noise,
     fresh_noise,
     named_drift,
+    named_noise,
     open_drift,
 )
-from semsig_gis.localization.noise.model import NoiseSpec, cell_noise, named_noise
-from semsig_gis.objects.changes import ClassChange, compare_objects
-from semsig_gis.objects.load import build_objects
-from semsig_gis.sources.catalog import load_catalog, paper_taxonomy
-from semsig_gis.sources.synthetic.city import CitySpec, synthetic_city
+from semsig_gis.objects import ClassChange, build_objects, compare_objects
+from semsig_gis.sources import CitySpec, load_catalog, paper_taxonomy, synthetic_city
 
 if TYPE_CHECKING:
     from pathlib import Path

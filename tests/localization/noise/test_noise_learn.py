@@ -14,28 +14,28 @@ from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_q
 from sentences import refused
 from worlds import CODES, World
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.signature import Signature
-from semsig_gis.core.statistics import wilson_interval
-from semsig_gis.database.database import visible_objects_in
-from semsig_gis.localization.noise.fit import (
+from semsig_gis.core import InputError, Signature, wilson_interval
+from semsig_gis.database import visible_objects_in
+from semsig_gis.localization import (
     ALL,
+    Sample,
     drawn_rates,
     estimated_rates,
     expected_counts,
     gather_evidence,
+    learn_noise,
     model_change,
     next_model,
+    noise_from_dict,
+    read_samples,
 )
-from semsig_gis.localization.noise.learn import Sample, learn_noise, read_samples
-from semsig_gis.localization.noise.model import noise_from_dict
-from semsig_gis.observation.view import Photo, View
+from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.localization.noise.learn import NoiseEstimate
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.localization import NoiseEstimate
 
 # What the simulated detector does; the estimator has no part in it.
 DETECTION = {1: 0.9, 2: 0.7, 3: 0.8, 4: 0.6}

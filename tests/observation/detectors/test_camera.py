@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from benchmarks.rendered import Scene
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import angular_distance
-from semsig_gis.observation.detectors.camera import Camera
+from semsig_gis.core import InputError, angular_distance
+from semsig_gis.observation import Camera
 
 if TYPE_CHECKING:
-    from semsig_gis.observation.detectors.camera import Projection
+    from semsig_gis.observation import Projection
 
 PROJECTIONS: dict[Projection, float] = {
     "pinhole": 80.0,

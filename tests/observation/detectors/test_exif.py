@@ -10,8 +10,8 @@ from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.observation.detectors.exif import read_exif
+from semsig_gis.core import InputError
+from semsig_gis.observation import read_exif
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

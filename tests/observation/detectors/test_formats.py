@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.observation.detectors.formats import read_pictures
-from semsig_gis.observation.detectors.pictures import Shot
+from semsig_gis.core import InputError
+from semsig_gis.observation import Shot, read_pictures
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.observation.detectors.pictures import Picture
+    from semsig_gis.observation import Picture
 
 # Of a picture of 800 x 400 pixels: a bench, and a sign of which the detector is less sure.
 CORNERS = [(80, 100, 240, 200), (400, 40, 440, 80)]

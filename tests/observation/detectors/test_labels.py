@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import pytest
 from sentences import refused
 
-from semsig_gis.core.errors import CatalogError, InputError, UnknownNameError
-from semsig_gis.observation.detectors.labels import LabelMap, Meaning, label_maps
-from semsig_gis.sources.catalog import built_in_taxonomy, paper_taxonomy
+from semsig_gis.core import CatalogError, InputError, UnknownNameError
+from semsig_gis.observation import LabelMap, Meaning, label_maps
+from semsig_gis.sources import built_in_taxonomy, paper_taxonomy
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,13 +12,18 @@ import pytest
 from PIL import Image
 from sentences import refused
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.observation.detectors.labels import LabelMap
-from semsig_gis.observation.detectors.pictures import Box, Picture, Shot
-from semsig_gis.observation.detectors.views import Detector, read_shots
-from semsig_gis.observation.files import parse_queries
-from semsig_gis.observation.view import View
-from semsig_gis.sources.catalog import built_in_taxonomy, paper_taxonomy
+from semsig_gis.core import InputError
+from semsig_gis.observation import (
+    Box,
+    Detector,
+    LabelMap,
+    Picture,
+    Shot,
+    View,
+    parse_queries,
+    read_shots,
+)
+from semsig_gis.sources import built_in_taxonomy, paper_taxonomy
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,18 +1,20 @@
-"""Pick a measure: how far a query's sequence is from every distinct sequence of a database.
+"""Metrics: distances between the sequence of a query and each distinct sequence of a database.
 
-Each measure is a module with one function ``distances(queries, table, *, normalized, only)``.
-A new one is added to `METRICS`; the laws in ``tests/localization/distance/test_metrics.py`` then
-hold it too.
+Each module of this package is a metric: its name, and a function ``distances(queries, table, *,
+normalized, only)``. To add one, add its module. `METRICS`, the help of the commands and the general
+tests in ``tests/localization/distance/test_metrics.py`` find it.
 """
 
 from __future__ import annotations
 
+import importlib
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
-from semsig_gis.core.errors import InputError, UnknownNameError, nearest_name
-from semsig_gis.localization.distance.metrics import edit, histogram, jaccard
+from semsig_gis.core import InputError, UnknownNameError, nearest_name
+from semsig_gis.localization.distance.metric_names import METRIC_NAMES
+from semsig_gis.localization.distance.metrics import edit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,12 +22,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
     from semsig_gis.localization.distance.metrics.edit import EditWeights
 
 
 class Distances(Protocol):
-    """Distances of some queries to the distinct sequences of a table, lower for more alike."""
+    """Distances of queries to the distinct sequences of a table; lower is more similar."""
 
     def __call__(
         self,
@@ -36,22 +38,22 @@ class Distances(Protocol):
         normalized: bool = True,
         only: NDArray[np.int64] | None = None,
     ) -> NDArray[np.float32]:
-        """Return float32 distances of shape (queries, d), or (queries, len(only))."""
+        """Return float32 distances, shape (queries, d), or (queries, len(only)) for some rows."""
 
 
 METRICS: Mapping[str, Distances] = MappingProxyType(
-    {"jaccard": jaccard.distances, "histogram": histogram.distances, "edit": edit.distances}
+    {name: importlib.import_module(f"{__name__}.{name}").distances for name in METRIC_NAMES}
 )
-"""Every measure, by name."""
+"""Every metric, by name."""
 
 
 def metric(
     name: str, *, weights: EditWeights | None = None, wildcard: int | None = None
 ) -> Distances:
-    """Return the measure of a name in `METRICS`, with the edit weights bound to it.
+    """Return the metric of a name in `METRICS`, with the edit weights bound to it.
 
-    Measures other than the edit distance ignore weights and refuse a wildcard (a value of the query
-    that stands for any other) with an `InputError`.
+    Metrics other than the edit distance ignore weights. They raise InputError for a wildcard, which
+    is a value of the query that equals any other.
     """
     if name not in METRICS:
         raise UnknownNameError(

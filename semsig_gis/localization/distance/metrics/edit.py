@@ -1,6 +1,6 @@
-"""Weighted edit distance (Levenshtein) between sequences; the home of RapidFuzz.
+"""Weighted edit distance (Levenshtein) between sequences; the only module that imports RapidFuzz.
 
-Unit weights have a kernel of their own, about fifty times as fast a value as RapidFuzz on one
+For weights of 1 there is a kernel, which is about fifty times as fast per value as RapidFuzz on one
 query. Both give the same distances.
 """
 
@@ -14,46 +14,44 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 from rapidfuzz.process import cdist
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.database.sequences import checked_sequence
+from semsig_gis.core import InputError
+from semsig_gis.database import checked_sequence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
 
-STRIPE = 64  # words in a plane: enough work for a loop, little enough for the nearest cache
-BLOCK = 64 * STRIPE
-"""Sequences in a block."""
+PLANE_WORDS = 64  # enough work for a loop, and a plane still fits the first-level cache
+BLOCK_SEQUENCES = 64 * PLANE_WORDS
 _VALUES = 256
 
 _LARGEST_WEIGHT = 100  # costs of any real signature stay exact in float32
-# Loading the compiled kernel takes as long as RapidFuzz takes for this many values (0.7 s).
-_LOADING = 100_000_000
-# A table with as many values, asked again, is likely to be asked often.
-_LARGE = 50_000
-_FEWER = 50  # times: RapidFuzz on so many fewer sequences is as fast as the kernel on all
+# RapidFuzz compares this many values in the time that the compiled kernel takes to load (0.7 s).
+_VALUES_OF_LOADING = 100_000_000
+# A second search of a table with this many values makes further searches likely.
+_LARGE_TABLE_VALUES = 50_000
+_KERNEL_SPEEDUP = 50  # RapidFuzz on 1/50 of the sequences is as fast as the kernel on all
 
 
 @dataclass(frozen=True, eq=False)
 class BitPlanes:
-    """Sequences of small integers, turned so that the same position of many lies together.
+    """Sequences of small integers as bit planes: one bit per sequence for each position and digit.
 
-    For every block and position, from the longest sequence back to front, `planes`, shape (p, 64),
-    tells which sequences reach that far and then, for each first and each second digit of a value,
-    which have it there. All sequences end at the last position. Block ``b`` owns the rows
-    ``bounds[b]:bounds[b + 1]``. `digits`, shape (256, 2), gives the two planes that are both set
-    where a value stands; never both for a value that no sequence has. Two digits, of about the
-    square root of the number of values each, need fewer planes than one plane a value.
+    Sequences are aligned at their ends. For each block and each position, from the start of its
+    longest sequence, `planes`, shape (p, 64), has one row that marks the sequences with an entry at
+    this position, then one row for each first digit and each second digit of a value. `digits`,
+    shape (256, 2), has the two rows that are both set for a value; never both for a value that no
+    sequence has. Two digits need fewer planes than one plane per value: about twice the square root
+    of the number of values. Block ``b`` owns the rows ``bounds[b]:bounds[b + 1]``.
 
-    Hyyrö (2004) gives the steps with bits along one sequence; here they lie across sequences. With
-    the steps ``v`` down the left side of an entry and ``h`` along its top, and ``e`` set where the
-    two values are equal, the diagonal step is 0 where ``d = e | (v < 0) | (h < 0)``. Then the right
-    side is +1 where ``(h < 0) | ~(d | (h > 0))`` and -1 where ``(h > 0) & d``, and the bottom is
-    the same of ``v``. Where a sequence does not reach, steps of 0 along the top leave its column as
-    it was.
+    The recurrence is that of Hyyrö (2004), with bits across sequences in place of along one. Let
+    ``v`` be the step down the left side of an entry, ``h`` the step along its top, and ``e`` set
+    where the two values are equal. The diagonal step is 0 where ``d = e | (v < 0) | (h < 0)``. The
+    right side is +1 where ``(h < 0) | ~(d | (h > 0))`` and -1 where ``(h > 0) & d``; the bottom is
+    the same with ``v``. Before a sequence begins, steps of 0 along the top keep its column.
     """
 
     planes: NDArray[np.uint64]
@@ -63,25 +61,24 @@ class BitPlanes:
 
     @classmethod
     def build(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> BitPlanes:
-        """Turn sequences given as flat values and offsets, shape (d + 1,).
+        """Return the planes of sequences in flat `values`, with `offsets` of shape (d + 1,).
 
-        Any order gives the same distances, but sequences ordered by length waste no memory and no
-        time.
+        The order does not change the distances, but sorting by length saves memory and time.
         """
-        from semsig_gis.localization.distance.kernels import pack  # noqa: PLC0415 - loads a compiler
+        from semsig_gis.localization.distance.kernels import pack  # noqa: PLC0415 - numba, 0.25 s
 
         present = np.flatnonzero(np.bincount(values, minlength=_VALUES))
-        # At least two, so that two digits of one kind make the value that no sequence has.
+        # At least two first digits, so that rows 1 and 2 are never both set: an absent value.
         first = max(2, int(np.ceil(np.sqrt(len(present)))))
         second = max(1, -(-len(present) // first))
         digits = np.tile(np.array([1, 2]), (_VALUES, 1))
         digits[present, 0] = 1 + np.arange(len(present)) % first
         digits[present, 1] = 1 + first + np.arange(len(present)) // first
         lengths = np.diff(offsets)
-        starts = np.arange(0, len(lengths), BLOCK)
+        starts = np.arange(0, len(lengths), BLOCK_SEQUENCES)
         longest = np.maximum.reduceat(lengths, starts) if len(lengths) else lengths
         bounds = np.concatenate([[0], np.cumsum(longest * (1 + first + second))])
-        planes = np.zeros((bounds[-1], STRIPE), np.uint64)
+        planes = np.zeros((bounds[-1], PLANE_WORDS), np.uint64)
         pack(values, offsets, digits, bounds, 1 + first + second, planes)
         for array in (planes, bounds, digits):
             array.setflags(write=False)
@@ -94,17 +91,17 @@ class BitPlanes:
         normalized: bool = True,
         wildcard: int | None = None,
     ) -> NDArray[np.float32]:
-        """Measure the fewest changes that turn each query into each sequence, shape (queries, d).
+        """Return the unit-weight edit distances of queries to all sequences, shape (queries, d).
 
-        `normalized` divides by the longer of the two lengths, and a `wildcard` in a query equals
-        every value.
+        `normalized` divides by the longer of the two lengths. A `wildcard` in a query equals every
+        value.
         """
-        from semsig_gis.localization.distance.kernels import scan  # noqa: PLC0415 - loads a compiler
+        from semsig_gis.localization.distance.kernels import scan  # noqa: PLC0415 - numba, 0.25 s
 
         digits = self.digits
         if wildcard is not None:
             digits = digits.copy()
-            digits[wildcard] = 0
+            digits[wildcard] = 0  # row 0 is set wherever a sequence has an entry
         ends = np.cumsum([0, *map(len, queries)])
         query_digits = digits[np.concatenate([*queries, np.empty(0, np.uint8)])]
         result = np.empty((len(queries), len(self.lengths)), np.float32)
@@ -115,15 +112,15 @@ class BitPlanes:
 
 
 _planes: WeakKeyDictionary[SequenceTable, BitPlanes] = WeakKeyDictionary()
-_tables_seen: WeakSet[SequenceTable] = WeakSet()
+_searched_tables: WeakSet[SequenceTable] = WeakSet()
 
 
 @dataclass(frozen=True, slots=True)
 class EditWeights:
     """Costs, each 1 to 100, of the operations that turn a query into a cell's sequence.
 
-    An object is inserted that the query missed, deleted if it is a false detection, and substituted
-    if it has another value in the cell.
+    `insert` is for an object that the query missed, `delete` for a false detection, `substitute`
+    for an object that has another value in the cell.
     """
 
     insert: int = 1
@@ -150,12 +147,12 @@ def distances(
     only: NDArray[np.int64] | None = None,
     wildcard: int | None = None,
 ) -> NDArray[np.float32]:
-    """Measure the cheapest way to turn each query into each distinct sequence.
+    """Return the weighted edit distances of queries to distinct sequences.
 
-    Levenshtein's distance with weights (paper, section "Signature comparison"). `normalized`
-    divides by the largest cost that two sequences of these lengths can have: that of deleting
-    everything and inserting everything, or, if cheaper, of substituting along the shorter length
-    and inserting or deleting the rest. With weights of 1 it is the longer length.
+    The distance (Levenshtein; paper, section "Signature comparison") is the lowest cost of
+    operations that turn the query into the sequence. `normalized` divides by the largest possible
+    cost for the two lengths: delete and insert everything, or, if cheaper, substitute along the
+    shorter length and insert or delete the rest. With weights of 1 it is the longer length.
 
     A `wildcard` in a query, for an object of unknown class, equals any value; it needs weights of
     1.
@@ -167,15 +164,15 @@ def distances(
             f"a wildcard was given with edit weights {'/'.join(map(str, astuple(costs)))}; "
             "wildcards are compared with weights of 1 only."
         )
-    few = only is not None and len(only) * _FEWER < len(table)
+    few = only is not None and len(only) * _KERNEL_SPEEDUP < len(table)
     if wildcard is not None or (
-        costs == EditWeights() and not few and _pays(len(sequences), table)
+        costs == EditWeights() and not few and _kernel_pays(len(sequences), table)
     ):
         if table not in _planes:
             _planes[table] = BitPlanes.build(table.values, table.offsets)
         planes = _planes[table]
-        everything = planes.edit_distances(sequences, normalized=normalized, wildcard=wildcard)
-        return everything if only is None else everything[:, only]
+        costs_of_all = planes.edit_distances(sequences, normalized=normalized, wildcard=wildcard)
+        return costs_of_all if only is None else costs_of_all[:, only]
     choices = table.strings if only is None else list(map(table.strings.__getitem__, only.tolist()))
     result: NDArray[np.float32] = cdist(
         [sequence.tobytes().decode("latin-1") for sequence in sequences],
@@ -187,9 +184,9 @@ def distances(
     return result
 
 
-def _pays(queries: int, table: SequenceTable) -> bool:
-    """Tell whether to load the kernel; one query of a short-lived process is not worth it."""
-    again = table in _tables_seen
-    _tables_seen.add(table)
+def _kernel_pays(queries: int, table: SequenceTable) -> bool:
+    """Whether the kernel saves more time than it takes to load; not for a single query."""
+    repeated = table in _searched_tables
+    _searched_tables.add(table)
     values = len(table.values)
-    return queries * values >= _LOADING or (again and values >= _LARGE)
+    return queries * values >= _VALUES_OF_LOADING or (repeated and values >= _LARGE_TABLE_VALUES)

@@ -1,4 +1,4 @@
-"""Histogram distance: how often each value occurs in two sequences, whatever their order."""
+"""Histogram distance: compares how often each value occurs, in any order."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.database.sequences import checked_sequence
+from semsig_gis.database import checked_sequence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from semsig_gis.database.sequences import SequenceTable
+    from semsig_gis.database import SequenceTable
 
 
 def distances(
@@ -23,14 +23,14 @@ def distances(
     normalized: bool = True,
     only: NDArray[np.int64] | None = None,
 ) -> NDArray[np.float32]:
-    """Measure how much the counts of values of queries and of distinct sequences differ.
+    """Return the differences between the value counts of queries and of distinct sequences.
 
     The paper (section "Signature comparison") sums over the values ``c`` present in either
     sequence: ``S = sum of min(x_c, y_c) / max(x_c, y_c)``. Normalised, the distance is ``1 - S /
-    (number of such values)``: 0 for equal counts, also for two empty sequences, and 1 if no value
+    (number of these values)``: 0 for equal counts, also for two empty sequences, and 1 if no value
     is shared. Otherwise it is ``-S``, which has no lower bound.
     """
-    from semsig_gis.localization.distance.kernels import add_quotients  # noqa: PLC0415 - loads a compiler
+    from semsig_gis.localization.distance.kernels import add_quotients  # noqa: PLC0415 - numba, 0.25 s
 
     histogram = table.histogram if only is None else table.histogram[only]
     result = np.empty((len(queries), len(histogram)), np.float32)
@@ -39,10 +39,10 @@ def distances(
     for row, query in zip(result, queries, strict=True):
         values, counts = np.unique(checked_sequence(query), return_counts=True)
         total = np.zeros(len(histogram))
-        # A value the query lacks adds nothing to the sum, whatever the other sequence has.
+        # A value that the query lacks adds 0 to the sum.
         for value, count in zip(values.tolist(), counts.tolist(), strict=True):
             if value < histogram.shape[1]:
-                # There are few different counts, and so few quotients.
+                # Look up the quotients by count: there are few different counts.
                 quotients = np.minimum(numbers, count) / np.maximum(numbers, count)
                 add_quotients(histogram[:, value], quotients, total)
         if normalized:

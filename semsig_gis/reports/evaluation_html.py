@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.evaluation.figures import percentile
-from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
+from semsig_gis.evaluation import percentile
+from semsig_gis.localization import DEFAULT_RULE
 from semsig_gis.reports.evaluation import (
     FIGURES,
     evaluation_headline,
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.evaluation.result import Evaluation
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
 
 GROUPED = {
     "p50": "P(error ≤ 50 m)",

@@ -12,10 +12,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core.display import Displayed
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.geometry import COUNT, GEOMETRY, MERGED, SOURCE, SOURCE_ID
-from semsig_gis.core.rtree import ObjectIndex
+from semsig_gis.core import (
+    COUNT,
+    GEOMETRY,
+    MERGED,
+    SOURCE,
+    SOURCE_ID,
+    Displayed,
+    InputError,
+    ObjectIndex,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

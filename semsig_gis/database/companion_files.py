@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import InputError
-from semsig_gis.core.temporary import TEMPORARY_PREFIX, is_abandoned, remove_abandoned
+from semsig_gis.core import TEMPORARY_PREFIX, InputError, is_abandoned, remove_abandoned
 from semsig_gis.database.city import open_city
 from semsig_gis.database.store import store_path, waiting_store
-from semsig_gis.storage.whole import alone_in, reason
+from semsig_gis.storage import folder_locked, reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -77,7 +76,7 @@ def remove_companions(
     if dry_run or not unneeded:
         return unneeded
     # After the wait, a store that another program was moving to its final folder is gone.
-    with alone_in(Path(os.path.realpath(database)).parent):
+    with folder_locked(Path(os.path.realpath(database)).parent):
         removed = tuple(companion for companion in unneeded if os.path.lexists(companion.path))
         for companion in removed:
             try:

@@ -1,4 +1,4 @@
-"""Words of several languages that tell which class a layer, a field or a value is about."""
+"""Keywords of several languages for classes, roles and fields."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import unicodedata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from semsig_gis.core.errors import UnknownNameError, nearest_name
-from semsig_gis.core.taxonomy import WILDCARD
+from semsig_gis.core import WILDCARD, UnknownNameError, nearest_name
 from semsig_gis.sources.catalog import data_folder, load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from semsig_gis.core.taxonomy import Taxonomy
+    from semsig_gis.core import Taxonomy
 
-# Boundaries in ArbresAlign and in WCPublic.
-HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
-# Shorter words are the beginnings of too many others.
+# Word boundaries in camel case, such as ArbresAlign and WCPublic.
+CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+# Keywords up to this length must be a whole word, because too many words start with them.
 WHOLE_WORD_LETTERS = 3
 ARTICLES = frozenset(
     {"a", "al", "alla", "and", "au", "aux", "d", "da", "das", "de", "dei", "del", "della", "dem",
@@ -32,9 +31,9 @@ ARTICLES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A class or role whose keyword stands in a text, and the words there.
+    """A class or role with a keyword in a text, and the matching words of the text.
 
-    `letters` is the length of the keyword: the longer, the surer.
+    `letters` is the length of the keyword; a longer keyword is a better match.
     """
 
     name: str
@@ -43,31 +42,31 @@ class Match:
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """Return the words of a name without capitals, accents and articles.
+    """Return the words of a name in lower case, without accents and articles.
 
     Words also end where a capital follows (``WCPublic``) and between letters and digits.
     """
     letters = unicodedata.normalize("NFKD", text)
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
-    parts = re.findall(r"[^\W\d_]+|\d+", HUMPS.sub(" ", plain))
+    parts = re.findall(r"[^\W\d_]+|\d+", CAMEL_CASE.sub(" ", plain))
     return tuple(word for part in parts if (word := part.casefold()) not in ARTICLES)
 
 
 @dataclass(frozen=True, slots=True)
 class Keywords:
-    """Names of classes, roles or kinds of field, each with words that stand for it in a row."""
+    """Names of classes, roles or kinds of field, each with the words of a keyword."""
 
     phrases: tuple[tuple[str, tuple[str, ...]], ...]
 
     @classmethod
     def of(cls, pairs: Iterable[tuple[str, str]]) -> Keywords:
-        """Return the keywords of pairs of a name and a phrase, each once."""
+        """Return the keywords of pairs of a name and a phrase, without duplicates."""
         return cls(tuple(dict.fromkeys((name, words_of(phrase)) for name, phrase in pairs)))
 
     def find(self, text: str) -> tuple[Match, ...]:
         """Find the keywords in a text, the longest first and each name once.
 
-        Words that are part of those of a longer keyword do not count.
+        A keyword inside a longer keyword does not count.
         """
         words = words_of(text)
         spans = [
@@ -89,26 +88,25 @@ class Keywords:
 
 
 def _end(words: tuple[str, ...], start: int, phrase: tuple[str, ...]) -> int | None:
-    """Return where a phrase ends that begins at a word, or None if it is not there."""
+    """Return the end of a phrase that starts at a word of a text, or None without a match."""
     if len(phrase) > 1 and words[start].startswith("".join(phrase)):
         return start + 1  # written as one word
     end = start + len(phrase)
-    pairs = zip(words[start:end], phrase, strict=False)
-    return end if end <= len(words) and all(_begins(*pair) for pair in pairs) else None
-
-
-def _begins(word: str, keyword: str) -> bool:
-    if len(keyword) <= WHOLE_WORD_LETTERS:
-        return word in {keyword, f"{keyword}s"}
-    return word.startswith(keyword)
+    if end > len(words):
+        return None
+    for word, keyword in zip(words[start:end], phrase, strict=True):
+        is_short = len(keyword) <= WHOLE_WORD_LETTERS
+        if not (word in {keyword, f"{keyword}s"} if is_short else word.startswith(keyword)):
+            return None
+    return end
 
 
 @functools.cache
 def keywords(kind: str) -> Keywords:
     """Return the shipped keywords of a kind.
 
-    They are ``"classes"`` (what a class is called), ``"class_fields"`` (fields that tell the class
-    of a layer), ``"roles"`` (layers without objects) and ``"fields"`` (what a field is for).
+    Kinds are ``"classes"`` (words for classes), ``"class_fields"`` (names of fields that imply the
+    class of a layer), ``"roles"`` (layers without objects) and ``"fields"`` (uses of fields).
     """
     content = _content()
     if kind == "fields":
@@ -119,13 +117,13 @@ def keywords(kind: str) -> Keywords:
         (name, word)
         for name, lists in content["classes" if fields else kind].items()
         for key, words in lists.items()
-        if (key == "fields") == fields and key != SAID
+        if (key == "fields") == fields and key != SPOKEN
         for word in words
     )
 
 
 def class_code(word: str, taxonomy: Taxonomy) -> int:
-    """Return the code of the class that a person or a detector calls so.
+    """Return the code of the class for a word of a person or a detector.
 
     Parameters
     ----------
@@ -144,7 +142,7 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     Raises
     ------
     UnknownNameError
-        If the word stands for no class of the taxonomy; with the nearest one that does.
+        If no class of the taxonomy has the word; the message gives the nearest word.
 
     Examples
     --------
@@ -155,27 +153,29 @@ def class_code(word: str, taxonomy: Taxonomy) -> int:
     text = word.strip()
     if len(text) == 1:
         return int(taxonomy.encode(text)[0])
-    known = _class_words(taxonomy)
+    class_words = _class_words(taxonomy)
+    code: int | None
     if "=" in text:
         key, _, value = (part.strip() for part in text.partition("="))
         names = _tagged_classes()
-        tagged = names.get(f"{key}={value}") or names.get(f"{key}=*")
-        found = next((item.code for item in taxonomy.classes if item.name == tagged), None)
+        name = names.get(f"{key}={value}") or names.get(f"{key}=*")
+        code = next((item.code for item in taxonomy.classes if item.name == name), None)
     else:
-        together = "".join(words_of(text))
-        ends = [together.removesuffix(end) for end in ("", "s", "es")]
-        found = next((known[one][0] for one in ends if one in known), None)
-    if found is None:
-        near = nearest_name(text, (said for _, said in known.values()))
+        joined = "".join(words_of(text))
+        # The word itself, then its singular.
+        forms = [joined.removesuffix(suffix) for suffix in ("", "s", "es")]
+        code = next((class_words[form][0] for form in forms if form in class_words), None)
+    if code is None:
+        near = nearest_name(text, (name for _, name in class_words.values()))
         legend = ", ".join(f"{item.symbol} {item.title.lower()}" for item in taxonomy.classes)
         raise UnknownNameError(
             f"class {word!r} is unknown{near}; give a word for one of these: {legend}."
         )
-    return found
+    return code
 
 
-SAID = "said"
-"""Key of the words that people say, by which no layer is told."""
+SPOKEN = "said"
+"""Key of words for classes in observations; layers are not recognised by them."""
 
 
 @functools.cache
@@ -185,7 +185,7 @@ def _content() -> dict[str, Any]:
 
 @functools.lru_cache(maxsize=8)
 def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
-    """Return the words for classes, written as one: the code of the class, and the words."""
+    """Return code and word of classes by the word in lower case without blanks."""
     lists = _content()["classes"]
     others = [
         (key, item.code, word)
@@ -194,23 +194,24 @@ def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
         if key != "fields"
         for word in words
     ]
-    others.sort(key=lambda one: one[0] not in {"en", SAID})  # English before all other languages
-    spoken = [
+    # English has priority over the other languages.
+    others.sort(key=lambda item: item[0] not in {"en", SPOKEN})
+    pairs = [
         *((item.code, item.name.replace("_", " ")) for item in taxonomy.classes),
         *((item.code, item.title) for item in taxonomy.classes),
         (WILDCARD, "unknown"),
         *((code, word) for _, code, word in others),
     ]
-    known: dict[str, tuple[int, str]] = {}
-    for code, word in spoken:
-        if together := "".join(words_of(word)):
-            known.setdefault(together, (code, word))
-    return known
+    class_words: dict[str, tuple[int, str]] = {}
+    for code, word in pairs:
+        if joined := "".join(words_of(word)):
+            class_words.setdefault(joined, (code, word))
+    return class_words
 
 
 @functools.cache
 def _tagged_classes() -> Mapping[str, str]:
-    """Return the names of classes by the tags of OpenStreetMap that stand for one class alone."""
+    """Return the class name of each OpenStreetMap tag that belongs to exactly one class."""
     classes: dict[str, set[str]] = {}
     for layer in load_catalog("openstreetmap").layers:
         for tags in layer.tags if layer.role == "objects" else ():
