@@ -458,10 +458,10 @@ class _Change:
 def _find_change(database: SignatureDatabase, old: StreetObjects, new: StreetObjects) -> _Change:
     """Compare objects, and find the cells in range of a change; ranges are of the `database`."""
     changes = compare_objects(old, new)
-    places = np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
+    places = np.concatenate([old.xy[changes.obsolete_rows], new.xy[changes.new_rows]])
     ids = np.empty(0, np.int64)
     if len(places):
-        codes = np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
+        codes = np.concatenate([old.codes[changes.obsolete_rows], new.codes[changes.new_rows]])
         ranges = database.taxonomy.ranges(database.spec.radius)[codes]
         reach = float(ranges.max())
         columns, rows = cells_near(places, grid=database.grid, radius=reach)

@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from semsig_gis.localization.requirement import Requirement
     from semsig_gis.observation import North
 
-    AnyMethod: TypeAlias = Method | LikelihoodMethod
     Cells: TypeAlias = SignatureDatabase | PartitionedDatabase | City
+
+AnyMethod: TypeAlias = "Method | LikelihoodMethod"
 
 # Imports of one kind of method are in functions: they take 0.1 s for each kind, and a process
 # answers by one of them.

@@ -34,6 +34,7 @@ from .north import declination as declination
 from .sentences import GUESS_ERROR as GUESS_ERROR
 from .sentences import RADIUS_M as RADIUS_M
 from .sentences import SEEN as SEEN
+from .sentences import mappings as mappings
 from .sentences import parse_view as parse_view
 from .sentences import said_row as said_row
 from .sentences import unplaced_codes as unplaced_codes

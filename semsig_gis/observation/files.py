@@ -1,4 +1,4 @@
-"""Files of queries: one signature a row, from detectors or people, each by itself or a route."""
+"""Read files of queries, one view per row: independent queries, or the views of a route."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 Route = tuple[list[tuple[str | int, View]], list[Leg]]
 Codes = tuple[int, ...]
 
-PLAIN_LEG = ("dx", "dy")
-TOWARDS = ("distance", "bearing")
+COORDINATE_KEYS = ("dx", "dy")
+POLAR_KEYS = ("distance", "bearing")
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class QueryLine:
-    """A line of a file of queries: a query, perhaps of nothing, or the error that it is none.
+    """A line of a file of queries: a query, possibly without objects, or an error.
 
-    `name` is its ``id``, or else the number of the line. `unplaced` and `absent` are the class
-    codes of what its sentence says was seen in no known direction, and was not seen.
+    `name` is its ``id``, otherwise the line number. `unplaced` and `absent` are the class codes of
+    objects in its sentence that were seen in an unknown direction, and that are not in sight.
     """
 
     line: int
@@ -52,9 +52,9 @@ def read_queries(
 ) -> Iterator[QueryLine]:
     """Read the queries of a CSV file, or of a file of JSON lines, line by line.
 
-    The columns are those of `parse_view` and perhaps ``id``; `radius` is the visibility range of
-    the city. A line that is no query takes none of the others with it. Raises InputError if the
-    file cannot be read.
+    The columns are those of `parse_view`, and ``id``, which is optional; `radius` is the visibility
+    range of the city. An invalid line has an error as its query. Raises InputError if the file
+    cannot be read.
     """
     return _query_lines(file_rows(path, what="query"), str(path), taxonomy, radius)
 
@@ -62,7 +62,7 @@ def read_queries(
 def parse_queries(
     lines: Iterable[str | bytes], source: str, *, taxonomy: Taxonomy, radius: float = RADIUS_M
 ) -> Iterator[QueryLine]:
-    """Read queries as `read_queries` does, from JSON lines that messages call `source`."""
+    """Read queries as `read_queries` does, from JSON lines; `source` names them in messages."""
     return _query_lines(json_rows(lines), source, taxonomy, radius)
 
 
@@ -75,12 +75,12 @@ def _query_lines(
         view = parse_view({**row, "see": seen}, taxonomy=taxonomy, radius=radius)
         return view, unplaced, absent
 
-    for line, row, found in scan_rows(rows, source, read, what="query"):
+    for line, row, result in scan_rows(rows, source, read, what="query"):
         name = _name(row_value(row, "id"), line)
-        if isinstance(found, InputError):
-            yield QueryLine(line=line, name=name, query=found)
+        if isinstance(result, InputError):
+            yield QueryLine(line=line, name=name, query=result)
         else:
-            query, unplaced, absent = found
+            query, unplaced, absent = result
             yield QueryLine(line=line, name=name, query=query, unplaced=unplaced, absent=absent)
 
 
@@ -94,13 +94,13 @@ def read_route(
 ) -> Route:
     """Read the views of a route from a file of queries (see `read_queries`).
 
-    A line that does not say what was seen, like one where that is empty, has seen nothing. Each
-    line but the first also tells the way from the line before: ``dx`` and ``dy`` (metres to
-    grid east and north), or ``distance`` (metres) and ``bearing`` (degrees clockwise from
-    `north`), and ``sigma`` (standard deviation of each coordinate in metres, 0 if missing). With a
-    `track`, that tells the ways, to 5 m where ``sigma`` is missing: by the ``time`` of each line,
-    or where none has one, by their order. There is one leg fewer than views. Raises InputError if
-    the file cannot be read, a line of it is no view of a route, or the track is of another one.
+    A line without objects is a view of no objects. Each line except the first also gives the step
+    from the line before: ``dx`` and ``dy`` (metres to grid east and north), or ``distance``
+    (metres) and ``bearing`` (degrees clockwise from `north`), and ``sigma`` (standard deviation of
+    each coordinate in metres, 0 if missing). With a `track`, the steps come from the track, by the
+    ``time`` of each line, or by the order of lines if none has a time; then ``sigma`` is 5 m if
+    missing. There is one leg fewer than views. Raises InputError if the file cannot be read, a line
+    is not a view of a route, or the track does not fit the views.
     """
     rows = read_rows(path, _route_reader(taxonomy, north, radius), what="view")
     return _route(rows, str(path), track)
@@ -115,14 +115,14 @@ def parse_route(
     radius: float = RADIUS_M,
     track: Track | None = None,
 ) -> Route:
-    """Read a route as `read_route` does, from JSON lines that messages call `source`."""
+    """Read a route as `read_route` does, from JSON lines; `source` names them in messages."""
     rows = parse_rows(lines, source, _route_reader(taxonomy, north, radius), what="view")
     return _route(rows, source, track)
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class _Stop:
-    """A line of a route: what it tells of its view and of the way to it."""
+class _RouteLine:
+    """A line of a route: a view, and the leg that leads to it."""
 
     name: object
     view: View
@@ -131,13 +131,13 @@ class _Stop:
     time: dt.datetime | None
 
 
-def _route_reader(taxonomy: Taxonomy, north: North, radius: float) -> Callable[[Row], _Stop]:
-    """Return what reads a line of a route."""
+def _route_reader(taxonomy: Taxonomy, north: North, radius: float) -> Callable[[Row], _RouteLine]:
+    """Return a function that reads a line of a route."""
 
-    def read(row: Row) -> _Stop:
+    def read(row: Row) -> _RouteLine:
         sigma, time = row_value(row, "sigma"), row_value(row, "time")
         sigma = None if sigma is None else float(sigma)
-        return _Stop(
+        return _RouteLine(
             name=row_value(row, "id"),
             view=parse_view(row, taxonomy=taxonomy, radius=radius),
             leg=_leg(row, north, sigma or 0.0),
@@ -151,33 +151,33 @@ def _route_reader(taxonomy: Taxonomy, north: North, radius: float) -> Callable[[
 def _leg(row: Row, north: North, sigma: float) -> Leg | None:
     values = {
         name: float(row_value(row, name))
-        for name in (*PLAIN_LEG, *TOWARDS)
+        for name in (*COORDINATE_KEYS, *POLAR_KEYS)
         if row_value(row, name) is not None
     }
     if not values:
         return None
-    if values.keys() == set(PLAIN_LEG):
+    if values.keys() == set(COORDINATE_KEYS):
         return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
-    if values.keys() == set(TOWARDS):
+    if values.keys() == set(POLAR_KEYS):
         return Leg.towards(values["bearing"] + north.turn, values["distance"], sigma=sigma)
     raise InputError("its step from the line before needs dx and dy, or distance and bearing")
 
 
-def _route(rows: list[tuple[int, _Stop]], source: str, track: Track | None) -> Route:
-    views = [(_name(stop.name, line), stop.view) for line, stop in rows]
-    stops = [stop for _, stop in rows]
+def _route(rows: list[tuple[int, _RouteLine]], source: str, track: Track | None) -> Route:
+    views = [(_name(item.name, line), item.view) for line, item in rows]
+    route_lines = [item for _, item in rows]
     advice = "leave it out, because the track gives the steps"
     if track is None:
         advice = "give dx and dy, or distance and bearing, on every line of a route but the first"
-    for number, (line, stop) in enumerate(rows):
-        if (stop.leg is None) != (number == 0 or track is not None):
-            gives = number == 0 or track
-            fault = "gives a step" if gives else "does not give the step from the line before"
+    for number, (line, item) in enumerate(rows):
+        needs_no_step = number == 0 or track is not None
+        if (item.leg is None) != needs_no_step:
+            fault = "gives a step" if item.leg else "does not give the step from the line before"
             raise InputError(f"line {line} of {source} {fault}; {advice}.")
     if track is None:
-        return views, [stop.leg for stop in stops if stop.leg is not None]
-    steps = np.diff(track.places([stop.time for stop in stops]), axis=0).tolist()
-    sigmas = [STEP_ERROR_M if stop.sigma is None else stop.sigma for stop in stops[1:]]
+        return views, [item.leg for item in route_lines if item.leg is not None]
+    steps = np.diff(track.places([item.time for item in route_lines]), axis=0).tolist()
+    sigmas = [STEP_ERROR_M if item.sigma is None else item.sigma for item in route_lines[1:]]
     return views, [
         Leg(dx=dx, dy=dy, sigma=sigma) for (dx, dy), sigma in zip(steps, sigmas, strict=True)
     ]

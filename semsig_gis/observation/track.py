@@ -1,4 +1,4 @@
-"""Tracks of GPS receivers: where somebody was, and when."""
+"""Read tracks of GPS receivers: places and times."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
 POINTS = ("trkpt", "rtept", "wpt")
-"""Elements of GPX that are points, of which the first kind that a file has is its track."""
+"""Point elements of GPX; the track of a file consists of the first kind that it has."""
 STEP_ERROR_M = 5.0
-"""Standard deviation of the way between two places of a track, east and north."""
+"""Standard deviation of the step between two places of a track, east and north, in metres."""
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class Track:
-    """The points of a track in their order.
+    """The points of a track, in order.
 
-    `xy` (n, 2) are metres in the CRS of a database, and `times` (n,) seconds since 1970, None
-    where the file does not tell of every point when that was.
+    `xy` (n, 2) are in metres in the CRS of a database, and `times` (n,) in seconds since 1970; None
+    if a point of the file has no time.
     """
 
     source: str
@@ -39,21 +39,21 @@ class Track:
     times: NDArray[np.float64] | None
 
     def places(self, times: Sequence[dt.datetime | None]) -> NDArray[np.float64]:
-        """Return where each view was seen from, shape (n, 2), by its time or its number.
+        """Return the place of each view, shape (n, 2), by its time or its number.
 
-        Between two points, the way is straight and its speed the same. InputError if some views
-        have a time and others do not, one is from before or after the track, or, without times,
-        there is not one point for each view.
+        Places are interpolated between points. InputError if some views have a time and others do
+        not, a time is outside the track, or, without times, the numbers of points and of views
+        differ.
         """
-        known = [one.timestamp() for one in times if one is not None]
-        if not known:
+        seconds = np.array([time.timestamp() for time in times if time is not None])
+        if not len(seconds):
             if len(times) != len(self.xy):
                 raise InputError(
                     f"{self.source} has {len(self.xy):,} points for {len(times):,} views without a "
                     "time; give each view its time, or a track with one point for each view."
                 )
             return self.xy
-        if len(known) < len(times):
+        if len(seconds) < len(times):
             number = times.index(None) + 1
             raise InputError(
                 f"view {number} of the route has no time as others have; give all views theirs."
@@ -63,35 +63,37 @@ class Track:
                 f"{self.source} has no times; leave out the times of the views, and give one point "
                 "for each."
             )
-        asked = np.array(known)
-        outside = np.flatnonzero((asked < self.times[0]) | (asked > self.times[-1]))
+        outside = np.flatnonzero((seconds < self.times[0]) | (seconds > self.times[-1]))
         if len(outside):
-            first, last = (_said(float(one)) for one in self.times[[0, -1]])
+            own, first, last = map(_time_text, (seconds[outside[0]], self.times[0], self.times[-1]))
             raise InputError(
-                f"view {outside[0] + 1} of the route is from {_said(known[outside[0]])}, and "
+                f"view {outside[0] + 1} of the route is from {own}, and "
                 f"{self.source} from {first} to {last}; give the track of that walk, or times "
                 "with their zone."
             )
-        return np.column_stack([np.interp(asked, self.times, axis) for axis in self.xy.T])
+        return np.column_stack([np.interp(seconds, self.times, axis) for axis in self.xy.T])
 
 
 def read_track(path: str | Path, *, crs: CRS) -> Track:
-    """Read the points of a GPX file: those of its tracks, or else of its routes, or its waypoints.
+    """Read the points of a GPX file: of its tracks, otherwise of its routes, or its waypoints.
 
-    Points without a time have the order of the file, others that of time. InputError if the file
-    is no GPX, or has no points.
+    They are in the order of time, or of the file if a point has no time. InputError if the file is
+    not GPX, or has no points.
     """
     try:
         text = read_text(path)
-        if "<!DOCTYPE" in text:  # which may define texts that swell
+        if "<!DOCTYPE" in text:  # to prevent expansion of entities
             raise ValueError("it defines its own document type")  # noqa: TRY301 - as others below
         root = ET.fromstring(text)  # noqa: S314 - without a document type
-        kinds = {name: [one for one in root.iter() if _name(one) == name] for name in POINTS}
-        points = next(filter(None, kinds.values()), [])
+        elements = list(root.iter())
+        kinds = ([point for point in elements if _name(point) == name] for name in POINTS)
+        points = next(filter(None, kinds), [])
         if not points:
             raise ValueError("it has no points")  # noqa: TRY301 - as others below
-        degrees = np.array([[float(one.attrib[key]) for key in ("lon", "lat")] for one in points])
-        times = [_time(one) for one in points]
+        degrees = np.array(
+            [[float(point.attrib[key]) for key in ("lon", "lat")] for point in points]
+        )
+        times = [_time(point) for point in points]
     except (OSError, ET.ParseError, KeyError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"track {path} cannot be read ({reason}); give a GPX file.") from error
@@ -101,15 +103,15 @@ def read_track(path: str | Path, *, crs: CRS) -> Track:
         raise InputError(
             f"track {path} has points that are not on the globe; give latitudes and longitudes."
         )
-    known = [one.timestamp() for one in times if one is not None]
-    if len(known) < len(points):
+    seconds = np.array([time.timestamp() for time in times if time is not None])
+    if len(seconds) < len(points):
         return Track(source=str(path), xy=xy, times=None)
-    order = np.argsort(known, kind="stable")
-    return Track(source=str(path), xy=xy[order], times=np.array(known)[order])
+    order = np.argsort(seconds, kind="stable")
+    return Track(source=str(path), xy=xy[order], times=seconds[order])
 
 
 def parse_time(text: object) -> dt.datetime:
-    """Return a time as 2024-05-31T14:05:09+02:00 or with Z; without a zone, it is UTC."""
+    """Parse a time such as 2024-05-31T14:05:09+02:00 or with Z; without a zone, it is UTC."""
     try:
         time = dt.datetime.fromisoformat(str(text).strip())
     except ValueError as error:
@@ -120,15 +122,15 @@ def parse_time(text: object) -> dt.datetime:
 
 
 def _time(point: ET.Element) -> dt.datetime | None:
-    """Return the time of a point, None where it does not tell one."""
-    told = next((one.text for one in point if _name(one) == "time"), None)
-    return parse_time(told) if told and told.strip() else None
+    """Return the time of a point; None if it has none."""
+    text = next((child.text for child in point if _name(child) == "time"), None)
+    return parse_time(text) if text and text.strip() else None
 
 
 def _name(element: ET.Element) -> str:
-    """Return the name of an element without that of its schema, of which GPX has several."""
+    """Return the name of an element without its namespace; GPX has several."""
     return element.tag.rpartition("}")[2]
 
 
-def _said(seconds: float) -> str:
+def _time_text(seconds: float) -> str:
     return dt.datetime.fromtimestamp(seconds, dt.UTC).isoformat(timespec="seconds")

@@ -1,7 +1,7 @@
-"""Views: what a detector or a person saw from one place, and in which directions they looked.
+"""Views: the objects that a detector or a person saw from one place, and the directions observed.
 
-A view is a signature of which more may be known: rough distances, scores of several classes, and
-the sectors that were looked at, as those of a photograph.
+A view is a signature with optional rough distances, scores of several classes, and the sectors that
+were looked at, as in a photograph.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 LEAST_TURN = 0.001
 MOST_RANGE_ERROR = 3.0
-ROUNDING = 1e-6  # of sums of scores
-EDGE = 0.05  # degrees, of bearings and sectors that others rounded
+ROUNDING = 1e-6  # tolerance of sums of scores
+EDGE = 0.05  # degrees; tolerance for bearings and sectors that were rounded before
 CLASSES = MAX_CODE + 1
 
 Sector = tuple[float, float]
@@ -41,9 +41,9 @@ Sector = tuple[float, float]
 
 
 def check_north(north_sigma: float) -> None:
-    """Refuse a standard deviation of north, in degrees, that is out of range.
+    """Raise InputError if a standard deviation of north, in degrees, is out of range.
 
-    It is 0, or 0.001 to 360; infinite where nothing is known of north.
+    Valid are 0, 0.001 to 360, and infinity, for an unknown north.
     """
     if north_sigma not in {0, math.inf}:
         require_number(
@@ -55,8 +55,8 @@ def check_north(north_sigma: float) -> None:
         )
 
 
-def _joined(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
-    """Return sectors clockwise from north, overlapping ones as one; none for the full turn."""
+def _merge_sectors(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
+    """Merge overlapping sectors and sort them clockwise from north; empty for the full turn."""
     spans = []
     for start, end in sectors:
         for value in (start, end):
@@ -70,13 +70,14 @@ def _joined(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
             )
         low = float(wrap_degrees(start))
         spans.append((low, low + width))
+    # Merge each sector with the last one if they overlap.
     merged: list[Sector] = []
     for low, high in sorted(spans):
         if merged and low <= merged[-1][1]:
             merged[-1] = merged[-1][0], max(high, merged[-1][1])
         else:
             merged.append((low, high))
-    # The last ones may reach over north, into the first ones.
+    # The last sector may extend over north into the first ones.
     while len(merged) > 1 and merged[-1][1] - FULL_TURN >= merged[0][0]:
         _, high = merged.pop(0)
         merged[-1] = merged[-1][0], max(merged[-1][1], high + FULL_TURN)
@@ -86,16 +87,16 @@ def _joined(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Photo:
-    """A look in some directions: a photograph, or a panorama.
+    """The directions of a photograph or a panorama.
 
     Parameters
     ----------
     sectors : tuple of (float, float), default ()
-        What was seen: from one bearing clockwise to another, in degrees from -360 to 720. Sectors
-        that overlap become one; none stands for the full turn.
+        Sectors from one bearing clockwise to another, in degrees from -360 to 720. Sectors that
+        overlap are merged; none means the full turn.
     north_sigma : float, optional
-        Standard deviation in degrees of its north, 0 or 0.001 to 360, infinite if not known; by
-        which all its bearings and sectors are off together. None if the query sets it.
+        Standard deviation of its north in degrees, 0 or 0.001 to 360, infinite if unknown. All its
+        bearings and sectors have this error together. None if the query sets it.
 
     Raises
     ------
@@ -114,13 +115,13 @@ class Photo:
     north_sigma: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        object.__setattr__(self, "sectors", _joined(self.sectors))
+        object.__setattr__(self, "sectors", _merge_sectors(self.sectors))
         if self.north_sigma is not None:
             check_north(self.north_sigma)
 
     @classmethod
     def looking(cls, *, heading: float, fov: float, north_sigma: float | None = None) -> Photo:
-        """Return the photo of a camera that looks at a bearing and sees `fov` degrees around it."""
+        """Return the photo of a camera with its heading and its field of view in degrees."""
         require_number("heading", heading, least=-FULL_TURN, most=FULL_TURN, unit="degrees")
         if not 0 < fov <= FULL_TURN:
             raise InputError(
@@ -132,24 +133,24 @@ class Photo:
 
     @property
     def width(self) -> float:
-        """How many degrees were looked at."""
+        """Total width of the sectors in degrees."""
         return sum(end - start for start, end in self.sectors) if self.sectors else FULL_TURN
 
     def sees(self, bearings: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which bearings were looked at."""
+        """Return a mask of the bearings inside the sectors."""
         angles = np.asarray(bearings, dtype=np.float64)
-        seen = np.full(angles.shape, not self.sectors)
+        inside = np.full(angles.shape, not self.sectors)
         for start, end in self.sectors:
-            seen |= wrap_degrees(angles - start) <= end - start
-        return seen
+            inside |= wrap_degrees(angles - start) <= end - start
+        return inside
 
     def turned(self, degrees: float) -> Photo:
-        """Return the same with bearings that are so many degrees larger."""
+        """Return the photo with `degrees` added to its bearings."""
         start = [(float(wrap_degrees(low + degrees)), high - low) for low, high in self.sectors]
         return replace(self, sectors=tuple((low, low + width) for low, width in start))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON: ``sectors`` and ``heading_error``, if they are given."""
+        """Return plain values for JSON: ``sectors`` and ``heading_error``, where there are any."""
         values: dict[str, Any] = {}
         if self.sectors:
             values["sectors"] = [[low, high % FULL_TURN] for low, high in self.sectors]
@@ -165,31 +166,31 @@ FULL_VIEW: Photo = Photo()
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class View(Signature):
-    """What was seen from one place: a signature of which more may be known.
+    """The objects that were seen from one place: a signature with optional details.
 
-    Methods on sequences take its `codes` and `bearings`; the likelihood takes all of it.
+    Distances use its `codes` and `bearings`; the likelihood method uses everything.
 
     Parameters
     ----------
     codes, bearings : ndarray, shape (n,), or None
-        As of `Signature`; what follows, if anything, needs both or the bearings.
+        As in `Signature`; `ranges` and sectors require the bearings.
     ranges : ndarray of float64, shape (n,), or None
-        Rough distance of each object in metres, NaN where it is not known.
+        Rough distance of each object in metres, NaN if unknown.
     range_errors : ndarray of float64, shape (n,), or None
         Relative error of each distance, the standard deviation of its logarithm, above 0 and up to
-        3; NaN where the noise model is to say.
+        3; NaN for that of the noise model.
     scores : ndarray of float64, shape (n, 256), or None
-        The detector's chance of each class code for each object; each row sums to one. What it
-        gives to code 0 stands for any class.
+        The probability of each class code for each object, by the detector; each row sums to one.
+        Code 0 is for any class.
     photo : ndarray of int64, shape (n,), or None
-        Which photo each object is from; the first by default.
+        Number of the photo of each object; 0 by default.
     photos : tuple of Photo, default one full turn
-        The directions looked at, each with its own error of north.
+        The photos, each with its own error of north.
 
     Raises
     ------
     InputError
-        If the parts differ in length, or a number is out of its range.
+        If the arrays differ in length, or a number is out of its range.
 
     Examples
     --------
@@ -215,12 +216,12 @@ class View(Signature):
         self._check()
 
     def _facts(self) -> dict[str, object]:
-        seen = ", ".join(f"{photo.width:g}°" for photo in self.photos)
-        told = [name for name in ("ranges", "scores") if getattr(self, name) is not None]
-        return {**super()._facts(), "seen": seen, "told": ", ".join(told) or "no more"}
+        sectors = ", ".join(f"{photo.width:g}°" for photo in self.photos)
+        details = [name for name in ("ranges", "scores") if getattr(self, name) is not None]
+        return {**super()._facts(), "sectors": sectors, "details": ", ".join(details) or "none"}
 
     def _check(self) -> None:
-        """Refuse parts that do not fit each other, or numbers out of range."""
+        """Raise InputError if arrays do not fit each other or numbers are out of range."""
         plain = self.photos == (FULL_VIEW,) and self.ranges is None
         if self.bearings is None and not plain:
             raise InputError(
@@ -260,16 +261,16 @@ class View(Signature):
 
     @classmethod
     def of(cls, signature: Signature, **more: Any) -> View:  # noqa: ANN401 - any field
-        """Return a signature as a view, with some of its fields given anew."""
+        """Return a signature as a view, with fields replaced by `more`."""
         if isinstance(signature, View):
             return replace(signature, **more) if more else signature
         return cls(signature.codes, signature.bearings, **more)
 
     @classmethod
     def joined(cls, views: Iterable[Signature]) -> View:
-        """Return several views of one place as one, each photo with its own error of north."""
+        """Merge several views of one place; each photo keeps its own error of north."""
         parts = [cls.of(view) for view in views]
-        before = np.cumsum([0, *(len(part.photos) for part in parts)])
+        first_photos = np.cumsum([0, *(len(part.photos) for part in parts)])
 
         def column(name: str, blank: float) -> NDArray[Any] | None:
             columns = [getattr(part, name) for part in parts]
@@ -283,7 +284,7 @@ class View(Signature):
 
         scored = any(part.scores is not None for part in parts)
         shares = [part.class_scores() for part in parts] if scored else []
-        rows = [part.photo_rows + first for part, first in zip(parts, before, strict=False)]
+        rows = [part.photo_rows + first for part, first in zip(parts, first_photos, strict=False)]
         return cls(
             column("codes", WILDCARD),
             column("bearings", math.nan),
@@ -296,11 +297,11 @@ class View(Signature):
 
     @property
     def photo_rows(self) -> NDArray[np.int64]:
-        """Which photo each object is from, shape (n,)."""
+        """Number of the photo of each object, shape (n,)."""
         return np.zeros(len(self), np.int64) if self.photo is None else self.photo
 
     def split(self) -> tuple[View, ...]:
-        """Return the views of its photos one by one."""
+        """Return one view for each photo."""
         if len(self.photos) == 1:
             return (self,)
         rows = self.photo_rows
@@ -310,36 +311,36 @@ class View(Signature):
         )
 
     def outside(self) -> NDArray[np.int64]:
-        """Return the rows of the objects where their photo did not look, but for rounding."""
+        """Return the rows of objects outside the sectors of their photo by more than `EDGE`."""
         if self.bearings is None:
             return np.empty(0, np.int64)
         around = self.bearings + np.array([[-EDGE], [0.0], [EDGE]])
-        seen = np.stack([photo.sees(around).any(axis=0) for photo in self.photos])
-        return np.flatnonzero(~seen[self.photo_rows, np.arange(len(self))])
+        inside = np.stack([photo.sees(around).any(axis=0) for photo in self.photos])
+        return np.flatnonzero(~inside[self.photo_rows, np.arange(len(self))])
 
     def class_scores(self) -> NDArray[np.float64]:
-        """Return the chance of each class code for each object, shape (n, 256)."""
+        """Return the probability of each class code for each object, shape (n, 256)."""
         if self.scores is not None:
             return self.scores
         codes = np.full(len(self), WILDCARD) if self.codes is None else self.codes
         return np.eye(CLASSES)[codes]
 
     def among(self, codes: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which objects may be of these classes, or are of unknown class, shape (n,)."""
+        """Return a mask of objects that may be of these classes, or any class, shape (n,)."""
         if self.scores is None:
             return super().among(codes)
-        kept = np.append(np.asarray(codes, dtype=np.int64), WILDCARD)
-        return np.asarray(self.scores[:, kept].sum(axis=1) > 0)
+        classes = np.append(np.asarray(codes, dtype=np.int64), WILDCARD)
+        return np.asarray(self.scores[:, classes].sum(axis=1) > 0)
 
     def select(self, objects: NDArray[np.bool_ | np.int64]) -> View:
-        """Return the view with some of the objects alone, by their row numbers or a mask."""
+        """Return the view with a selection of its objects, by row numbers or a mask."""
         names = ("codes", "bearings", "ranges", "range_errors", "scores", "photo")
         values = {name: getattr(self, name) for name in names}
-        kept = {name: None if value is None else value[objects] for name, value in values.items()}
-        return View(kept.pop("codes"), kept.pop("bearings"), **kept, photos=self.photos)
+        rows = {name: None if value is None else value[objects] for name, value in values.items()}
+        return View(rows.pop("codes"), rows.pop("bearings"), **rows, photos=self.photos)
 
     def turned(self, degrees: float) -> View:
-        """Return the view with bearings that are so many degrees larger, clockwise."""
+        """Return the view with `degrees` added to its bearings, sorted clockwise."""
         if self.bearings is None:
             return self
         bearings = wrap_degrees(self.bearings + degrees)
@@ -348,17 +349,17 @@ class View(Signature):
         return turned.select(np.argsort(bearings, kind="stable"))
 
     def to_dict(self, taxonomy: Taxonomy) -> dict[str, Any]:
-        """Return what `Signature.to_dict` gives, and what else is known, ready for JSON.
+        """Return the values of `Signature.to_dict` and the details, for JSON and `parse_view`.
 
-        ``ranges`` and ``range_errors`` have None where nothing is known, ``scores`` is by name of
-        the class. What `Photo.to_dict` tells of one photo stands beside it; of several it is in
-        ``photos``, and ``photo`` tells which one each object is in. `parse_view` reads it again.
+        ``ranges`` and ``range_errors`` have None for unknown values; ``scores`` are by name of the
+        class. The values of `Photo.to_dict` are on the same level for one photo; for several
+        photos, they are in ``photos``, and ``photo`` has the number of the photo of each object.
         """
         values = super().to_dict(taxonomy)
         for name in ("ranges", "range_errors"):
             column = getattr(self, name)
             if column is not None:
-                values[name] = [None if math.isnan(one) else one for one in column.tolist()]
+                values[name] = [None if math.isnan(value) else value for value in column.tolist()]
         if self.scores is not None:
             names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
             values["scores"] = [

@@ -69,7 +69,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("columns", FORMS.values(), ids=FORMS)
-def test_elements_are_told_by_their_columns(columns: dict[str, list[Any]]) -> None:
+def test_elements_are_recognized_by_their_columns(columns: dict[str, list[Any]]) -> None:
     table = frame(**columns)
     assert has_element_columns(table.columns) or "type" in columns
     layers = frame_layers(table, SPECS)
@@ -91,8 +91,8 @@ def test_geojson_is_read_like_a_table(tmp_path: Path, name: str) -> None:
     assert ids(read_layers(path, SPECS)) == [["node/1"], ["node/2"]]
 
 
-def test_the_shapefiles_of_geofabrik_are_read_as_one(tmp_path: Path) -> None:
-    """Also of roads and buildings, whose classes are those of a key, and no landuse."""
+def test_geofabrik_shapefiles_are_read_together(tmp_path: Path) -> None:
+    """Roads and buildings have classes that are values of a key; landuse is ignored."""
     folder = tmp_path / "shp"
     folder.mkdir()
     line = shapely.LineString([(2, 48), (2.001, 48)])
@@ -113,7 +113,7 @@ def test_the_shapefiles_of_geofabrik_are_read_as_one(tmp_path: Path) -> None:
     assert layers[1].table["half_width"].tolist() == [8.0]
 
 
-def test_ways_and_relations_are_told_by_columns_and_shapes() -> None:
+def test_columns_and_shapes_distinguish_ways_and_relations() -> None:
     ring = shapely.Polygon(
         SQUARE.exterior, [shapely.box(2.0004, 48.0004, 2.0006, 48.0006).exterior]
     )
@@ -123,7 +123,7 @@ def test_ways_and_relations_are_told_by_columns_and_shapes() -> None:
         frame(shapes, osm_id=[1, 2, -3, 4, 5], amenity=["fountain"] * 5), [fountains]
     )[0]
     assert ids((layer,)) == [["way/1", "way/2", "relation/3", "node/4", "node/5"]]
-    # A closed line is an area, whoever drew it.
+    # A closed line is an area, also from another program.
     assert shapely.area(layer.table.geometry.array).round(9).tolist()[:3] == [1e-6, 1e-6, 9.6e-7]
     gdal = frame(
         [SQUARE] * 2,
@@ -137,7 +137,7 @@ def test_ways_and_relations_are_told_by_columns_and_shapes() -> None:
     assert frame_layers(nameless, [fountains])[0].counts.kept == 2
 
 
-def test_an_element_counts_once_and_broken_tags_are_told() -> None:
+def test_element_counts_once_and_unreadable_tags_are_noted() -> None:
     snapshots = frame(at_osmId=["node/1", "node/1"], amenity=["bench", "bench"])
     assert frame_layers(snapshots, SPECS)[0].counts.read == 1
     broken = frame(feature_id=IDS, tags=["{amenity}", TREE])
@@ -146,7 +146,7 @@ def test_an_element_counts_once_and_broken_tags_are_told() -> None:
     assert ids(frame_layers(joined, SPECS)) == [["node/2"], []]
 
 
-def test_files_without_tags_are_no_files_of_openstreetmap(tmp_path: Path) -> None:
+def test_file_without_tags_is_refused(tmp_path: Path) -> None:
     path, folder = tmp_path / "trees.gpkg", tmp_path / "city"
     frame(art=["oak"]).to_file(path)
     assert file_reader(path) is None
@@ -162,7 +162,7 @@ def test_files_without_tags_are_no_files_of_openstreetmap(tmp_path: Path) -> Non
         find_files(SPECS, [damaged])
 
 
-def test_an_answer_of_overpass_is_known_by_its_content(tmp_path: Path) -> None:
+def test_overpass_answer_is_recognized_by_its_content(tmp_path: Path) -> None:
     answer = {"version": 0.6, "elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2,
                                             "tags": {"amenity": "bench"}}]}  # fmt: skip
     path = tmp_path / "some.json"

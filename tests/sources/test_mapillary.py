@@ -1,4 +1,4 @@
-"""Mapillary's map features: files, and a service on this machine that keeps the rules."""
+"""Map features of Mapillary from files and from a local service with the same limits."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ import pytest
 from sentences import refused
 from servers import Answer
 
-from semsig_gis.core import InputError, SourceError
+from semsig_gis.core import InputError
 from semsig_gis.sources import (
     MOST_FEATURES,
     AccessToken,
     HttpError,
     HttpSpec,
-    fetch_layers,
     load_catalog,
     parse_area,
 )
-from semsig_gis.sources.mapillary import read_layers
+from semsig_gis.sources.mapillary import fetch_layers, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -57,7 +56,7 @@ VALUES = {
 
 
 @pytest.mark.parametrize("form", ["answer", "geojson"])
-def test_a_value_belongs_to_its_layer(tmp_path: Path, form: str) -> None:
+def test_value_belongs_to_its_layer(tmp_path: Path, form: str) -> None:
     features = [feature(number, value) for number, value in enumerate(VALUES)]
     content: dict[str, Any] = {"data": features}
     if form == "geojson":
@@ -66,23 +65,23 @@ def test_a_value_belongs_to_its_layer(tmp_path: Path, form: str) -> None:
     path = tmp_path / "map_features.json"
     path.write_text(json.dumps(content), "utf-8")
     layers = read_layers([path, path], CATALOG.layers)  # an id counts once
-    found = {item.spec.name: len(item.table) for item in layers if len(item.table)}
+    counts = {item.spec.name: len(item.table) for item in layers if len(item.table)}
     names = [name for name in VALUES.values() if name]
-    assert found == {name: names.count(name) for name in names}
+    assert counts == {name: names.count(name) for name in names}
     assert {layer.counts.read for layer in layers} == {len(VALUES)}
 
 
 class Service:
-    """Answers as the Graph API does: by box, at most so many features, a full box is cut off."""
+    """Answers as the Graph API does: by box, with a limit on the number of features."""
 
     def __init__(self, features: Sequence[dict[str, Any]]) -> None:
         self.features = features
 
-    def __call__(self, seen: Seen) -> Answer:
-        if seen.headers.get("authorization") != f"OAuth {TOKEN}":
-            told = {"error": {"message": f"Invalid token {seen.headers.get('authorization')}"}}
-            return Answer(json.dumps(told).encode(), status=401)
-        west, south, east, north = map(float, seen.query["bbox"].split(","))
+    def __call__(self, request: Seen) -> Answer:
+        if request.headers.get("authorization") != f"OAuth {TOKEN}":
+            error = {"error": {"message": f"Invalid token {request.headers.get('authorization')}"}}
+            return Answer(json.dumps(error).encode(), status=401)
+        west, south, east, north = map(float, request.query["bbox"].split(","))
         if (east - west) * (north - south) > 0.01:
             return Answer(b'{"error": {"message": "bbox too large"}}', status=500)
         inside = [
@@ -90,8 +89,8 @@ class Service:
             for item in self.features
             for x, y in [item["geometry"]["coordinates"]]
             if west <= x <= east and south <= y <= north
-        ][: int(seen.query["limit"])]
-        # A service that gives the token away all the same, spelt in every way.
+        ][: int(request.query["limit"])]
+        # The answer contains the token in several spellings.
         link = f"https://graph.example/?access_token={TOKEN.replace('|', '%7C')}"
         body = json.dumps({"data": inside, "paging": {"next": link, "own": TOKEN}})
         return Answer(body.replace("|0", "\\u007c0").encode())
@@ -99,7 +98,7 @@ class Service:
 
 @pytest.fixture
 def crowd() -> list[dict[str, Any]]:
-    """Return more benches than an answer has, half of them in one corner."""
+    """Return more benches than an answer may have, half of them in one corner."""
     corner = [feature(n, "object--bench", 2.3001 + n * 1e-8, 48.8501) for n in range(1500)]
     return [*corner, *(feature(2000 + n, "object--bench", 2.3099) for n in range(1500))]
 
@@ -112,12 +111,12 @@ def texts(folder: Path) -> Iterator[str]:
             yield path.read_bytes().decode("latin-1")
 
 
-def test_a_full_box_is_asked_for_in_quarters(
+def test_full_box_is_requested_in_quarters_without_storing_the_token(
     server: Server, cache: Cache, crowd: list[dict[str, Any]], slept: list[float]
 ) -> None:
     server.on("/map_features", Service(crowd))
-    told: list[str] = []
-    spec = HttpSpec(sleep=slept.append, report=told.append, token=AccessToken(TOKEN))
+    lines: list[str] = []
+    spec = HttpSpec(sleep=slept.append, report=lines.append, token=AccessToken(TOKEN))
     benches = [CATALOG.layer("benches"), CATALOG.layer("signs")]
     options: Any = {"endpoints": [server.url], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
@@ -125,21 +124,21 @@ def test_a_full_box_is_asked_for_in_quarters(
     assert len(read_layers(files, benches)[0].table) == len(crowd) > MOST_FEATURES
     assert len(server.seen) == 1 + 4
     assert steps[-1] == (4, 4)
-    asked = server.seen[0].query
-    assert asked["object_values"].split(",")[:2] == ["complementary--*", "information--*"]
-    assert "access_token" not in asked
-    # Again: all is there, and offline without a token.
+    query = server.seen[0].query
+    assert query["object_values"].split(",")[:2] == ["complementary--*", "information--*"]
+    assert "access_token" not in query
+    # A second run uses the cache, also offline and without a token.
     server.seen.clear()
     assert fetch_layers(benches, spec=spec, **options) == files
     assert not server.seen
     assert fetch_layers(benches, spec=HttpSpec(offline=True), **options) == files
-    # Not in names, files, addresses or lines, however it is spelt.
-    everything = "\n".join([*texts(cache.folder), *told, repr(spec)])
+    # No file name, content, address or line contains the token in any spelling.
+    everything = "\n".join([*texts(cache.folder), *lines, repr(spec)])
     assert "paging" in everything
     assert not any(part in everything for part in TOKEN.split("|")[1:])
 
 
-def test_a_refused_token_is_not_told(server: Server, cache: Cache) -> None:
+def test_error_for_a_refused_token_hides_it(server: Server, cache: Cache) -> None:
     server.on("/map_features", Service([]))
     spec = HttpSpec(attempts=1, token=AccessToken("MLY|1|other"))
     words = ("401", "Invalid token OAuth (token)", "access token is still valid")
@@ -148,7 +147,7 @@ def test_a_refused_token_is_not_told(server: Server, cache: Cache) -> None:
     assert not any("other" in text for text in texts(cache.folder))
 
 
-def test_a_connection_that_is_cut_leaves_no_token(server: Server, cache: Cache) -> None:
+def test_interrupted_download_stores_no_token(server: Server, cache: Cache) -> None:
     body = json.dumps({"data": [], "next": TOKEN}).encode()
     server.on("/map_features", Answer(body, headers={"ETag": '"1"'}, cut=len(body) - 8),
               Answer(body))  # fmt: skip
@@ -158,7 +157,7 @@ def test_a_connection_that_is_cut_leaves_no_token(server: Server, cache: Cache) 
     assert not any("0123456789" in text for text in texts(cache.folder))
 
 
-def test_a_token_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_token_is_read_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MAPILLARY_ACCESS_TOKEN", raising=False)
     with refused(InputError, "MAPILLARY_ACCESS_TOKEN", "is not set"):
         AccessToken.from_environment("MAPILLARY_ACCESS_TOKEN")
@@ -170,16 +169,8 @@ def test_a_token_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("size", [1, 3, 7, 1000])
-def test_a_token_is_strained_out_of_blocks(size: int) -> None:
+def test_token_is_removed_across_blocks(size: int) -> None:
     spelt = ["a/b", r"a\/b", "a%2fb", r"a\u002Fb"]
     body = "".join(f"<{text}>" for text in spelt).encode()
     blocks = [body[start : start + size] for start in range(0, len(body), size)]
     assert b"".join(AccessToken("a/b").redact_blocks(blocks)) == b"<(token)>" * 4
-
-
-def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "x.json"
-    for content in ('{"data": [{"id": 1}]}', "[]", '{"features": [1]}', "x"):
-        path.write_text(content, "utf-8")
-        with refused(SourceError, str(path), "not an answer of Mapillary"):
-            read_layers(path, CATALOG.layers)

@@ -1,4 +1,4 @@
-"""OpenStreetMap elements, what they stand for, and files of them that tests write and damage."""
+"""OpenStreetMap elements, their geometry, and OpenStreetMap files."""
 
 from __future__ import annotations
 
@@ -110,9 +110,7 @@ def test_values_are_compared_exactly(tags: dict[str, str], *, expected: bool) ->
 
 
 @given(st.lists(SPECS, min_size=1, max_size=4), TAGS)
-def test_the_index_finds_what_trying_every_layer_finds(
-    specs: list[LayerSpec], tags: dict[str, str]
-) -> None:
+def test_tag_index_equals_linear_search(specs: list[LayerSpec], tags: dict[str, str]) -> None:
     index = TagIndex(specs)
     expected = [number for number, spec in enumerate(specs) if has_tags(tags, spec)]
     assert index.layers(tags) == expected
@@ -137,7 +135,7 @@ def square(size: float, x: float = 0.0, y: float = 0.0) -> NDArray[np.float64]:
     ],
     ids=["open", "area", "closed without area"],
 )
-def test_an_object_keeps_its_shape(line: NDArray[np.float64], kind: str) -> None:
+def test_way_of_an_object_is_a_line_or_an_area(line: NDArray[np.float64], kind: str) -> None:
     assert way_shape(line, "objects").geom_type == kind
     street = way_shape(line, "streets")  # a line even if closed
     assert isinstance(street, shapely.LineString)
@@ -162,9 +160,7 @@ BOW = xy((0, 0), (2, 2), (2, 0), (0, 2), (0, 0))
     ],
     ids=["outline", "crossed", "island in a hole", "adjoining", "hole at the edge"],
 )
-def test_a_building_is_the_area_of_its_outlines(
-    shape: BaseGeometry, kind: str, area: float
-) -> None:
+def test_building_is_the_area_of_its_outlines(shape: BaseGeometry, kind: str, area: float) -> None:
     assert (shape.geom_type, shape.is_valid) == (kind, True)
     assert shape.area == pytest.approx(area)
 
@@ -189,7 +185,7 @@ def test_pieces_of_a_ring_join_in_any_order_and_direction(cuts: list[int], rando
 CORNERS = [node(1, 0, 0), node(2, 1, 0), node(3, 1, 1), node(4, 0, 1)]
 
 
-def found(layer: RawLayer) -> dict[str, str]:
+def shapes_by_id(layer: RawLayer) -> dict[str, str]:
     assert layer.counts.kept == len(layer.table)
     return dict(zip(layer.table.source_id, layer.table.geometry.to_wkt(), strict=True))
 
@@ -221,7 +217,7 @@ def in_formats(plain: Path) -> dict[str, bytes]:
     return dict(zip(FORMATS, (*packings, *(packed.read_bytes(),) * 2), strict=True))
 
 
-def test_one_pass_reads_every_layer_in_the_order_asked(read: Read) -> None:
+def test_layers_are_read_in_the_requested_order(read: Read) -> None:
     layers = read(
         [STREETS, BENCHES, TREES, BUILDINGS],
         *CORNERS,
@@ -235,27 +231,30 @@ def test_one_pass_reads_every_layer_in_the_order_asked(read: Read) -> None:
     assert [layer.spec.name for layer in layers] == ["streets", "benches", "trees", "buildings"]
     streets, benches, trees, buildings = layers
     both = {"node/10": "POINT (2 48)"}
-    assert found(trees) == {"node/5": "POINT (2.5 48.5)"} | both
-    assert found(benches) == {"node/6": "POINT (2.6 48.6)", "way/7": "LINESTRING (0 0, 1 0)"} | both
-    assert found(buildings) == {"way/8": "POLYGON ((0 0, 1 0, 1 1, 0 1, 0 0))"}
-    assert found(streets) == {"way/9": "LINESTRING (0 0, 1 1)"}
+    assert shapes_by_id(trees) == {"node/5": "POINT (2.5 48.5)"} | both
+    assert (
+        shapes_by_id(benches)
+        == {"node/6": "POINT (2.6 48.6)", "way/7": "LINESTRING (0 0, 1 0)"} | both
+    )
+    assert shapes_by_id(buildings) == {"way/8": "POLYGON ((0 0, 1 0, 1 1, 0 1, 0 0))"}
+    assert shapes_by_id(streets) == {"way/9": "LINESTRING (0 0, 1 1)"}
     assert benches.table.class_name.tolist() == ["bench"] * 3
     assert buildings.table.class_name.tolist() == [""]
     assert all(layer.table.crs == "EPSG:4326" and layer.notes == () for layer in layers)
 
 
 @pytest.mark.parametrize("suffix", [*FORMATS, ".OSM", ".Osm.PBF"])
-def test_every_format_reads_the_same(tmp_path: Path, suffix: str) -> None:
+def test_all_formats_give_the_same_layers(tmp_path: Path, suffix: str) -> None:
     elements = (*CORNERS, way(7, [1, 2], BENCH), way(8, [1, 2, 3, 4, 1], HOUSE))
     plain = write_osm(tmp_path / "plain.osm", *elements)
     path = tmp_path / f"city{suffix}"
     path.write_bytes(in_formats(plain)[suffix.lower()])
     benches, buildings = read_layers(str(path), [BENCHES, BUILDINGS])
-    assert found(benches) == {"way/7": "LINESTRING (0 0, 1 0)"}
-    assert found(buildings) == {"way/8": "POLYGON ((0 0, 1 0, 1 1, 0 1, 0 0))"}
+    assert shapes_by_id(benches) == {"way/7": "LINESTRING (0 0, 1 0)"}
+    assert shapes_by_id(buildings) == {"way/8": "POLYGON ((0 0, 1 0, 1 1, 0 1, 0 0))"}
 
 
-# Each in two extracts: what is found, whichever is given first.
+# Elements in two extracts and the expected result, in either order.
 OVERLAPS: dict[str, tuple[list[str], list[str], dict[str, str]]] = {
     "the same node": ([node(1, 1, 2, BENCH)], [node(1, 1, 2, BENCH)], {"node/1": "POINT (1 2)"}),
     "a node and a way of one number": (
@@ -278,7 +277,7 @@ OVERLAPS: dict[str, tuple[list[str], list[str], dict[str, str]]] = {
         ['<node id="1" version="3" visible="false"/>'],
         {},
     ),
-    "a way whose node was moved": (
+    "a way with a moved node": (
         [node(1, 0, 0, version=1), node(2, 1, 0), way(7, [1, 2], BENCH, version=1)],
         [node(1, 0, 4, version=2), node(2, 1, 0), way(7, [1, 2], BENCH, version=1)],
         {"way/7": "POINT (0.5 2)"},
@@ -312,27 +311,27 @@ OVERLAPS: dict[str, tuple[list[str], list[str], dict[str, str]]] = {
 
 
 @pytest.mark.parametrize("case", OVERLAPS)
-def test_an_element_of_several_extracts_counts_once(tmp_path: Path, case: str) -> None:
+def test_element_in_several_extracts_counts_once(tmp_path: Path, case: str) -> None:
     *extracts, expected = OVERLAPS[case]
     paths = [write_osm(tmp_path / f"{n}.osm", *some) for n, some in enumerate(extracts)]
     for order in (paths, paths[::-1]):
         (layer,) = read_layers(order, [BENCHES])
         middles = shapely.centroid(layer.table.geometry.array)
-        assert dict(zip(found(layer), shapely.to_wkt(middles), strict=True)) == expected
+        assert dict(zip(shapes_by_id(layer), shapely.to_wkt(middles), strict=True)) == expected
         assert not layer.errors
 
 
-def test_merging_changes_no_tag(tmp_path: Path) -> None:
+def test_merging_extracts_keeps_tags(tmp_path: Path) -> None:
     strange = {"name": 'Bänke, "alt" = 100 % @\n木 \U0001f333', "amenity": "bench", "a:b": " x "}
     path = write_osm(tmp_path / "a.osm", node(-5, -1.2345678, 2.0000001, strange))
     other = write_osm(tmp_path / "b.osm", node(2, 0, 0, BENCH))
     spec = replace(BENCHES, where=tuple((key, (value,)) for key, value in strange.items()))
-    alone, merged = (read_layers(some, [spec])[0] for some in (path, [path, other]))
-    assert alone.table.source_id.tolist() == merged.table.source_id.tolist() == ["node/-5"]
-    assert alone.table.geometry.equals(merged.table.geometry)
+    single, merged = (read_layers(some, [spec])[0] for some in (path, [path, other]))
+    assert single.table.source_id.tolist() == merged.table.source_id.tolist() == ["node/-5"]
+    assert single.table.geometry.equals(merged.table.geometry)
 
 
-def test_extracts_of_different_days_are_told_and_a_damaged_one_is_named(tmp_path: Path) -> None:
+def test_extracts_of_different_days_are_noted_and_a_damaged_one_is_named(tmp_path: Path) -> None:
     paths = [tmp_path / name for name in ("old.osm.pbf", "new.pbf")]
     for path, year in zip(paths, (2021, 2022), strict=True):
         header = osmium.io.Header()
@@ -362,7 +361,7 @@ BOUNDS = '<bounds minlat="{1}" minlon="{0}" maxlat="{3}" maxlon="{2}"/>'
     ],
     ids=["one", "two extracts", "one of two", "empty", "all", "across the 180th meridian"],
 )
-def test_the_box_that_files_say_they_cover(
+def test_extent_is_the_box_in_the_headers(
     tmp_path: Path, boxes: list[tuple[int, ...] | None], extent: shapely.Geometry | None
 ) -> None:
     paths = [
@@ -391,10 +390,13 @@ def test_elements_of_another_kind_are_filtered(read: Read) -> None:
         way(13, [1, 2, 3, 1], {"area": "yes", **STREET}),
         *relations,
     )
-    assert (points.counts, list(found(points))) == (RowCounts(read=6, filtered=5), ["node/5"])
+    assert (points.counts, list(shapes_by_id(points))) == (
+        RowCounts(read=6, filtered=5),
+        ["node/5"],
+    )
     assert anything.counts == RowCounts(read=6, filtered=4)
-    assert list(found(anything)) == ["node/5", "way/6"]
-    assert list(found(streets)) == ["way/11", "way/12"]
+    assert list(shapes_by_id(anything)) == ["node/5", "way/6"]
+    assert list(shapes_by_id(streets)) == ["way/11", "way/12"]
 
 
 def test_multipolygons_with_untagged_members(read: Read) -> None:
@@ -412,27 +414,27 @@ def test_multipolygons_with_untagged_members(read: Read) -> None:
     assert buildings.table.source_id.tolist() == ["relation/30"]
     house = buildings.table.geometry[0]
     assert (house.area, len(house.interiors)) == (pytest.approx(1 - 0.02), 1)
-    assert list(found(benches)) == ["relation/31"]
+    assert list(shapes_by_id(benches)) == ["relation/31"]
     assert benches.table.geometry[0].equals(shapely.box(0, 0, 1, 1))
 
 
 def test_ways_before_nodes_out_of_order_and_with_negative_numbers(read: Read) -> None:
     ways = [way(7, [9, 5], BENCH), way(8, [-1, 5], BENCH), way(-9, [-1, -2], BENCH)]
     benches = read(BENCHES, *ways, node(9, 0, 0), node(-2, 3, 3), node(5, 2, 0), node(-1, 2, 2))
-    assert found(benches) == {
+    assert shapes_by_id(benches) == {
         "way/7": "LINESTRING (0 0, 2 0)",
         "way/8": "LINESTRING (2 2, 2 0)",
         "way/-9": "LINESTRING (2 2, 3 3)",
     }
 
 
-def test_deleted_elements_are_not_there(read: Read) -> None:
-    gone = '<node id="2" visible="false" lat="1" lon="1"><tag k="natural" v="tree"/></node>'
-    trees = read(TREES, node(1, 2, 48, TREE), gone)
-    assert (trees.counts.read, list(found(trees))) == (1, ["node/1"])
+def test_deleted_elements_are_omitted(read: Read) -> None:
+    deleted_tree = '<node id="2" visible="false" lat="1" lon="1"><tag k="natural" v="tree"/></node>'
+    trees = read(TREES, node(1, 2, 48, TREE), deleted_tree)
+    assert (trees.counts.read, list(shapes_by_id(trees))) == (1, ["node/1"])
 
 
-def test_where_and_class_by_are_by_tag(read: Read) -> None:
+def test_where_and_class_by_use_tags(read: Read) -> None:
     by_colour = ClassBy("colour", (("red", "taxi_station"),), otherwise=True)
     spec = replace(BENCHES, where=(("backrest", ("yes",)),), class_by=by_colour)
     nodes = [
@@ -442,14 +444,14 @@ def test_where_and_class_by_are_by_tag(read: Read) -> None:
         node(4, 2, 48, {**BENCH, "backrest": "yes", "colour": "red"}),
     ]
     layer = read(spec, *nodes)
-    assert list(found(layer)) == ["node/1", "node/4"]
+    assert list(shapes_by_id(layer)) == ["node/1", "node/4"]
     assert layer.table.class_name.tolist() == ["bench", "taxi_station"]
     assert layer.counts.filtered == 2
     everything = read(spec, *nodes, filters=False)
     assert (len(everything.table), everything.counts.filtered) == (4, 0)
 
 
-def test_what_is_below_the_street_is_left_out_and_told(read: Read) -> None:
+def test_objects_below_the_street_are_excluded_and_counted(read: Read) -> None:
     rules = (("level", ("<0",)), ("layer", ("<0",)), ("disused", ("*",)))
     spec = replace(BENCHES, exclusions=rules)
     tags = [
@@ -459,7 +461,7 @@ def test_what_is_below_the_street_is_left_out_and_told(read: Read) -> None:
     ]
     nodes = [node(number, 2, 48, {**BENCH, **more}) for number, more in enumerate(tags, start=1)]
     layer = read(spec, *nodes)
-    assert list(found(layer)) == [f"node/{number}" for number in range(1, 6)]
+    assert list(shapes_by_id(layer)) == [f"node/{number}" for number in range(1, 6)]
     assert layer.counts == RowCounts(read=10, excluded=5)
     assert layer.notes == ("left out by the catalogue's not: level 3, layer 1, disused 1",)
     everything = read(spec, *nodes, filters=False)
@@ -468,22 +470,21 @@ def test_what_is_below_the_street_is_left_out_and_told(read: Read) -> None:
     assert read(above, *nodes).counts == RowCounts(read=10, filtered=3)
 
 
-def test_layers_of_no_elements_and_another_crs(read: Read) -> None:
-    assert read([]) == ()
+def test_other_crs_of_an_empty_layer_is_noted(read: Read) -> None:
     trees = read(TREES, crs="EPSG:2154")
     assert (trees.counts.read, len(trees.table), trees.table.crs) == (0, 0, "EPSG:4326")
     assert any("EPSG:2154" in note for note in trees.notes)
 
 
-def test_no_user_metadata_is_kept() -> None:
+def test_user_metadata_is_dropped() -> None:
     (layer,) = read_layers(Path(__file__).with_name("data") / "mappers.osm", [BENCHES])
     assert layer.table.columns.tolist() == ["class_name", "source_id", "geometry"]
     assert (len(layer.table), layer.counts.unreadable) == (2, 1)
-    kept = pickle.dumps(layer) + repr(layer).encode()
+    content = pickle.dumps(layer) + repr(layer).encode()
     for secret in (b"Quasimodo", b"Esmeralda", b"987654321", b"876543210", b"2019", b"05:04"):
-        assert secret not in kept
+        assert secret not in content
     numbers = np.array([987654321, 876543210, 1562389443])
-    assert all(number.tobytes() not in kept for number in numbers)
+    assert all(number.tobytes() not in content for number in numbers)
 
 
 AREA = {"type": "multipolygon", **HOUSE}
@@ -514,10 +515,10 @@ UNTAGGED = [
         (relation(1, {9: "outer"}, AREA), "relation/1 encloses no area"),
     ],
 )
-def test_what_is_incomplete_or_broken_is_skipped(read: Read, element: str, message: str) -> None:
+def test_incomplete_or_invalid_element_is_counted(read: Read, element: str, message: str) -> None:
     house = way(20, [1, 2, 3, 4, 1], HOUSE)
     buildings = read(BUILDINGS, *CORNERS, *UNTAGGED, house, element)
-    assert list(found(buildings)) == ["way/20"]
+    assert list(shapes_by_id(buildings)) == ["way/20"]
     assert buildings.counts == RowCounts(read=2, unreadable=1)
     assert buildings.errors[0].partition(": ")[2].startswith(message)
 
@@ -544,7 +545,7 @@ CUT = [(suffix, suffix, part) for suffix in PACKED for part in (0.0, 0.001, 0.4,
 
 
 @pytest.mark.parametrize(("suffix", "kind", "part"), CUT + OTHERS)
-def test_a_file_that_is_cut_or_of_another_kind_is_refused(
+def test_truncated_file_or_file_of_another_format_is_refused(
     big: dict[str, bytes], tmp_path: Path, suffix: str, kind: str, part: float
 ) -> None:
     path = tmp_path / f"city{suffix}"
@@ -554,24 +555,14 @@ def test_a_file_that_is_cut_or_of_another_kind_is_refused(
 
 
 @pytest.mark.parametrize("name", ["city.osm.xz", "city.geojson", "city.gz", "osm", "-"])
-def test_another_suffix_is_refused(tmp_path: Path, name: str) -> None:
+def test_unknown_suffix_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(b"anything")
     with refused(SourceError, str(path), ".osm, .osm.gz, .osm.bz2, .pbf"):
         read_layers(path, [TREES])
 
 
-def test_what_is_no_file_of_elements_is_refused(tmp_path: Path, read: Read) -> None:
-    with refused(SourceError, "city.osm", "north"):
-        read(TREES, '<node id="1" lat="north" lon="2"/>')
-    with refused(SourceError, "is a folder"):
-        read_layers(tmp_path, [TREES])
-    for nowhere in (tmp_path / "nowhere.osm", "http://localhost/city.osm", "-"):
-        with refused(SourceError, "does not exist"):
-            read_layers(nowhere, [TREES])
-
-
-def test_a_name_is_never_an_address_or_standard_input(
+def test_path_is_never_an_address_or_standard_input(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -579,13 +570,16 @@ def test_a_name_is_never_an_address_or_standard_input(
     path.parent.mkdir(parents=True)
     write_osm(path, node(1, 2, 48, TREE))
     (trees,) = read_layers("http:/localhost/city.osm", [TREES])
-    assert list(found(trees)) == ["node/1"]
+    assert list(shapes_by_id(trees)) == ["node/1"]
+    for name in ("http://localhost/town.osm", "-"):
+        with refused(SourceError, "does not exist"):
+            read_layers(name, [TREES])
 
 
 @pytest.mark.parametrize(
     ("change", "words"), [({"tags": ()}, "no tags"), ({"id_field": "ref"}, "id_field = 'ref'")]
 )
-def test_a_specification_that_does_not_fit_is_refused(
+def test_layer_without_tags_or_with_id_field_is_refused(
     read: Read, change: dict[str, Any], words: str
 ) -> None:
     with refused(CatalogError, "'benches'", words):
@@ -623,8 +617,8 @@ def peak_megabytes(path: Path, nodes: int) -> int:
     command = [sys.executable, "-c", MEASURE, str(path)]
     root = Path(__file__).parents[2]
     result = subprocess.run(command, check=True, capture_output=True, text=True, cwd=root)
-    kept, peak = map(int, result.stdout.split())
-    assert kept == 1001
+    rows, peak = map(int, result.stdout.split())
+    assert rows == 1001
     return peak
 
 

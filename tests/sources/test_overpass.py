@@ -1,4 +1,4 @@
-"""Overpass and Nominatim servers, played on the loopback, and the files that they send."""
+"""Overpass and Nominatim, simulated by a local server, and files of Overpass."""
 
 from __future__ import annotations
 
@@ -84,27 +84,27 @@ BENCHES = [
 ]
 
 
-def box_of(seen: Seen) -> tuple[float, float, float, float]:
+def box_of(request: Seen) -> tuple[float, float, float, float]:
     """Return west, south, east and north of a query."""
-    found = re.search(r"\[bbox:(.*?)\]", seen.form["data"])
-    assert found is not None
-    south, west, north, east = map(float, found[1].split(","))
+    match = re.search(r"\[bbox:(.*?)\]", request.form["data"])
+    assert match is not None
+    south, west, north, east = map(float, match[1].split(","))
     return west, south, east, north
 
 
-def in_box(seen: Seen) -> Answer:
-    """Answer as a server does that knows the benches."""
-    west, south, east, north = box_of(seen)
+def in_box(request: Seen) -> Answer:
+    """Answer with the benches in the box of the query."""
+    west, south, east, north = box_of(request)
     inside = [b for b in BENCHES if west <= b["lon"] <= east and south <= b["lat"] <= north]
     return Answer(sent(inside))
 
 
 def wider_than(limit: float, answer: Answer) -> Callable[[Seen], Answer]:
-    """Play a server for which wide tiles are too much."""
+    """Return a script that answers a wider tile with `answer`."""
 
-    def script(seen: Seen) -> Answer:
-        west, _, east, _ = box_of(seen)
-        return answer if east - west > limit + 1e-6 else in_box(seen)
+    def script(request: Seen) -> Answer:
+        west, _, east, _ = box_of(request)
+        return answer if east - west > limit + 1e-6 else in_box(request)
 
     return script
 
@@ -118,20 +118,20 @@ def server(server: Server) -> Server:
 
 @pytest.fixture
 def get(server: Server, cache: Cache, quick: HttpSpec) -> Get:
-    """Fetch the benches of the area; keywords change the specification or those of the call."""
+    """Fetch the benches of the area; keywords replace arguments or fields of the spec."""
     fields = {field.name for field in dataclasses.fields(HttpSpec)}
 
     def call(**what: Any) -> list[Path]:  # noqa: ANN401 - see above
         own = {name: what.pop(name) for name in fields & what.keys()}
         spec = replace(quick, **{"attempts": 2, **own})
-        given = {"area": AREA, "endpoints": [f"{server.url}/api"], "cache": cache, "spec": spec}
-        return fetch_layers([BENCH], **{**given, **what})
+        options = {"area": AREA, "endpoints": [f"{server.url}/api"], "cache": cache, "spec": spec}
+        return fetch_layers([BENCH], **{**options, **what})
 
     return call
 
 
-def asked(server: Server) -> int:
-    """Return how many queries the server was asked."""
+def query_count(server: Server) -> int:
+    """Return the number of queries that the server received."""
     return sum(path.endswith("/interpreter") for path in server.paths())
 
 
@@ -144,7 +144,7 @@ def ids(paths: list[Path]) -> list[str]:
 ALL = [f"node/{bench['id']}" for bench in BENCHES]
 
 
-def test_the_query_asks_for_exact_tags(snapshot: Callable[[str, str], None]) -> None:
+def test_query_has_exact_tags(snapshot: Callable[[str, str], None]) -> None:
     marked = (("highway", ("crossing",)), ("crossing", ("marked", "a.b;c")))
     tags = (marked, (("crossing:markings", ("*",)),))
     crossings = replace(BENCH, tags=tags, elements=("node",))
@@ -155,86 +155,88 @@ def test_the_query_asks_for_exact_tags(snapshot: Callable[[str, str], None]) -> 
         overpass_query([replace(BENCH, tags=())], (1, 2, 3, 4))
 
 
-# The star is no value: it stands for all of them.
+# The star is not a value, it means any value.
 TAG_VALUES = st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=8)
 
 
 @given(TAG_VALUES.filter(lambda value: value != ANY_VALUE))
-def test_a_list_of_values_matches_exactly_those(value: str) -> None:
+def test_pattern_for_several_values_matches_exactly_these(value: str) -> None:
     layer = replace(BENCH, tags=((("k", (value, "other")),),), elements=("node",))
-    found = re.search(r'(?m)^node\["k"~"(.*)"\];$', overpass_query([layer], (1, 2, 3, 4)))
-    assert found is not None
-    pattern = re.sub(r"\\(.)", r"\1", found[1])  # as the server reads a text
+    match = re.search(r'(?m)^node\["k"~"(.*)"\];$', overpass_query([layer], (1, 2, 3, 4)))
+    assert match is not None
+    pattern = re.sub(r"\\(.)", r"\1", match[1])  # as the server reads a text
     assert re.search(pattern, value)
     assert not re.search(pattern, f"{value}x")
     assert not re.search(pattern, f"x{value}") or value.startswith("x")
 
 
-def test_an_area_is_fetched_in_tiles(server: Server, get: Get, slept: list[float]) -> None:
+def test_area_is_fetched_in_tiles(server: Server, get: Get, slept: list[float]) -> None:
     steps: list[tuple[int, int]] = []
     paths = get(progress=lambda *step: steps.append(step))
     assert len(paths) == 2
     assert ids(paths) == ALL  # those on the border of the tiles are in both, and count once
     assert steps == [(1, 2), (2, 2)]
     assert server.paths() == ["/api/status", "/api/interpreter"] * 2
-    assert all("semsig_gis/" in seen.headers["user-agent"] for seen in server.seen)
+    assert all("semsig_gis/" in request.headers["user-agent"] for request in server.seen)
     assert slept == []
 
 
-def test_tiles_outside_the_polygon_are_not_asked_for(server: Server, get: Get) -> None:
+def test_tiles_outside_the_polygon_are_not_requested(server: Server, get: Get) -> None:
     corner = shapely.Polygon([(2, 48), (2.05, 48), (2.2, 48.1), (2.2, 48.1), (2.0, 48.05)])
     get(area=Area(corner, "corner"), tile_deg=0.05)
-    assert 0 < asked(server) < 8
+    assert 0 < query_count(server) < 8
 
 
-def test_an_area_across_180_degrees_is_asked_for_on_both_sides(server: Server, get: Get) -> None:
+def test_area_across_180_degrees_is_requested_on_both_sides(server: Server, get: Get) -> None:
     get(area=parse_area("179.95,-17,-179.9,-16.9"))
-    boxes = sorted(box_of(seen) for seen in server.seen if seen.path.endswith("/interpreter"))
+    boxes = sorted(
+        box_of(request) for request in server.seen if request.path.endswith("/interpreter")
+    )
     assert boxes == [(-180, -17, -179.9, -16.9), (179.95, -17, 180, -16.9)]
 
 
-def test_a_second_run_needs_no_server(server: Server, get: Get) -> None:
+def test_second_run_needs_no_server(server: Server, get: Get) -> None:
     first = get()
     assert get() == get(offline=True) == first
-    assert (asked(server), len(server.seen)) == (2, 4)
+    assert (query_count(server), len(server.seen)) == (2, 4)
     with refused(NotCachedError, "is not in the cache"):
         get(offline=True, area=parse_area("1,1,2,2"))
 
 
-def test_an_interrupted_run_goes_on(server: Server, get: Get) -> None:
+def test_interrupted_run_continues(server: Server, get: Get) -> None:
     server.on("/api/interpreter", in_box, Answer(b"bad", status=400), in_box)
     with pytest.raises(SourceError):
         get()
     assert ids(get()) == ALL
-    assert asked(server) == 3
+    assert query_count(server) == 3
 
 
 @pytest.mark.parametrize(
     ("answer", "tries"),
     [
-        # A time-out comes with what was found so far, inside an answer 200.
+        # After a time-out, the answer has status 200 and the elements up to then.
         (Answer(sent(BENCHES[:1], TIMED_OUT)), 1),
         (Answer(sent(BENCHES[:1], NO_MEMORY)), 1),
         (Answer(status=504), 2),
     ],
 )
-def test_a_tile_that_is_too_much_is_split(
+def test_tile_that_is_too_large_is_split(
     server: Server, get: Get, answer: Answer, tries: int
 ) -> None:
     server.on("/api/interpreter", wider_than(0.05, answer))
     steps: list[tuple[int, int]] = []
     paths = get(progress=lambda *step: steps.append(step))
     assert ids(paths) == ALL
-    assert (len(paths), steps[-1], asked(server)) == (8, (8, 8), 2 * tries + 8)
+    assert (len(paths), steps[-1], query_count(server)) == (8, (8, 8), 2 * tries + 8)
     assert get(offline=True) == paths
     if tries == 1:  # what was too much once is not asked for again
         assert get() == paths
-        assert asked(server) == 2 + 8
+        assert query_count(server) == 2 + 8
 
 
-def test_a_tile_of_too_many_bytes_is_split(server: Server, get: Get) -> None:
+def test_tile_of_too_many_bytes_is_split(server: Server, get: Get) -> None:
     assert ids(get(max_bytes=len(sent(BENCHES[:2])) + 5)) == ALL
-    assert asked(server) > 2
+    assert query_count(server) > 2
 
 
 @pytest.mark.parametrize(
@@ -244,30 +246,30 @@ def test_a_tile_of_too_many_bytes_is_split(server: Server, get: Get) -> None:
         (Answer(status=504), "504 Gateway Timeout"),
     ],
 )
-def test_splitting_ends(server: Server, get: Get, answer: Answer, words: str) -> None:
+def test_smallest_tile_is_not_split(server: Server, get: Get, answer: Answer, words: str) -> None:
     server.on("/api/interpreter", answer)
     with refused(SourceError, words, f"127.0.0.1:{server.port}"):
         get()
 
 
-def test_a_remark_that_is_no_error_is_no_error(server: Server, get: Get) -> None:
+def test_remark_without_error_is_accepted(server: Server, get: Get) -> None:
     server.on("/api/interpreter", Answer(sent(BENCHES, "data is a minute old")))
     assert ids(get()) == ALL
 
 
-def test_slots_are_waited_for_unless_far_away(server: Server, get: Get, slept: list[float]) -> None:
+def test_pause_until_a_slot_is_free_has_a_limit(
+    server: Server, get: Get, slept: list[float]
+) -> None:
     later = BUSY.replace("in 7 s", "in 700 s").replace("in 60 s", "in 900 s")
     server.on("/api/status", *(Answer(text.encode(), type="text/plain") for text in (later, BUSY)))
     with refused(HttpError, "no free slot for 700 s"):
         get()
-    assert (slept, asked(server)) == ([], 0)
+    assert (slept, query_count(server)) == ([], 0)
     assert ids(get()) == ALL
     assert slept == [8.0, 8.0]  # before each of the tiles
 
 
-def test_a_server_without_status_is_asked_all_the_same(
-    server: Server, get: Get, slept: list[float]
-) -> None:
+def test_server_without_status_page_is_used(server: Server, get: Get, slept: list[float]) -> None:
     server.on("/api/status", Answer(status=404))
     server.on("/api/interpreter", Answer(status=429, headers={"Retry-After": "5"}), in_box)
     assert (ids(get()), slept) == (ALL, [5.0])
@@ -284,7 +286,7 @@ def test_a_server_without_status_is_asked_all_the_same(
         ("<html>", 0),
     ],
 )
-def test_the_status_says_how_long_to_wait(status: str, seconds: float) -> None:
+def test_waiting_time_is_read_from_the_status_page(status: str, seconds: float) -> None:
     assert waiting_time(status) == seconds
 
 
@@ -302,7 +304,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("bad", BROKEN.values(), ids=BROKEN)
-def test_another_server_is_asked_where_one_fails(server: Server, get: Get, bad: Answer) -> None:
+def test_other_server_is_used_if_one_fails(server: Server, get: Get, bad: Answer) -> None:
     server.on("/broken/interpreter", bad)
     endpoints = [f"{server.url}/broken", f"{server.url}/api/interpreter/"]
     assert ids(get(endpoints=endpoints)) == ALL
@@ -312,7 +314,7 @@ def test_another_server_is_asked_where_one_fails(server: Server, get: Get, bad: 
         get(endpoints=endpoints[:1], area=parse_area("3,48,3.1,48.1"))
 
 
-def test_where_all_servers_fail_each_is_told(server: Server, get: Get) -> None:
+def test_error_names_each_failing_server(server: Server, get: Get) -> None:
     server.on("/a/interpreter", Answer(status=503))
     with refused(SourceError, "no Overpass server", "503", "localhost", "404"):
         get(endpoints=[f"{server.url}/a", f"{server.other_host}/b"])
@@ -369,9 +371,7 @@ def test_buildings_and_streets_keep_their_shape() -> None:
         ({"type": "relation", "id": 1}, "relation/1 encloses no area"),
     ],
 )
-def test_an_incomplete_element_is_counted(
-    tmp_path: Path, element: dict[str, Any], words: str
-) -> None:
+def test_incomplete_element_is_counted(tmp_path: Path, element: dict[str, Any], words: str) -> None:
     tags = {"amenity": "bench", "type": "multipolygon"}
     path = tmp_path / "tile.json"
     path.write_bytes(sent([BENCHES[0], element | {"tags": tags, "id": 99}]))
@@ -381,28 +381,8 @@ def test_an_incomplete_element_is_counted(
     assert words.replace("/1 ", "/99 ") in layer.errors[0]
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        *((bad, "is not JSON as Overpass servers send it") for bad in (b"", b"\xff\xfe", b"null")),
-        (b"[" * 100_000, "is not JSON as Overpass servers send it"),
-        (sent(BENCHES, TIMED_OUT), "is incomplete (runtime error: Query timed out"),
-        (None, "cannot be read (No such file"),
-    ],
-)
-def test_a_file_that_is_no_answer_is_said(
-    tmp_path: Path, content: bytes | None, words: str
-) -> None:
-    path = tmp_path / "tile.json"
-    if content is not None:
-        path.write_bytes(content)
-    with refused(SourceError, words):
-        read_layers(path, [BENCH])
-
-
-def test_no_layers_are_none(cache: Cache, tmp_path: Path) -> None:
+def test_no_layers_need_no_request(cache: Cache) -> None:
     assert fetch_layers([], area=AREA, endpoints=["http://x"], cache=cache) == []
-    assert read_layers(tmp_path / "nowhere.json", []) == ()
 
 
 def as_overpass(path: Path) -> bytes:
@@ -437,13 +417,13 @@ def as_overpass(path: Path) -> bytes:
     return sent(elements)
 
 
-def test_a_server_and_a_file_say_the_same_of_a_city(geodata: Path, tmp_path: Path) -> None:
+def test_server_and_file_give_the_same_city(geodata: Path, tmp_path: Path) -> None:
     file = geodata / "osm" / "neukolln_2024.osm"
     answer = tmp_path / "neukolln.json"
     answer.write_bytes(as_overpass(file))
     specs = load_catalog("openstreetmap").layers
     pairs = zip(read_layers(answer, specs), osm_file.read_layers(file, specs), strict=True)
-    found = 0
+    rows = 0
     for ours, theirs in pairs:
         mine = ours.table.set_index("source_id").sort_index()
         other = theirs.table.set_index("source_id").sort_index()
@@ -451,11 +431,11 @@ def test_a_server_and_a_file_say_the_same_of_a_city(geodata: Path, tmp_path: Pat
         assert mine.geometry.geom_equals_exact(other.geometry, 1e-7).all(), ours.spec.name
         assert ours.counts == theirs.counts
 
-        found += len(mine)
-    assert found > 300
+        rows += len(mine)
+    assert rows > 300
 
 
-def test_a_server_and_a_file_leave_out_the_same(tmp_path: Path) -> None:
+def test_server_and_file_exclude_the_same_elements(tmp_path: Path) -> None:
     """Servers send what is underground too, so that what is left out is counted."""
     more: list[dict[str, str]] = [
         {},
@@ -475,7 +455,7 @@ def test_a_server_and_a_file_leave_out_the_same(tmp_path: Path) -> None:
     assert "level" not in overpass_query([spec], (1, 47, 3, 49))
 
 
-def test_a_place_is_found_with_its_outline(server: Server, cache: Cache) -> None:
+def test_place_has_its_outline(server: Server, cache: Cache) -> None:
     outline = json.loads(shapely.to_geojson(shapely.box(13.4, 52.4, 13.5, 52.5)))
     answer = [
         {"display_name": "a statue", "geojson": {"type": "Point", "coordinates": [13, 52]}},
@@ -486,10 +466,10 @@ def test_a_place_is_found_with_its_outline(server: Server, cache: Cache) -> None
     where: dict[str, Any] = {"endpoint": f"{server.url}/", "cache": cache}
     area = find_place(" Neukölln  Berlin", **where)
     assert (area.name, area.bounds) == ("Neukölln, Berlin", (13.4, 52.4, 13.5, 52.5))
-    (seen,) = server.seen
+    (request,) = server.seen
     query = {"q": "Neukölln Berlin", "polygon_geojson": "1", "format": "jsonv2"}
-    assert query.items() <= seen.query.items()
-    assert seen.headers["user-agent"].startswith("semsig_gis/")
+    assert query.items() <= request.query.items()
+    assert request.headers["user-agent"].startswith("semsig_gis/")
     again = find_place("Neukölln Berlin", **where, spec=HttpSpec(offline=True))
     assert math.isclose(again.polygon.area, area.polygon.area)
     assert len(server.seen) == 1
@@ -506,7 +486,7 @@ def test_a_place_is_found_with_its_outline(server: Server, cache: Cache) -> None
         (b"[{", SourceError, "did not answer as a Nominatim server"),
     ],
 )
-def test_a_place_that_is_not_found_is_said(
+def test_unknown_place_is_an_error(
     server: Server, cache: Cache, answer: bytes, kind: type[Exception], words: str
 ) -> None:
     server.on("/search", Answer(answer))

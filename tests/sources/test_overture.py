@@ -1,4 +1,4 @@
-"""Overture Maps: what is read of its files, and of an object store that runs on this machine."""
+"""Overture Maps from files and from a local object store."""
 
 from __future__ import annotations
 
@@ -69,9 +69,11 @@ def write(folder: Path, kind: str, rows: Sequence[dict[str, object]], **more: pa
     path = folder / f"theme={theme}" / f"type={name}" / "part-0.zstd.parquet"
     path.parent.mkdir(parents=True, exist_ok=True)
     schema = pa.schema([*SCHEMA, *more.items()])
-    told = [{key: list(v.items()) if isinstance(v, dict) and key == "source_tags" else v
+    records = [{key: list(v.items()) if isinstance(v, dict) and key == "source_tags" else v
              for key, v in row.items()} for row in rows]  # fmt: skip
-    pq.write_table(pa.Table.from_pylist(told, schema), path, row_group_size=10, compression="zstd")
+    pq.write_table(
+        pa.Table.from_pylist(records, schema), path, row_group_size=10, compression="zstd"
+    )
     return path
 
 
@@ -114,7 +116,7 @@ EXPECTED = {
 }  # bench 32 is on a level below the ground
 
 
-def test_a_release_is_read_by_type_class_and_level(release: Path) -> None:
+def test_release_is_read_by_type_class_and_level(release: Path) -> None:
     pairs, absent = find_files(SPECS, [release])
     paths = list(dict.fromkeys(path for _, path in pairs))
     assert not absent
@@ -130,7 +132,9 @@ def test_a_release_is_read_by_type_class_and_level(release: Path) -> None:
     assert "trees" in kept(read_layers(renamed, SPECS, area=AREA))
 
 
-def test_row_groups_outside_are_not_read(release: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_row_groups_outside_the_area_are_skipped(
+    release: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     read: list[int] = []
     original = pq.ParquetFile.read_row_group
 
@@ -148,7 +152,9 @@ def test_row_groups_outside_are_not_read(release: Path, monkeypatch: pytest.Monk
     assert read == list(range(11))
 
 
-def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache: Cache) -> None:
+def test_store_sends_only_the_area_and_only_once(
+    release: Path, server: Server, cache: Cache
+) -> None:
     padding = np.random.default_rng(1).bytes(20_000)
     land = next(release.glob("theme=base/type=land/*"))
     table = pq.read_table(land, partitioning=None)
@@ -156,8 +162,8 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
     table = table.set_column(1, "geometry", spoiled)  # WKB ends where its geometry does
     pq.write_table(table, land, row_group_size=10)
     address = keep_in_bucket(server, "maps", release.parent)
-    told: list[str] = []
-    spec = HttpSpec(attempts=1, report=told.append)
+    lines: list[str] = []
+    spec = HttpSpec(attempts=1, report=lines.append)
     options: Any = {"endpoints": [address], "area": AREA, "cache": cache}
     steps: list[tuple[int, int]] = []
     files = fetch_layers(SPECS, spec=spec, progress=lambda *s: steps.append(s), **options)
@@ -165,7 +171,7 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
     assert kept(layers) == EXPECTED
     assert layers[-1].table["name"].item() == "Rue"
     assert steps == [(n, 4) for n in (1, 2, 3, 4)]
-    assert told == ["s3://maps: release 2026-08-19.0, 4 files"]
+    assert lines == ["s3://maps: release 2026-08-19.0, 4 files"]
     size = land.stat().st_size
     ranges = [s.headers.get("range", "") for s in server.seen if "type%3Dland" in s.path]
     spans = [text.removeprefix("bytes=").split("-") for text in ranges if text]
@@ -173,7 +179,7 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
     assert 0 < sent < size / 3
     server.seen.clear()
     assert fetch_layers(SPECS, spec=spec, **options) == files
-    assert all(seen.path == "/maps" for seen in server.seen)  # a release does not change
+    assert all(request.path == "/maps" for request in server.seen)  # a release does not change
     offline = HttpSpec(offline=True)
     assert fetch_layers(SPECS, spec=offline, **options) == files
     with refused(NotCachedError, address, "without --offline"):
@@ -190,20 +196,10 @@ def test_a_store_gives_what_is_needed_once(release: Path, server: Server, cache:
         ("empty", SourceError, ("contains no files of base/land", "endpoints")),
     ],
 )
-def test_a_store_that_is_none_is_refused(
+def test_invalid_store_is_refused(
     address: str, error: type[Exception], words: Sequence[str], cache: Cache, tmp_path: Path
 ) -> None:
     (tmp_path / "empty" / "2026" / "theme=base" / "type=land").mkdir(parents=True)
     where = address if "/" in address else str(tmp_path / address)
     with refused(error, *words):
         fetch_layers(SPECS[:1], endpoints=[where], area=AREA, cache=cache)
-
-
-def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "x.parquet"
-    pq.write_table(pa.table({"id": ["a"], "amenity": ["bench"]}), path)
-    with refused(SourceError, str(path), "not a file of Overture Maps", "id, amenity"):
-        read_layers(path, SPECS)
-    path.write_bytes(b"PAR1")
-    with refused(SourceError, str(path), "cannot be read as GeoParquet"):
-        read_layers(path, SPECS)

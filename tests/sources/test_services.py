@@ -1,4 +1,4 @@
-"""Services that send pages, each played by a stand-in on this machine."""
+"""Services that send pages, each simulated by a local server."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def fetched(cache: Cache, quick: HttpSpec) -> Fetch:
 
     def call(service: StandIn, layer: LayerSpec = LAMPS, **options: Any) -> Download:  # noqa: ANN401
         layer = replace(layer, dataset=layer.dataset or service.dataset)
-        given = {"endpoints": [service.endpoint], "cache": cache, "spec": quick, **options}
-        (download,) = fetch_layers(service.reader, [layer], **given)
+        arguments = {"endpoints": [service.endpoint], "cache": cache, "spec": quick, **options}
+        (download,) = fetch_layers(service.reader, [layer], **arguments)
         return download
 
     return call
@@ -72,21 +72,23 @@ def xy(layer: RawLayer) -> list[tuple[float, float]]:
     return [(x, y) for x, y in shapely.get_coordinates(layer.table.geometry.array).round(9)]
 
 
-def test_pages_are_one_layer_and_kept(service: StandIn, fetched: Fetch, quick: HttpSpec) -> None:
+def test_pages_become_one_layer_and_are_cached(
+    service: StandIn, fetched: Fetch, quick: HttpSpec
+) -> None:
     steps: list[tuple[int, int]] = []
-    download = fetched(service, progress=lambda done, total: steps.append((done, total)))
+    download = fetched(service, progress=lambda rows, total: steps.append((rows, total)))
     layer = download.read()
     assert (ids(layer), xy(layer)) == (["11", "12", "13", "14", "15"], PLACES)
     assert (layer.table.crs, layer.errors, layer.notes) == ("EPSG:4326", (), ())
     assert len(download.files) == len(service.pages_asked()) == 3
     assert steps == [(2, 5), (4, 5), (5, 5)]
-    asked = len(service.server.seen)
+    requests = len(service.server.seen)
     again = fetched(service, spec=replace(quick, offline=True))
-    assert len(service.server.seen) == asked
+    assert len(service.server.seen) == requests
     assert ids(again.read()) == ids(layer)
 
 
-def test_the_service_cuts_out_the_area(service: StandIn, fetched: Fetch) -> None:
+def test_service_selects_the_area(service: StandIn, fetched: Fetch) -> None:
     layer = fetched(service, area=NEAR).read()
     if not service.cuts:
         assert layer.counts.read == 5
@@ -97,14 +99,14 @@ def test_the_service_cuts_out_the_area(service: StandIn, fetched: Fetch) -> None
     assert (layer.counts.read, layer.notes) == (0, ("the layer has no rows",))
 
 
-def test_an_area_across_180_degrees_is_two_boxes(server: Server, fetched: Fetch) -> None:
+def test_area_across_180_degrees_is_two_boxes(server: Server, fetched: Fetch) -> None:
     service = ArcGIS(server)
     service.rows = [{**ROWS[0], "xy": (179.95, 1.0)}, {**ROWS[1], "xy": (-179.95, 1.0)}]
     layer = fetched(service, area=parse_area("179.9,0,-179.9,2")).read()
     assert (ids(layer), len(service.pages_asked())) == (["11", "12"], 2)
 
 
-def test_an_interrupted_run_goes_on_where_it_ended(service: StandIn, fetched: Fetch) -> None:
+def test_interrupted_run_continues_at_the_next_page(service: StandIn, fetched: Fetch) -> None:
     service.whole = 2
     with refused(HttpError, "layer 'lamps'", "503", "try again later"):
         fetched(service)
@@ -122,7 +124,7 @@ def test_an_interrupted_run_goes_on_where_it_ended(service: StandIn, fetched: Fe
         ({"surplus": -2}, ["sends 4 rows where it announced 3"]),
     ],
 )
-def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(
+def test_inconsistent_pages_are_refused_and_fetched_again(
     service: StandIn, fetched: Fetch, *, fault: dict[str, Any], words: list[str]
 ) -> None:
     for name, value in fault.items():
@@ -143,7 +145,7 @@ def test_pages_that_do_not_add_up_are_refused_and_asked_for_again(
         (Answer(b'{"message": "Log in."}', status=403), HttpError, ["403", "(Log in)"]),
     ],
 )
-def test_what_is_no_page_is_told(
+def test_answer_that_is_not_a_page_is_an_error(
     service: StandIn, fetched: Fetch, *, page: Answer, error: type[Exception], words: list[str]
 ) -> None:
     service.page = page
@@ -151,22 +153,22 @@ def test_what_is_no_page_is_told(
         fetched(service)
 
 
-def test_half_a_page_is_asked_for_again(service: StandIn, fetched: Fetch) -> None:
+def test_truncated_page_is_requested_again(service: StandIn, fetched: Fetch) -> None:
     service.page = Answer(service.half)
     with refused(HttpError, "layer 'lamps'", "not whole", "3 times"):
         fetched(service)
 
 
-def test_a_wrong_dataset_is_named_with_those_there_are(service: StandIn, fetched: Fetch) -> None:
+def test_unknown_dataset_is_an_error_with_the_known_ones(service: StandIn, fetched: Fetch) -> None:
     with refused(CatalogError, "'lamps'", "`dataset`", "127.0.0.1", *service.others):
         fetched(service, replace(LAMPS, dataset=service.wrong))
 
 
-def test_only_the_fields_that_are_used_are_asked_for(service: StandIn, fetched: Fetch) -> None:
+def test_only_needed_fields_are_requested(service: StandIn, fetched: Fetch) -> None:
     layer = replace(LAMPS, select=("Note",), where=(("kind", ("lamp",)),))
-    found = fetched(service, layer).read()
-    assert ids(found) == ["11", "13", "15"]
-    assert found.counts.filtered == 2
+    lamps = fetched(service, layer).read()
+    assert ids(lamps) == ["11", "13", "15"]
+    assert lamps.counts.filtered == 2
     with refused(CatalogError, "'noot'", "select", "'NOTE'"):
         fetched(service, replace(LAMPS, select=("noot",)))
 
@@ -174,7 +176,7 @@ def test_only_the_fields_that_are_used_are_asked_for(service: StandIn, fetched: 
 # --- ArcGIS -----------------------------------------------------------------------------------
 
 
-def test_arcgis_filters_and_says_whom_to_name(server: Server, fetched: Fetch) -> None:
+def test_arcgis_filters_and_states_its_terms(server: Server, fetched: Fetch) -> None:
     service = ArcGIS(server)
     layer = fetched(service, replace(LAMPS, server_where="KIND='lamp'")).read()
     assert ids(layer) == ["11", "13", "15"]
@@ -185,16 +187,14 @@ def test_arcgis_filters_and_says_whom_to_name(server: Server, fetched: Fetch) ->
         fetched(service, replace(LAMPS, server_where="KIND=lamp"))
 
 
-def test_an_old_arcgis_server_sends_its_own_json(server: Server, fetched: Fetch) -> None:
+def test_old_arcgis_server_sends_esri_json(server: Server, fetched: Fetch) -> None:
     service = ArcGIS(server)
     service.geojson = False
     layer = fetched(service).read()
     assert (ids(layer), xy(layer)) == (["11", "12", "13", "14", "15"], PLACES)
 
 
-def test_an_arcgis_server_without_pages_sends_what_fits_in_one(
-    server: Server, fetched: Fetch
-) -> None:
+def test_arcgis_server_without_paging_sends_one_page(server: Server, fetched: Fetch) -> None:
     service = ArcGIS(server)
     service.paging = False
     with refused(SourceError, "'lamps'", "sends 2 rows at most", "smaller area"):
@@ -217,15 +217,17 @@ def test_an_arcgis_server_without_pages_sends_what_fits_in_one(
         ({"rings": []}, None),
     ],
 )
-def test_geometries_of_esri(tmp_path: Path, geometry: dict[str, Any], text: str | None) -> None:
+def test_esri_geometries_are_read(
+    tmp_path: Path, geometry: dict[str, Any], text: str | None
+) -> None:
     rows = [{"attributes": {"a": 1}, "geometry": geometry}]
     content = {"spatialReference": {"wkid": 102100, "latestWkid": 3857}, "features": rows}
     (tmp_path / "a.json").write_text(json.dumps(content))
     (layer,) = read_layers(tmp_path / "a.json", [LayerSpec(name="a", class_name="bench")])
     assert layer.table.crs == "EPSG:3857"
-    (found,) = layer.table.geometry
-    assert (found is None) == (text is None)
-    assert text is None or found.equals(shapely.from_wkt(text))
+    (shape,) = layer.table.geometry
+    assert (shape is None) == (text is None)
+    assert text is None or shape.equals(shapely.from_wkt(text))
 
 
 def test_arcgis_errors_come_with_status_200(server: Server, fetched: Fetch) -> None:
@@ -238,7 +240,7 @@ def test_arcgis_errors_come_with_status_200(server: Server, fetched: Fetch) -> N
         fetched(service, replace(LAMPS, dataset="Parks"))
 
 
-def test_arcgis_may_fail_for_a_while_and_send_an_empty_page_that_is_not_the_last(
+def test_arcgis_may_be_busy_and_send_an_empty_page_before_the_last(
     server: Server, fetched: Fetch, slept: list[float]
 ) -> None:
     service = ArcGIS(server)
@@ -260,9 +262,7 @@ LAMP = (
 
 
 @pytest.mark.parametrize("kind", [Wfs, WfsOfGml])
-def test_a_wfs_takes_a_filter_beside_the_area(
-    server: Server, fetched: Fetch, kind: type[Wfs]
-) -> None:
+def test_wfs_combines_filter_and_area(server: Server, fetched: Fetch, kind: type[Wfs]) -> None:
     service = kind(server)
     lamps = replace(LAMPS, server_where=LAMP)
     layer = fetched(service, lamps, area=NEAR).read()
@@ -273,7 +273,7 @@ def test_a_wfs_takes_a_filter_beside_the_area(
         fetched(service, replace(LAMPS, server_where=LAMP.replace("lamp<", "x<")))
 
 
-def test_a_wfs_without_order_is_told(server: Server, fetched: Fetch) -> None:
+def test_wfs_without_natural_order_needs_an_id_field(server: Server, fetched: Fetch) -> None:
     service = Wfs(server)
     with refused(HttpError, "layer 'lamps'", "(Cannot do natural order, Add a key)"):
         fetched(service, replace(LAMPS, id_field=None))
@@ -281,7 +281,7 @@ def test_a_wfs_without_order_is_told(server: Server, fetched: Fetch) -> None:
     assert len(fetched(service, replace(LAMPS, id_field=None), area=NEAR).read().table) == 1
 
 
-def test_a_wfs_without_pages_sends_all_at_once(server: Server, fetched: Fetch) -> None:
+def test_wfs_without_paging_sends_all_rows(server: Server, fetched: Fetch) -> None:
     service = WfsOfGml(server)
     service.limit = 5
     service.constraints = (("ImplementsResultPaging", "FALSE"), ("ImplementsSorting", "FALSE"))
@@ -289,7 +289,7 @@ def test_a_wfs_without_pages_sends_all_at_once(server: Server, fetched: Fetch) -
     assert ids(layer) == [f"lamps.{number}" for number in range(11, 16)]
 
 
-def test_axes_that_a_wfs_exchanges_are_exchanged_back(server: Server, fetched: Fetch) -> None:
+def test_exchanged_axes_of_a_wfs_are_corrected(server: Server, fetched: Fetch) -> None:
     service = Wfs(server)
     service.turned = True
     layer = fetched(service, area=NEAR).read()
@@ -297,7 +297,7 @@ def test_axes_that_a_wfs_exchanges_are_exchanged_back(server: Server, fetched: F
     assert layer.notes == ("the service sends latitude as x and longitude as y; exchanged here",)
 
 
-def test_what_is_no_wfs_is_told(server: Server, fetched: Fetch) -> None:
+def test_answer_that_is_not_a_wfs_is_an_error(server: Server, fetched: Fetch) -> None:
     service = Wfs(server)
     for answer, words in [
         (
@@ -316,7 +316,7 @@ def test_what_is_no_wfs_is_told(server: Server, fetched: Fetch) -> None:
 # --- OGC API - Features -----------------------------------------------------------------------
 
 
-def test_ogc_features_filters_where_it_says_so(server: Server, fetched: Fetch) -> None:
+def test_ogc_features_filters_rows(server: Server, fetched: Fetch) -> None:
     service = OgcFeatures(server)
     lamps = replace(LAMPS, server_where="KIND = 'lamp'")
     layer = fetched(service, lamps, area=NEAR).read()
@@ -332,7 +332,7 @@ def test_ogc_features_filters_where_it_says_so(server: Server, fetched: Fetch) -
         ({"next_host": "http://elsewhere.example/x"}, {}, SourceError, ["elsewhere", "endpoints"]),
     ],
 )
-def test_what_ogc_features_cannot_do_is_told(
+def test_unsupported_request_to_ogc_features_is_an_error(
     server: Server,
     fetched: Fetch,
     *,
@@ -351,7 +351,7 @@ def test_what_ogc_features_cannot_do_is_told(
 # --- CKAN -------------------------------------------------------------------------------------
 
 
-def test_the_datastore_of_ckan_filters(server: Server, fetched: Fetch) -> None:
+def test_ckan_datastore_filters_rows(server: Server, fetched: Fetch) -> None:
     layer = fetched(Ckan(server), replace(LAMPS, server_where='{"KIND": "lamp"}')).read()
     assert ids(layer) == ["11", "13", "15"]
     assert layer.spec.terms == "City of Somewhere (CC0)"
@@ -371,7 +371,7 @@ NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T
         ([CSV, {"format": "PDF", "url": "/files/a.pdf"}], (), "lamps_2023.csv"),
     ],
 )
-def test_ckan_sends_the_file_of_the_best_format(
+def test_ckan_file_has_the_best_format(
     server: Server,
     fetched: Fetch,
     *,
@@ -392,9 +392,7 @@ def test_ckan_sends_the_file_of_the_best_format(
     assert server.paths()[-1] == f"/files/{expected}"
 
 
-def test_a_file_may_lie_with_another_host_that_the_catalogue_names(
-    server: Server, fetched: Fetch
-) -> None:
+def test_file_may_be_on_another_host_of_the_catalogue(server: Server, fetched: Fetch) -> None:
     service = Ckan(server)
     service.resources = [{"format": "GeoJSON", "url": "/files/lamps.geojson"}]
     there = {"Location": f"{server.other_host}/store/lamps.geojson"}
@@ -422,7 +420,7 @@ PDF = {"format": "PDF", "url": "/files/map.pdf"}
         ([{**CSV, "url": "http://far.example/a.csv"}], {}, SourceError, ["far.example", "endpoi"]),
     ],
 )
-def test_what_ckan_cannot_give_is_told(
+def test_unusable_ckan_dataset_is_an_error(
     server: Server,
     fetched: Fetch,
     *,
@@ -442,17 +440,17 @@ def test_what_ckan_cannot_give_is_told(
 
 
 @pytest.mark.parametrize("place", ["point", "multipolygon", "location", ""])
-def test_places_of_socrata(server: Server, fetched: Fetch, place: str) -> None:
+def test_socrata_positions_are_read(server: Server, fetched: Fetch, place: str) -> None:
     service = Socrata(server)
     service.place = place
     lamps = replace(LAMPS, server_where="KIND = 'lamp'")
     layer = fetched(service, lamps, area=NEAR).read()
     assert (ids(layer), xy(layer), layer.counts.read) == (["13"], [PLACES[2]], 1)
     assert layer.spec.terms == "City of Somewhere (PDDL)"
-    chosen = replace(LAMPS, select=("KIND",), x_field="LON", y_field="LAT")
-    assert xy(fetched(service, chosen).read()) == PLACES
-    named = replace(LAMPS, aliases=(("geo_shape", ("the_place",)),))
-    assert xy(fetched(service, named).read()) == PLACES
+    selection = replace(LAMPS, select=("KIND",), x_field="LON", y_field="LAT")
+    assert xy(fetched(service, selection).read()) == PLACES
+    with_alias = replace(LAMPS, aliases=(("geo_shape", ("the_place",)),))
+    assert xy(fetched(service, with_alias).read()) == PLACES
 
 
 @pytest.mark.parametrize(
@@ -466,7 +464,7 @@ def test_places_of_socrata(server: Server, fetched: Fetch, place: str) -> None:
         '{"features": [{"attributes": {"OBJECTID": 7}, "geometry": {"x": 2.35, "y": 48.85}}]}',
     ],
 )
-def test_what_was_downloaded_by_hand_is_read_as_well(tmp_path: Path, text: str) -> None:
+def test_file_downloaded_by_hand_is_read(tmp_path: Path, text: str) -> None:
     path = tmp_path / ("a.csv" if text[0] == "O" else "a.json")
     path.write_text(text)
     spec = replace(LAMPS, aliases=(("geo_point_2d", ("location",)),))

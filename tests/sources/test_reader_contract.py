@@ -1,0 +1,192 @@
+"""What every reader does with files that are damaged, of another kind, or absent."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import shapely
+from sentences import refused
+
+from semsig_gis.core import CrsError, SourceError
+from semsig_gis.sources import LayerSpec, mapillary, overture
+from semsig_gis.sources.osm import features, file, overpass
+from semsig_gis.sources.services import layers as services
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+def parquet(**columns: list[Any]) -> bytes:
+    stream = io.BytesIO()
+    pq.write_table(pa.table(columns), stream)
+    return stream.getvalue()
+
+
+PLAIN = LayerSpec(name="benches", class_name="bench")
+OSM = LayerSpec(name="benches", class_name="bench", tags=((("amenity", ("bench",)),),))
+OVERTURE = LayerSpec(name="benches", class_name="bench", tags=((("class", ("bench",)),),))
+WKB = [shapely.to_wkb(shapely.Point(2, 48))]
+POINT = {"type": "Point", "coordinates": [2, 48]}
+BENCH = {"amenity": "bench"}
+
+
+def encoded(content: object) -> bytes:
+    return json.dumps(content).encode()
+
+
+class Case(NamedTuple):
+    """A reader with a file of one bench, and the words of its errors."""
+
+    read: Callable[..., Any]
+    spec: LayerSpec
+    name: str
+    content: bytes
+    truncated: str
+    absent: str = "does not exist"
+    folder: str = "is a folder"
+    crs: str = "EPSG:4326"  # of the layer, if the user states EPSG:2154
+
+
+NO_OVERPASS = "is not JSON as Overpass servers send it"
+NO_GEOPARQUET = "cannot be read as GeoParquet"
+NO_ANSWER = "is not an answer of Mapillary about map features"
+OSM_XML = (
+    b'<osm version="0.6"><node id="1" version="1" lat="48" lon="2">'
+    b'<tag k="amenity" v="bench"/></node></osm>'
+)
+OVERPASS = {"elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2, "tags": BENCH}]}
+GEOJSON = {
+    "type": "FeatureCollection",
+    "features": [{"type": "Feature", "geometry": POINT, "properties": BENCH}],
+}
+MAP_FEATURES = {"data": [{"id": "1", "object_value": "x", "geometry": POINT}]}
+GML = (
+    b'<FeatureCollection xmlns:gml="g"><member><a><p><gml:Point><gml:pos>2 48</gml:pos>'
+    b"</gml:Point></p></a></member></FeatureCollection>"
+)
+OVERTURE_COLUMNS: dict[str, list[Any]] = {"id": ["1"], "geometry": WKB, "class": ["bench"]}
+CASES = {
+    "osm_file": Case(file.read_layers, OSM, "a.osm", OSM_XML, "it is damaged or not the kind"),
+    "overpass": Case(overpass.read_layers, OSM, "a.json", encoded(OVERPASS), NO_OVERPASS,
+                     "cannot be read (No such file", "cannot be read (Is a directory"),
+    "osm_features": Case(features.read_layers, OSM, "a.geojson", encoded(GEOJSON),
+                         "cannot be read"),
+    "mapillary": Case(mapillary.read_layers, PLAIN, "a.json", encoded(MAP_FEATURES),
+                      NO_ANSWER, NO_ANSWER, NO_ANSWER),
+    "overture": Case(overture.read_layers, OVERTURE, "a.parquet", parquet(**OVERTURE_COLUMNS),
+                     NO_GEOPARQUET, NO_GEOPARQUET, NO_GEOPARQUET),
+    "service JSON": Case(services.read_layers, PLAIN, "a.json",
+                         encoded([{"geo_point_2d": [48, 2]}]), "is not whole JSON",
+                         crs="EPSG:2154"),
+    "service GML": Case(services.read_layers, PLAIN, "a.gml", GML, "is not whole GML",
+                        crs="EPSG:2154"),
+    "service Parquet": Case(services.read_layers, PLAIN, "a.parquet", parquet(geo_shape=WKB),
+                            "is not a whole Parquet", crs="EPSG:2154"),
+}  # fmt: skip
+# Files that a reader refuses: their name, content and the words of the error.
+REPORT = b"<ExceptionReport><ExceptionText>No.</ExceptionText></ExceptionReport>"
+TIMED_OUT = b'{"elements": [], "remark": "runtime error: Query timed out after 91 seconds."}'
+WHOLE = parquet(idbase=list(range(50)), geo_shape=WKB * 50)
+WRONG_FILES: dict[str, list[tuple[str, bytes, str]]] = {
+    "osm_file": [
+        ("a.osm", b"", "is empty"),
+        ("a.osm", b'<osm version="0.6"><node id="1" lat="north" lon="2"/></osm>', "north"),
+    ],
+    "overpass": [
+        *(("a.json", content, NO_OVERPASS)
+          for content in (b"", b"\xff\xfe", b"null", b"[" * 100_000)),
+        ("a.json", TIMED_OUT, "is incomplete (runtime error: Query timed out"),
+    ],
+    "mapillary": [
+        ("a.json", content, NO_ANSWER)
+        for content in (b'{"data": [{"id": 1}]}', b"[]", b'{"features": [1]}', b"x")
+    ],
+    "overture": [
+        ("a.parquet", b"PAR1", NO_GEOPARQUET),
+        ("a.parquet", parquet(id=["a"], amenity=["bench"]), "not a file of Overture Maps"),
+        ("a.parquet", parquet(id=["a"], amenity=["bench"]), "its columns are id, amenity"),
+    ],
+    "service JSON": [
+        ("a.json", b"", "is empty"),
+        ("a.json", b'[{"a": 1}, {"a"', "whole JSON"),
+        ("a.json", b"[" * 100_000, "whole JSON"),
+        ("a.json", b'{"message": "no such dataset"}', "no records"),
+        ("a.json", b'{"results": 3}', "no records"),
+        ("a.json", b"[1, 2]", "no records"),
+        ("a.json", b'[{"a": "\xe9"}]', "is not UTF-8 text"),
+        ("a.csv", b"\xef\xbb\xbf \n", "is empty"),
+        ("a.csv", b"a;b\n1;2\n", "geo_point_2d"),
+        ("a.png", b"\x89PNG\r\n\x1a\n\0\0", "unknown encoding"),
+        ("a.gpkg", b"SQLite", "a.gpkg"),
+    ],
+    "service GML": [
+        ("a.gml", b"<!DOCTYPE html><html/>", "document type"),
+        ("a.gml", b"<kml/>", "has no features"),
+        ("a.gml", REPORT, "contains the error No"),
+    ],
+    "service Parquet": [
+        ("a.parquet", b"PAR1" + bytes(100), "whole Parquet"),
+        ("a.parquet", b"PAR1", "whole Parquet"),
+        ("a.parquet", WHOLE[:-40], "whole Parquet"),
+        # The metadata at the end is intact, the values are not.
+        ("a.parquet", b"PAR1" + bytes(len(WHOLE) // 3) + WHOLE[4 + len(WHOLE) // 3 :],
+         "whole Parquet"),
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(params=CASES.values(), ids=list(CASES))
+def case(request: pytest.FixtureRequest) -> Case:
+    result: Case = request.param
+    return result
+
+
+def test_file_is_read_in_its_own_crs(case: Case, tmp_path: Path) -> None:
+    path = tmp_path / case.name
+    path.write_bytes(case.content)
+    for stated, expected in ((None, "EPSG:4326"), ("EPSG:2154", case.crs)):
+        (layer,) = case.read(path, [case.spec], crs=stated)
+        assert (layer.counts.kept, len(layer.table), layer.table.crs) == (1, 1, expected)
+    assert case.read(path, []) == ()
+
+
+@pytest.mark.parametrize("part", [0.4, 0.9])
+def test_truncated_file_is_refused(case: Case, tmp_path: Path, part: float) -> None:
+    path = tmp_path / case.name
+    path.write_bytes(case.content[: int(part * len(case.content))])
+    with refused(SourceError, str(path), case.truncated):
+        case.read(path, [case.spec])
+
+
+def test_absent_path_and_folder_are_refused(case: Case, tmp_path: Path) -> None:
+    with refused(SourceError, case.absent):
+        case.read(tmp_path / case.name, [case.spec])
+    (tmp_path / case.name).mkdir()
+    with refused(SourceError, case.folder):
+        case.read(tmp_path / case.name, [case.spec])
+
+
+@pytest.mark.parametrize(
+    ("reader", "name", "content", "words"),
+    [(reader, *wrong) for reader, files in WRONG_FILES.items() for wrong in files],
+)
+def test_damaged_file_or_other_content_is_refused(
+    tmp_path: Path, reader: str, name: str, content: bytes, words: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with refused(SourceError, str(path), words):
+        CASES[reader].read(path, [CASES[reader].spec])
+
+
+def test_unknown_crs_of_gml_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.gml"
+    path.write_bytes(CASES["service GML"].content.replace(b"<p>", b"<p srsName='EPSG:99999'>"))
+    with refused(CrsError, "'EPSG:99999'", "unknown"):
+        services.read_layers(path, [PLAIN])
