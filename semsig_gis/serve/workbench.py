@@ -53,12 +53,12 @@ from semsig_gis.maps import (
     to_metres,
 )
 from semsig_gis.observation import (
-    Detector,
     LabelMap,
     North,
     Photo,
     Shot,
     Tally,
+    ViewBuilder,
     field_of_view,
     picture_shot,
     read_pictures,
@@ -253,7 +253,7 @@ class Workbench:
             except SemsigError as error:
                 raise InputError(str(error).replace(f"{folder}/", "")) from error
         tally = Tally()
-        detector = Detector(
+        detector = ViewBuilder(
             labels=LabelMap.open(told.get("labels") or (), self.taxonomy),
             taxonomy=self.taxonomy,
             shots=shots | {stem: shots[key] for stem, key in stems.items()},
@@ -271,8 +271,8 @@ class Workbench:
             )
         return {"photos": found, "notes": _left_out(tally)}
 
-    def _marks(self, detector: Detector, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
-        seen = detector.sightings(picture, tally)
+    def _marks(self, detector: ViewBuilder, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
+        seen = detector.located_boxes(picture, tally)
         names = {item.code: item.name for item in self.taxonomy.classes}
         turn = seen.shot.heading or 0.0
         return [
