@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase, VisibleObjects
-    from semsig_gis.evaluation import Query
+    from semsig_gis.evaluation import SimulatedQuery
     from semsig_gis.localization import NoiseTable
     from semsig_gis.observation import Photo
 
@@ -210,7 +210,9 @@ def _row(database: SignatureDatabase, degrees: int, wanted: int, *, ranges: bool
     }
 
 
-def _queries(database: SignatureDatabase, degrees: int, *, ranges: bool) -> Iterator[Query]:
+def _queries(
+    database: SignatureDatabase, degrees: int, *, ranges: bool
+) -> Iterator[SimulatedQuery]:
     """Yield queries from cells that are seen by the noise and have one to fourteen detections."""
     told = f"ranges:{100 * RANGE_ERROR:g}, " if ranges else ""
     chain = parse_chain(f"detector:views, {told}view:{degrees}", noises={NOISE.name: NOISE})

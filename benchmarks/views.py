@@ -39,7 +39,7 @@ from semsig_gis.evaluation import (
     draw_queries,
     parse_chain,
     plain_records,
-    ready_chain,
+    prepare_chain,
 )
 from semsig_gis.localization import (
     REGION_SHARE,
@@ -243,7 +243,7 @@ def _single(
 def _walks(database: SignatureDatabase, line: Line) -> Iterator[_Question]:
     """Yield straight ways along cells, each photo with a direction and a compass of its own."""
     rng = np.random.default_rng(0)
-    spoil = ready_chain(line.chain, CitySights.of(database))
+    spoil = prepare_chain(line.chain, CitySights.of(database))
     for start in rng.permutation(len(database)).tolist():
         cells = straight_walk(database, start, line.photos, np.random.default_rng([start, 1]))
         if cells:

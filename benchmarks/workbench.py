@@ -15,7 +15,7 @@ from selenium.webdriver.support.ui import Select
 from benchmarks.street_photos import WIDTH, street_photo
 from semsig_gis.cli.options import object_store
 from semsig_gis.evaluation import Sight
-from semsig_gis.serve import Workbench, server
+from semsig_gis.serve import Workbench, make_server, open_listener, server_address
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,12 +59,12 @@ def serving(city: City) -> Iterator[str]:
     bench = Workbench(city=city, store=object_store(city, None, needed=False))
     bench.prepare()
     token = secrets.token_urlsafe(32)
-    with server.listening(0) as listener:
-        running = server.served(bench, listener, token=token)
+    with open_listener(0) as listener:
+        running = make_server(bench, listener, token=token)
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
-            yield server.address(listener, token)
+            yield server_address(listener, token)
         finally:
             running.should_exit = True
             thread.join()

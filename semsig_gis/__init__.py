@@ -15,14 +15,14 @@ import warnings
 
 import lazy_loader
 
-from semsig_gis.core import presentation as _presentation
+from semsig_gis.core import register_loader as _register_loader
 
 __version__ = "0.1.0"  # CITATION.cff, codemeta.json, CHANGELOG.md and the QGIS plugin repeat it
 
 # The names of `__init__.pyi` are imported when they are first used, so that the command line can
 # print its help without loading a GIS stack.
 _attached, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-_presentation.register_loader(_attached)
+_register_loader(_attached)
 
 _RENAMED = {"suggest_catalog": ("draft_catalog", "0.3.0")}
 """Names that were public, as they are called now, and the version without the old one."""

@@ -26,7 +26,7 @@ from .sources.vector import read_layer as read_layer
 from .objects.load import build_objects as build_objects
 from .objects.conflation import conflate as conflate
 from .objects.draft import draft_catalog as draft_catalog
-from .objects.fetch import (
+from .sources.fetch import (
     fetch_layers as fetch_layers,
     find_area as find_area,
     open_cache as open_cache,
@@ -128,7 +128,7 @@ from .evaluation.queries.distortions import (
 from .evaluation.queries.true_view import Sight as Sight
 from .evaluation.compare import compare_evaluations as compare_evaluations
 from .evaluation.scoring import evaluate as evaluate
-from .evaluation.error_field import ErrorField as ErrorField, error_field as error_field
+from .evaluation.error_maps import ErrorField as ErrorField, error_field as error_field
 from .evaluation.file import open_evaluation as open_evaluation, save_evaluation as save_evaluation
 from .evaluation.identifiability.check import (
     IdentifiabilityCheck as IdentifiabilityCheck,
@@ -185,7 +185,7 @@ from .reports.scenes import (
     draw_scenes as draw_scenes,
 )
 from .core.tables import Table as Table
-from .evaluation.experiments.run import open_results as open_results
+from .evaluation.experiments.results import open_results as open_results
 from .evaluation.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce
 from .evaluation.experiments.run import (
     run_experiment as run_experiment,

@@ -415,4 +415,4 @@ def _require_check(check: int | None, out: Path | None) -> None:
         return
     if check is None:
         raise InputError("--out was given without --check; give both or neither.")
-    import semsig_gis.reports.plots  # noqa: F401 - before the work, which takes long
+    from semsig_gis.reports import draw_plot  # noqa: F401 - before the work, which takes long

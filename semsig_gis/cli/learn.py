@@ -185,8 +185,7 @@ def calibrate(
     import numpy as np
 
     from semsig_gis.database import open_city
-    from semsig_gis.localization import read_samples
-    from semsig_gis.localization.likelihood import answer_rule as abstention
+    from semsig_gis.localization import calibrate, read_samples, save_rule
 
     keep_inputs(out, read=(database, samples, noise, drift_report, objects))
     city = open_city(database)
@@ -212,8 +211,8 @@ def calibrate(
                 position = location.estimate.x, location.estimate.y
                 errors[number] = math.dist(position, places[number])
             advance(number + 1, len(rows))
-    rule = abstention.calibrate(masses, errors <= radius, precision=precision, radius=radius)
-    abstention.save_rule(rule, out)
+    rule = calibrate(masses, errors <= radius, precision=precision, radius=radius)
+    save_rule(rule, out)
     if as_json:
         threshold = rule.threshold if math.isfinite(rule.threshold) else None
         print_json({**asdict(rule), "threshold": threshold, "coverage": rule.coverage})

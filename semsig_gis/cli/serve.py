@@ -33,7 +33,7 @@ def serve(
     No data leaves the machine. Others cannot open the page: its address contains a secret.
     """
     with extra("serve", "the workbench"):
-        from semsig_gis.serve import server
+        from semsig_gis.serve import make_server, open_listener, server_address
     from semsig_gis.database import open_city
     from semsig_gis.localization import NOISES
     from semsig_gis.serve import Workbench
@@ -45,11 +45,11 @@ def serve(
     options = [str(database), *(["--objects", str(objects)] if objects is not None else [])]
     bench = Workbench(city=city, store=store, noises=noises, options=options)
     token = secrets.token_urlsafe(32)
-    with server.listening(port) as listener:
+    with open_listener(port) as listener:
         bench.prepare()
-        address = server.address(listener, token)
+        address = server_address(listener, token)
         say(f"The workbench of {city.path.name} is at {address}")
         remark("it runs until you press Ctrl-C")
         if not no_browser:
             webbrowser.open(address)
-        server.served(bench, listener, token=token).run(sockets=[listener])
+        make_server(bench, listener, token=token).run(sockets=[listener])

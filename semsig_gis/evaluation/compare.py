@@ -1,4 +1,4 @@
-"""Compare two evaluations that asked queries from the same places."""
+"""Compare two evaluations with queries from the same places."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation.result import Evaluation
 
 RESAMPLES = 2000
-AT_ONCE = 50
+BATCH = 50  # samples computed together
 PERCENTILES = {"error_median": ("error_m", 50), "error_p90": ("error_m", 90)}
 HEADINGS = {"heading_error_median": ("heading_error", 50)}
 INTERVAL = (2.5, 97.5)
@@ -27,24 +27,24 @@ INTERVAL = (2.5, 97.5)
 def compare_evaluations(
     first: Evaluation, second: Evaluation, *, resamples: int = RESAMPLES, seed: int = 0
 ) -> pd.DataFrame:
-    """Return by how much the figures of two evaluations differ.
+    """Return the differences between the figures of two evaluations, with intervals.
 
     Parameters
     ----------
     first, second : Evaluation
         Evaluations with queries from the same places, number by number.
     resamples : int, default 2000
-        How often the queries are drawn again.
+        Number of bootstrap samples of the queries.
     seed : int, default 0
-        Seed of these draws.
+        Seed of these samples.
 
     Returns
     -------
     DataFrame
-        One row a figure of `experiments.tables.experiment_figures` that both have: ``figure``,
-        ``first``, ``second``, ``difference`` (the second less the first), ``low`` and ``high`` (its
-        95 % interval); NaN where one of them is infinite. The bootstrap is by pairs, so that what
-        is hard for both methods does not blur the difference.
+        One row for each figure of `experiments.tables.experiment_figures` that both have:
+        ``figure``, ``first``, ``second``, ``difference`` (second minus first), ``low`` and ``high``
+        (its 95 % interval); NaN if one of the values is infinite. The bootstrap resamples pairs, so
+        queries that are hard for both methods do not widen the interval.
 
     Raises
     ------
@@ -54,50 +54,52 @@ def compare_evaluations(
     Examples
     --------
     >>> from semsig_gis import Method, evaluate
-    >>> one = evaluate(demo_database, queries=50, method=Method.parse("types:jaccard"))
-    >>> other = evaluate(demo_database, queries=50, method=Method.parse("edit+edit"))
-    >>> figures = compare_evaluations(one, other).set_index("figure")
+    >>> first = evaluate(demo_database, queries=50, method=Method.parse("types:jaccard"))
+    >>> second = evaluate(demo_database, queries=50, method=Method.parse("edit+edit"))
+    >>> figures = compare_evaluations(first, second).set_index("figure")
     >>> bool(figures["low"]["p50"] <= figures["difference"]["p50"] <= figures["high"]["p50"])
     True
     """
     _require_pairs(first, second)
-    shares = [one.figures for one in (first, second)]
+    both = (first, second)
+    shares = [evaluation.figures for evaluation in both]
     names = [name for name in shares[0] if name in shares[1]]
     values = [figures[names].to_numpy(dtype=np.float64) for figures in shares]
-    columns = {**PERCENTILES, **(HEADINGS if _turned(first) and _turned(second) else {})}
+    with_headings = all(evaluation.queries["heading_error"].notna().any() for evaluation in both)
+    columns = {**PERCENTILES, **(HEADINGS if with_headings else {})}
     errors = [
-        [one.queries[column].to_numpy(dtype=np.float64) for one in (first, second)]
+        [evaluation.queries[column].to_numpy(dtype=np.float64) for evaluation in both]
         for column, _ in columns.values()
     ]
 
-    def figures_of(rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        # Of both, for samples of the queries: shape (2, samples, figures).
-        means = np.stack([_means(one, rows) for one in values])
+    def sample_figures(rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        # Figures of both for samples of the queries: shape (2, samples, figures).
+        means = np.stack([_sample_means(table, rows) for table in values])
         ends = [
-            np.stack([percentiles(one[rows], percent) for one in pair])
+            np.stack([percentiles(column[rows], percent) for column in pair])
             for pair, (_, percent) in zip(errors, columns.values(), strict=True)
         ]
         return np.concatenate([means, np.stack(ends, axis=-1)], axis=-1)
 
     count = len(first.queries)
     rng = np.random.default_rng(seed)
-    drawn = [
-        figures_of(rng.integers(0, count, (min(AT_ONCE, resamples - start), count)))
-        for start in range(0, resamples, AT_ONCE)
+    batches = [
+        sample_figures(rng.integers(0, count, (min(BATCH, resamples - start), count)))
+        for start in range(0, resamples, BATCH)
     ]
-    one, other = figures_of(np.arange(count)[None])[:, 0]
-    samples = np.concatenate(drawn, axis=1)
-    with np.errstate(invalid="ignore"):  # of two infinite errors there is no difference
+    first_figures, second_figures = sample_figures(np.arange(count)[None])[:, 0]
+    samples = np.concatenate(batches, axis=1)
+    with np.errstate(invalid="ignore"):  # the difference of two infinite errors is NaN
         differences = samples[1] - samples[0]
-        difference = other - one
+        difference = second_figures - first_figures
     finite = np.isfinite(differences).all(axis=0)
     bounds = np.full((2, len(finite)), np.nan)
     bounds[:, finite] = np.percentile(differences[:, finite], INTERVAL, axis=0)
     return pd.DataFrame(
         {
             "figure": [*names, *columns],
-            "first": one,
-            "second": other,
+            "first": first_figures,
+            "second": second_figures,
             "difference": difference,
             "low": bounds[0],
             "high": bounds[1],
@@ -106,7 +108,7 @@ def compare_evaluations(
 
 
 def changed_successes(first: Evaluation, second: Evaluation) -> tuple[int, int]:
-    """Return how many queries only the second one answers well, and how many only the first one."""
+    """Return how many queries succeed only in the second, and how many only in the first."""
     _require_pairs(first, second)
     before, after = first.successful, second.successful
     return int((after & ~before).sum()), int((before & ~after).sum())
@@ -115,13 +117,13 @@ def changed_successes(first: Evaluation, second: Evaluation) -> tuple[int, int]:
 def common_cases(
     first: Mapping[str, Evaluation], second: Mapping[str, Evaluation]
 ) -> dict[str, tuple[Evaluation, Evaluation]]:
-    """Return the evaluations of two results that have the same name; InputError if none has.
+    """Return the pairs of evaluations with the same name in both; InputError if there are none.
 
-    Of two single evaluations, return these, whatever they are called.
+    If both results are a single evaluation, return this pair, whatever the names are.
     """
     if len(first) == len(second) == 1:
-        (name, one), (other_name, other) = *first.items(), *second.items()
-        return {name or other_name: (one, other)}
+        (first_name, first_case), (second_name, second_case) = *first.items(), *second.items()
+        return {first_name or second_name: (first_case, second_case)}
     common = {name: (first[name], second[name]) for name in first if name in second}
     if not common:
         raise InputError(
@@ -136,12 +138,12 @@ def _listed(results: Mapping[str, Evaluation]) -> str:
 
 
 def _require_pairs(first: Evaluation, second: Evaluation) -> None:
-    """Refuse evaluations whose queries are not from the same places, number by number."""
+    """Raise InputError unless the queries have the same seeds, numbers and places."""
     keys = ["seed", "number"]
-    tables = [one.queries.reset_index(drop=True) for one in (first, second)]
+    tables = [evaluation.queries.reset_index(drop=True) for evaluation in (first, second)]
     same = tables[0][keys].equals(tables[1][keys]) and first.queries.crs == second.queries.crs
     if same:
-        places = [np.column_stack([one.geometry.x, one.geometry.y]) for one in tables]
+        places = [np.column_stack([table.geometry.x, table.geometry.y]) for table in tables]
         same = np.array_equal(places[0], places[1])
     if not same:
         raise InputError(
@@ -150,13 +152,9 @@ def _require_pairs(first: Evaluation, second: Evaluation) -> None:
         )
 
 
-def _turned(evaluation: Evaluation) -> bool:
-    return bool(evaluation.queries["heading_error"].notna().any())
-
-
-def _means(values: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the mean of each column over samples of the rows, NaN left out."""
+def _sample_means(values: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the mean of each column over samples of the rows, without NaN."""
     weights = np.stack([np.bincount(row, minlength=len(values)) for row in rows]).astype(np.float64)
     counted = ~np.isnan(values)
-    with np.errstate(invalid="ignore"):  # a sample may have nothing to count
+    with np.errstate(invalid="ignore"):  # all values of a sample may be NaN
         return np.asarray((weights @ np.where(counted, values, 0.0)) / (weights @ counted))

@@ -1,6 +1,6 @@
-"""Figures of many scored queries, with intervals: shares, percentiles, groups, calibration.
+"""Figures of scored queries with intervals: shares, percentiles, groups and calibration.
 
-What a query adds to a figure is a chance, an expectation over all orders of the tied cells.
+The value of a query in a figure is a probability, over all orders of the tied cells.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RECALLS = (1, 10)
-LENGTHS = ("1-4", "5-9", "10-19", "20+")  # objects that are really seen
+LENGTHS = ("1-4", "5-9", "10-19", "20+")  # objects visible from the true place
 AMBIGUITIES = ("1", "2-9", "10-99", "100-999", "1000+")  # cells with the types of the true one
 ELSEWHERE = "elsewhere"
-RULES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
-BINS = 10
+ANSWER_THRESHOLDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
+CALIBRATION_BINS = 10
 
 
 def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
-    """Return what each query adds to each figure: chances in [0, 1], one row a query.
+    """Return the value of each query in each figure: probabilities, one row for each query.
 
-    Columns are ``p5``, ... (error at most so many metres), ``near1``, ... (one of the best N places
-    within 25 m), ``recall1``, ``recall10`` (true cell in the top 1 or 10 % of so many `cells`) and,
-    where a method states chances, ``coverage`` (answered), ``precision`` (answered and right; NaN
-    where not answered) and ``in_region``.
+    Columns are ``p5``, ... (error at most 5 m, ...), ``near1``, ... (one of the best N places
+    within 25 m), ``recall1``, ``recall10`` (true cell in the top 1 or 10 % of all `cells`) and, if
+    the method gives probabilities, ``coverage`` (answered), ``precision`` (answered and right; NaN
+    if not answered) and ``in_region``.
     """
     names = [*(f"p{metres}" for metres in ERROR_BREAKS), *(f"near{count}" for count in NEAR_PLACES)]
     figures = {name: queries[name].to_numpy(dtype=np.float64) for name in names}
@@ -54,8 +54,8 @@ def query_figures(queries: pd.DataFrame, *, cells: int) -> pd.DataFrame:
 def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
     """Return the mean of each figure of `query_figures`, with an interval.
 
-    Columns are ``value``, ``low`` and ``high`` (Wilson's 95 % interval; a little wide where ties
-    make a query count with a chance) and ``n``, the number of values that are not NaN.
+    Columns are ``value``, ``low`` and ``high`` (Wilson's 95 % interval; slightly too wide for
+    fractional values of ties) and ``n``, the number of values that are not NaN.
     """
     means = [_share(values) for values in figures.to_numpy(dtype=np.float64).T]
     names = pd.Index(figures.columns, name="figure")
@@ -63,7 +63,7 @@ def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
 
 
 def _share(values: NDArray[np.float64]) -> tuple[float, float, float, int]:
-    """Return the mean of the values that are not NaN, its interval, and how many they are."""
+    """Return the mean of the values without NaN, its interval, and their number."""
     chances = values[~np.isnan(values)]
     if not chances.size:
         return math.nan, math.nan, math.nan, 0
@@ -74,9 +74,9 @@ def _share(values: NDArray[np.float64]) -> tuple[float, float, float, int]:
 def grouped_means(
     figures: pd.DataFrame, labels: Sequence[str], *, by: str, order: Iterable[str]
 ) -> pd.DataFrame:
-    """Return the means of all figures, one row a group in the order wanted, with queries or not.
+    """Return the means of all figures for each group of `order`; a group may be empty.
 
-    `labels` has the group of each query. Columns are the one named `by`, ``n``, all figures, and
+    `labels` has the group of each query. Columns are `by` (the group), ``n``, all figures, and
     ``p50_low`` and ``p50_high`` (95 %).
     """
     groups, values = np.asarray(labels), figures.to_numpy(dtype=np.float64)
@@ -92,33 +92,34 @@ def grouped_means(
 
 
 def range_labels(sizes: NDArray[np.int64], ranges: Sequence[str]) -> list[str]:
-    """Return the range that each size is in, such as ``5-9`` or ``20+``; ``"0"`` for none."""
+    """Return the range of each size, such as ``5-9`` or ``20+``; ``"0"`` below all ranges."""
     starts = [int(label.rstrip("+").split("-")[0]) for label in ranges]
     places = np.searchsorted(starts, sizes, side="right")
     return [("0", *ranges)[place] for place in places.tolist()]
 
 
 def district_labels(queries: gpd.GeoDataFrame, districts: gpd.GeoDataFrame, name: str) -> list[str]:
-    """Return the name of the first district around each query, ``"elsewhere"`` in none.
+    """Return the name of the first district that contains each query, or ``"elsewhere"``.
 
-    Districts are polygons in any CRS, named by the column `name`; InputError if there is none.
+    Districts are polygons in any CRS with names in the column `name`; InputError if it is missing.
     """
     if name not in districts:
-        columns = ", ".join(str(one) for one in districts if one != "geometry")
+        columns = ", ".join(str(column) for column in districts if column != "geometry")
         raise InputError(f"the districts have no column {name!r}; give one of {columns}.")
     polygons = districts.to_crs(queries.crs)
-    point, polygon = polygons.sindex.query(queries.geometry, predicate="intersects")
+    points, areas = polygons.sindex.query(queries.geometry, predicate="intersects")
     labels = [ELSEWHERE] * len(queries)
     names = districts[name].astype(str).to_list()
-    for one, inside in sorted(zip(point.tolist(), polygon.tolist(), strict=True), reverse=True):
-        labels[one] = names[inside]
+    # In reverse, so that the first district of a point is written last and stays.
+    for point, area in sorted(zip(points.tolist(), areas.tolist(), strict=True), reverse=True):
+        labels[point] = names[area]
     return labels
 
 
 def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, float, float]:
-    """Return a percentile as `percentiles`, and the ends of its interval of about 95 %.
+    """Return a percentile as `percentiles` does, and the ends of its interval of about 95 %.
 
-    The ends are order statistics: how many values are below the true percentile is binomial.
+    The ends are order statistics: the number of values below the true percentile is binomial.
     """
     ordered = np.sort(values[~np.isnan(values)])
     if not ordered.size:
@@ -129,9 +130,9 @@ def percentile(values: NDArray[np.float64], percent: float) -> tuple[float, floa
 
 
 def percentiles(samples: NDArray[np.float64], percent: float) -> NDArray[np.float64]:
-    """Return a percentile of each row, NaN left out; NaN where nothing is left.
+    """Return a percentile of each row without NaN; NaN if a row has no other values.
 
-    Between neighbours it is interpolated, infinite if the upper one is.
+    It is interpolated between neighbours, and infinite if the upper one is.
     """
     ordered = np.sort(samples, axis=1)  # NaN comes last
     last = np.maximum((~np.isnan(ordered)).sum(axis=1) - 1, 0)
@@ -145,15 +146,15 @@ def percentiles(samples: NDArray[np.float64], percent: float) -> NDArray[np.floa
 
 
 def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
-    """Return how many queries are answered, and how many answers are right, rule by rule.
+    """Return how many queries are answered, and how many answers are right, by threshold.
 
-    One row a rule: ``threshold`` (least chance that is answered), ``answered`` (queries),
-    ``coverage``, ``precision``, and ``low`` and ``high`` of the precision (95 %).
+    One row for each ``threshold`` (least stated probability that is answered): ``answered``
+    (queries), ``coverage``, ``precision``, and ``low`` and ``high`` of the precision (95 %).
     """
     chance = queries["chance"].to_numpy(dtype=np.float64)
     right = queries["right"].to_numpy(dtype=np.float64)
     rows = []
-    for threshold in RULES:
+    for threshold in ANSWER_THRESHOLDS:
         answered = chance >= threshold
         precision, low, high, count = _share(right[answered])
         rows.append((threshold, count, count / len(chance), precision, low, high))
@@ -162,27 +163,28 @@ def coverage_curve(queries: pd.DataFrame) -> pd.DataFrame:
 
 
 def calibration_bins(queries: pd.DataFrame) -> pd.DataFrame:
-    """Return how often stated chances come true, one row for each tenth.
+    """Return stated probabilities and the share of right answers, one row for each tenth.
 
-    Columns are ``from`` and ``to`` (chances stated), ``n``, ``stated`` (their mean), ``true``
-    (share that was right), and ``low`` and ``high`` of that (95 %); NaN in an empty bin.
+    Columns are ``from`` and ``to`` (stated probabilities), ``n``, ``stated`` (their mean), ``true``
+    (share of right answers), and ``low`` and ``high`` of that (95 %); NaN in an empty bin.
     """
     chance = queries["chance"].to_numpy(dtype=np.float64)
     right = queries["right"].to_numpy(dtype=np.float64)
-    # The last bin holds 1, too. In whole numbers, so that 0.3 is not a rounding below its bin.
-    bins = np.minimum(np.floor(np.round(chance * BINS, 9)), BINS - 1)
+    # The last bin contains 1. Rounded first, so that 0.3 is not below its bin.
+    bins = np.floor(np.round(chance * CALIBRATION_BINS, 9))
+    bins = np.minimum(bins, CALIBRATION_BINS - 1)
     rows = []
-    for number in range(BINS):
+    for number in range(CALIBRATION_BINS):
         inside = bins == number
         stated, _, _, count = _share(chance[inside])
         true, low, high, _ = _share(right[inside])
-        ends = {"from": number / BINS, "to": (number + 1) / BINS}
+        ends = {"from": number / CALIBRATION_BINS, "to": (number + 1) / CALIBRATION_BINS}
         rows.append({**ends, "n": count, "stated": stated, "true": true, "low": low, "high": high})
     return pd.DataFrame(rows)
 
 
 def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a table as values for JSON; None for infinite numbers and NaN."""
+    """Return the rows of a table as values for JSON, with None for infinite numbers and NaN."""
     return [
         {
             str(name): finite_or_none(value) if isinstance(value, float) else value
@@ -193,5 +195,5 @@ def plain_records(table: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def finite_or_none(value: float) -> float | None:
-    """Return a number, or None for what JSON cannot hold."""
+    """Return a number, or None if it is infinite or NaN, which JSON cannot store."""
     return value if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Files of evaluations, and their settings as plain values."""
+"""Read and write evaluations; convert their settings to and from JSON values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from semsig_gis.core import DatabaseError, InputError
 from semsig_gis.evaluation.queries.distortion_text import chain_text, parse_chain
-from semsig_gis.evaluation.queries.distortions import Detector
+from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.draw import QuerySpec
 from semsig_gis.evaluation.result import QUERY_COLUMNS, Evaluation
 from semsig_gis.localization import noise_from_dict, parse_method
@@ -42,17 +42,17 @@ def save_evaluation(evaluation: Evaluation, folder: str | Path) -> None:
     Parameters
     ----------
     evaluation : Evaluation
-        What to write.
+        The evaluation.
     folder : str or Path
-        Folder to write to, made when missing. It gets ``queries.parquet`` (GeoParquet, with the
-        settings in its metadata, so that it is enough to load and redraw everything),
-        ``evaluation.json`` (`Evaluation.summary`, for reading) and ``timing.json``, the one file
-        that differs when the same is done again.
+        Folder to write to, created if missing. It gets ``queries.parquet`` (GeoParquet with the
+        settings in its metadata; this file is enough to open the evaluation again),
+        ``evaluation.json`` (`Evaluation.summary`, for people and other programs) and
+        ``timing.json``, the only file that differs if the evaluation is repeated.
 
     Raises
     ------
     InputError
-        If the folder cannot be written to.
+        If the folder is not writable.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
     Parameters
     ----------
     folder : str or Path
-        Folder with ``queries.parquet``; without ``timing.json`` the time is not known.
+        Folder with ``queries.parquet``; without ``timing.json`` the time is NaN.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def open_evaluation(folder: str | Path) -> Evaluation:
     Raises
     ------
     DatabaseError
-        If the file is missing, damaged or of another kind.
+        If the file is missing, damaged or not an evaluation.
 
     Examples
     --------
@@ -118,13 +118,13 @@ def open_evaluation(folder: str | Path) -> Evaluation:
         frame = table.to_pandas()
         points = gpd.GeoSeries.from_wkb(frame.pop("geometry"), crs=crs)
         frame["best_cell_id"] = frame["best_cell_id"].astype("Int64")
-        method, asked = settings_from_dict(specs)
+        method, query_spec = settings_from_dict(specs)
         timing = parse_json(read_whole(times), finite=True) if times.exists() else {}
         seconds = timing.get("seconds_per_query")
         return Evaluation(
             queries=gpd.GeoDataFrame(frame, geometry=points),
             method=method,
-            asked=asked,
+            asked=query_spec,
             city=specs["city"],
             top=specs["top"],
             seconds_per_query=math.nan if seconds is None else seconds,
@@ -136,31 +136,31 @@ def open_evaluation(folder: str | Path) -> Evaluation:
         raise DatabaseError(f"{file} is damaged ({error}); evaluate again.") from error
 
 
-def settings_to_dict(method: AnyMethod, asked: QuerySpec) -> dict[str, Any]:
-    """Return a method and what it was asked as values for JSON, noise models in full."""
-    noises = used_noises([method], asked.distortions)
+def settings_to_dict(method: AnyMethod, query_spec: QuerySpec) -> dict[str, Any]:
+    """Return a method, its queries and all noise models in full, as values for JSON."""
+    noises = used_noises([method], query_spec.distortions)
     return {
         "method": str(method),
         "asked": {
-            "number": asked.number,
-            "seeds": list(asked.seeds),
-            "seen_from": asked.seen_from,
-            "distortions": [chain_text([one]) for one in asked.distortions],
+            "number": query_spec.number,
+            "seeds": list(query_spec.seeds),
+            "seen_from": query_spec.seen_from,
+            "distortions": [chain_text([distortion]) for distortion in query_spec.distortions],
         },
         "noises": {name: noise.to_dict() for name, noise in noises.items()},
     }
 
 
 def settings_from_dict(values: Mapping[str, Any]) -> tuple[AnyMethod, QuerySpec]:
-    """Read a method and what it was asked, the inverse of `settings_to_dict`.
+    """Return the method and the queries of `settings_to_dict`.
 
     Other values raise AttributeError, LookupError, TypeError or ValueError.
     """
-    noises = {name: noise_from_dict(one) for name, one in values["noises"].items()}
-    asked = dict(values["asked"])
-    asked["seeds"] = tuple(asked["seeds"])
-    asked["distortions"] = parse_chain(asked["distortions"], noises=noises)
-    return parse_method(values["method"], noises=noises), QuerySpec(**asked)
+    noises = {name: noise_from_dict(noise) for name, noise in values["noises"].items()}
+    spec = dict(values["asked"])
+    spec["seeds"] = tuple(spec["seeds"])
+    spec["distortions"] = parse_chain(spec["distortions"], noises=noises)
+    return parse_method(values["method"], noises=noises), QuerySpec(**spec)
 
 
 def used_noises(
@@ -168,11 +168,11 @@ def used_noises(
 ) -> dict[str, Noise]:
     """Return the noise models of likelihood methods and detectors by name.
 
-    InputError if two have one name, or a name has a sign that texts of methods use.
+    InputError if two models have the same name, or a name has one of the characters , : / and =.
     """
     noises: dict[str, Noise] = {}
-    models = [one.noise for one in methods if one.noise is not None]
-    models += [one.noise for one in distortions if isinstance(one, Detector)]
+    models = [method.noise for method in methods if method.noise is not None]
+    models += [item.noise for item in distortions if isinstance(item, SimulatedDetector)]
     for noise in models:
         if set(noise.name) & set(",:/="):
             raise InputError(

@@ -1,4 +1,4 @@
-"""The outcome of an evaluation: its queries, how they were answered, and the figures of them."""
+"""Result of an evaluation: its queries, their outcomes and the figures computed from them."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ QUERY_COLUMNS = (
 """Columns of the table of queries, in their order; ``geometry`` comes last."""
 
 PlotKind = Literal["errors", "recall", "map"]
-"""What can be drawn of an evaluation."""
+"""Kinds of plots of an evaluation."""
 
 
 def machine() -> dict[str, Any]:
-    """Return what decides how long things take here; ``memory_gb`` may be None."""
+    """Return the properties of this machine that affect its speed; ``memory_gb`` may be None."""
     pages = "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ())
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9 if pages else None
     return {
@@ -72,56 +72,56 @@ def machine() -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Evaluation(Displayed):
-    """The outcome of many queries and all that is needed to repeat or redraw it.
+    """Queries, their outcomes and the settings to repeat the evaluation.
 
     Parameters
     ----------
     queries : GeoDataFrame
-        One row a query, in the database's CRS; `geometry` is the true place.
+        One row for each query, in the database's CRS; `geometry` is the true place.
 
         - ``seed``, ``number``: its seed, and its number from 0;
-        - ``cell``, ``cell_id``: row number in the database (-1 where it has no such cell) and id of
+        - ``cell``, ``cell_id``: row number in the database (-1 if it has no such cell) and id of
           the cell of that place;
-        - ``types``, ``length``: symbols that the database says are seen there, and how many objects
-          really are;
-        - ``type_group``, ``angle_group``: cells with its type and with its angle sequence, 0
-          where the database has no such cell;
-        - ``query_types``, ``query_bearings``, ``query_length``: what was asked: symbols, degrees
-          (text, comma-separated) and how many there are (none: the query is *unlocalized*);
-          ``heading``: degrees to add to the bearings to have them from true north;
-        - ``query_ranges``, ``query_sectors``: rough distances in metres, and the sectors that were
-          stated to have been looked at, such as ``340.0-50.0`` (text, comma-separated, else empty);
+        - ``types``, ``length``: symbols of this cell in the database, and number of objects that
+          are visible from the true place;
+        - ``type_group``, ``angle_group``: number of cells with its type and with its angle
+          sequence, 0 if the database has no such cell;
+        - ``query_types``, ``query_bearings``, ``query_length``: symbols, degrees (text,
+          comma-separated) and number of objects of the query (0: the query is *unlocalized*);
+          ``heading``: degrees to add to the bearings to get bearings from true north;
+        - ``query_ranges``, ``query_sectors``: rough distances in metres, and the sectors that are
+          stated as observed, such as ``340.0-50.0`` (text, comma-separated, else empty);
         - ``best_cell_id``, ``best_x``, ``best_y``, ``distance``: the best candidate, drawn from the
           tied, and its distance or negative log-likelihood; missing when unlocalized;
         - ``tied``: cells that share the best score, 0 when unlocalized; ``next_cell_ids``: the
-          four best of the other cells (text, comma-separated), equals in the order of the cells;
+          four best of the other cells (text, comma-separated), tied ones in the order of the cells;
         - ``error_m``: expected smallest error among the top t in metres, infinite when
-          unlocalized; ``p0``, ``p5``, ...: probability that it is at most so many metres;
+          unlocalized; ``p0``, ``p5``, ...: probability that it is at most 0 m, 5 m, ...;
         - ``near1``, ``near5``, ...: probability that one of the N best cells (the answer first)
           is at most 25 m away;
         - ``rank_low``, ``rank_high``: first and last rank that ties allow for the true cell, from
           1; both the number of cells when unlocalized or when the database has no such cell;
-        - ``chance``: by the likelihood method's own account, that its answer is right, within
-          50 m; ``right``: probability that it was; ``in_region``: probability that its region of
-          90 % held the true cell. Missing for other methods and when unlocalized;
-        - ``heading_error``: by how many degrees the heading was off, where it was looked for.
+        - ``chance``: probability that the likelihood method states for its answer to be within
+          50 m; ``right``: probability that it is; ``in_region``: probability that its region of
+          90 % contains the true cell. Missing for other methods and when unlocalized;
+        - ``heading_error``: error of the estimated heading in degrees, if it was estimated.
     method : Method or LikelihoodMethod
-        What ranked the cells.
+        The method that ranked the cells.
     asked : QuerySpec
-        Which queries were asked, and what happened to them.
+        Number, seeds, places and distortions of the queries.
     city : str, optional
-        The city that was looked at, if not the one that was searched.
+        The observed city, if it is not the searched one.
     top : int
-        How many best candidates count (t).
+        Number of best candidates that count (t).
     seconds_per_query : float
-        Mean time of an answer, without distortion and statistics; NaN where it is not known.
+        Mean time of an answer, without distortion and statistics; NaN if it was not stored.
     database : mapping
-        What was searched: ``cells``, ``mean_length``, ``step_m``, ``origin``, ``radius_m``,
-        ``levels``, ``crs``, ``version``, ``mb_per_km2`` (or None).
+        Properties of the searched database: ``cells``, ``mean_length``, ``step_m``, ``origin``,
+        ``radius_m``, ``levels``, ``crs``, ``version``, ``mb_per_km2`` (or None).
     versions : mapping
         Versions of the software by name.
     machine : mapping
-        What it ran on: ``system``, ``processor``, ``processors`` and ``memory_gb`` (or None).
+        The computer: ``system``, ``processor``, ``processors`` and ``memory_gb`` (or None).
 
     Examples
     --------
@@ -131,7 +131,7 @@ class Evaluation(Displayed):
     True
     """
 
-    # A query is successful where the answer is so near with such a chance.
+    # A query is successful if its error is at most this distance with at least this probability.
     success_metres: ClassVar[int] = 50
     success_probability: ClassVar[float] = 0.5
 
@@ -162,13 +162,13 @@ class Evaluation(Displayed):
 
     @functools.cached_property
     def figures(self) -> pd.DataFrame:
-        """What each query adds to each figure (see `evaluation.figures.query_figures`)."""
+        """Value of each query in each figure (see `evaluation.figures.query_figures`)."""
         return query_figures(self.queries, cells=self.database["cells"])
 
     def plot(
         self, kind: PlotKind = "errors", *, ax: Axes | None = None, label: str | None = None
     ) -> Axes:
-        """Draw the curve of errors or of recall, or where queries failed (`plot_evaluation`)."""
+        """Draw the curve of errors or of recall, or a map of failures (`plot_evaluation`)."""
         return plot_with("plot_evaluation", self, kind, ax=ax, label=label)
 
     def explore(self, database: SignatureDatabase) -> MapFrame:
@@ -177,15 +177,15 @@ class Evaluation(Displayed):
 
     @property
     def query_bearings(self) -> list[list[float]]:
-        """Bearings of what each query asked for, in degrees."""
+        """Bearings of each query in degrees."""
         texts = self.queries["query_bearings"]
-        return [[float(one) for one in text.split(",") if one] for text in texts]
+        return [[float(bearing) for bearing in text.split(",") if bearing] for text in texts]
 
     @property
     def next_cell_ids(self) -> list[list[int]]:
         """Ids of the best cells of each query after the answer."""
         texts = self.queries["next_cell_ids"]
-        return [[int(one) for one in text.split(",") if one] for text in texts]
+        return [[int(cell_id) for cell_id in text.split(",") if cell_id] for text in texts]
 
     @property
     def successful(self) -> NDArray[np.bool_]:
@@ -195,13 +195,13 @@ class Evaluation(Displayed):
 
     @property
     def unlocalized(self) -> int:
-        """Number of queries in which the distortion left no object."""
+        """Number of queries without objects after the distortion."""
         return int((self.queries["query_length"] == 0).sum())
 
     def rows_in(self, database: SignatureDatabase) -> NDArray[np.int64]:
-        """Return the row of each query's true cell in the database that was searched, or -1.
+        """Return the row of each query's true cell in the searched database, or -1.
 
-        Raises InputError if another database was searched.
+        Raises InputError if `database` is not the searched one.
         """
         if len(database) != self.database["cells"]:
             raise InputError(
@@ -219,23 +219,25 @@ class Evaluation(Displayed):
         return rows
 
     def cdf(self, thresholds: Sequence[float] = THRESHOLDS) -> NDArray[np.float64]:
-        """Return the share of queries with an error of at most each of some `THRESHOLDS` in metres.
+        """Return the share of queries with an error of at most each threshold, in metres.
 
-        It is the mean probability over the queries. Raises InputError for another threshold.
+        It is the mean probability over the queries. Raises InputError for a threshold that is not
+        one of `THRESHOLDS`.
         """
         for value in thresholds:
             if value not in THRESHOLDS:
-                kept = ", ".join(str(one) for one in THRESHOLDS)
+                stored = ", ".join(map(str, THRESHOLDS))
                 raise InputError(
-                    f"No probability is stored for an error of {value} m; choose from {kept} m."
+                    f"No probability is stored for an error of {value} m; choose from {stored} m."
                 )
         columns = [f"p{int(value)}" for value in thresholds]
         return np.asarray(self.queries[columns].to_numpy(dtype=np.float64).mean(axis=0))
 
     def recall(self, percent: float) -> float:
-        """Return the share of queries whose true cell is in the top per cent of cells.
+        """Return the share of queries with the true cell in the top `percent` of the cells.
 
-        Rounded down; of tied cells each rank is as likely. InputError unless 0 < percent <= 100.
+        The number of these cells is rounded down; all orders of tied cells are equally likely.
+        Raises InputError unless 0 < percent <= 100.
         """
         ranks = self.queries["rank_low"], self.queries["rank_high"]
         chances = expected_recall(*ranks, cells=self.database["cells"], percent=percent)
@@ -246,16 +248,17 @@ class Evaluation(Displayed):
         return figure_means(self.figures)
 
     def by_length(self) -> pd.DataFrame:
-        """Return the figures by how many objects are really seen.
+        """Return the figures by the number of objects visible from the true place.
 
-        One row a range: ``length`` (text), ``n``, the figures (or NaN), ``p50_low``, ``p50_high``.
+        One row for each range: ``length`` (text), ``n``, the figures (or NaN), ``p50_low`` and
+        ``p50_high``.
         """
         return self._by_range("length", LENGTHS, label="length")
 
     def by_ambiguity(self) -> pd.DataFrame:
-        """Return the figures by how many cells have the types of the true one, as `by_length`.
+        """Return the figures by the number of cells with the types of the true one, as `by_length`.
 
-        ``cells_alike`` is ``"0"`` in a first row where some true cells are not in the database.
+        If some true cells are not in the database, there is a first row with ``cells_alike`` "0".
         """
         return self._by_range("type_group", AMBIGUITIES, label="cells_alike")
 
@@ -265,10 +268,11 @@ class Evaluation(Displayed):
         return grouped_means(self.figures, labels, by=label, order=order)
 
     def by_district(self, districts: gpd.GeoDataFrame, name: str) -> pd.DataFrame:
-        """Return the figures, as `by_length`, by the ``district`` that was seen.
+        """Return the figures, as `by_length`, by the ``district`` of the true place.
 
-        Districts are polygons in any CRS, named by the column `name`; those without queries are
-        left out, and places in none are ``elsewhere``. InputError if there is no such column.
+        Districts are polygons in any CRS with names in the column `name`. Districts without queries
+        are omitted, and places outside all districts are ``elsewhere``. Raises InputError if there
+        is no such column.
         """
         labels = district_labels(self.queries, districts, name)
         order = [*dict.fromkeys(districts[name].astype(str)), ELSEWHERE]
@@ -276,11 +280,11 @@ class Evaluation(Displayed):
         return grouped_means(self.figures, labels, by="district", order=order)
 
     def answers(self) -> dict[str, float]:
-        """Return how the likelihood method answers and declines; nothing for other methods.
+        """Return shares of the answers of the likelihood method; empty for other methods.
 
-        ``coverage`` is the share of queries that `likelihood.posterior.DEFAULT_RULE` answers,
-        ``precision`` the share of answers that are right, ``in_region`` the share of regions of
-        90 % that contain the true cell; NaN if there is no such query.
+        ``coverage`` is the share of queries that `likelihood.answer_rule.DEFAULT_RULE` answers,
+        ``precision`` the share of right answers, ``in_region`` the share of regions of 90 % that
+        contain the true cell; NaN if there are no such queries.
         """
         if self.method.noise is None:
             return {}
@@ -291,17 +295,17 @@ class Evaluation(Displayed):
         }
 
     def coverage_curve(self) -> pd.DataFrame:
-        """Return `evaluation.figures.coverage_curve`: answers, and right ones, rule by rule."""
+        """Return answers and right answers by threshold (`evaluation.figures.coverage_curve`)."""
         return coverage_curve(self.queries)
 
     def calibration(self) -> pd.DataFrame:
-        """Return `evaluation.figures.calibration_bins`: how often stated chances come true."""
+        """Return stated probabilities and right answers (`evaluation.figures.calibration_bins`)."""
         return calibration_bins(self.queries)
 
     def summary(self) -> dict[str, Any]:
         """Return ``settings``, ``database``, ``results``, ``versions`` and ``timing`` for JSON.
 
-        All but the last are the same whenever it is repeated. None stands for infinity and NaN.
+        All but ``timing`` are the same if the evaluation is repeated. Infinity and NaN are None.
         """
         errors = self.queries["error_m"].to_numpy(dtype=np.float64)
         turns = self.queries["heading_error"].to_numpy(dtype=np.float64)
@@ -309,7 +313,7 @@ class Evaluation(Displayed):
         return {
             "settings": {
                 "method": str(self.method),
-                "distortions": [chain_text([one]) for one in self.asked.distortions],
+                "distortions": [chain_text([item]) for item in self.asked.distortions],
                 "seen_from": self.asked.seen_from,
                 "city": self.city,
                 "top": self.top,

@@ -1,4 +1,4 @@
-"""Measure localization: draw queries of known places, let a method answer, score errors and ranks.
+"""Evaluate localization: draw queries from known places, locate them, score errors and ranks.
 
 Equal scores are common, so every figure is an expectation over all orders of the tied cells.
 """
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation.queries.draw import Query
+    from semsig_gis.evaluation.queries.draw import SimulatedQuery
     from semsig_gis.localization import (
         Answer,
         AnyMethod,
@@ -60,11 +60,11 @@ if TYPE_CHECKING:
     )
     from semsig_gis.observation import Photo
 
-# Seconds that a query, and a cell of a query, takes: only for telling how long the work is.
-QUERY_S, PAIR_S = 5e-3, 1e-7
-NEXT_CELLS = 4  # that are named after the best candidate
+# Approximate seconds for each query and for each cell of a query, to announce the duration.
+QUERY_S, QUERY_CELL_S = 5e-3, 1e-7
+NEXT_CELLS = 4  # listed after the best candidate
 
-# What is told of an answer, in this order.
+# Columns of the outcome of a query, in their order.
 OUTCOME_COLUMNS = (
     *("distance", "rank_low", "rank_high", "chance", "in_region", "heading_error", "seconds"),
     *("best_cell_id", "best_x", "best_y", "tied", "next_cell_ids"),
@@ -84,50 +84,49 @@ def evaluate(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """Query a database with distorted signatures of its own cells and score the answers.
+    """SimulatedQuery a database with distorted signatures of its own cells and score the answers.
 
     Parameters
     ----------
     database : SignatureDatabase
-        What to search.
+        The database to search.
     queries : int, default 500
-        How many cells to draw as queries, without replacement; 1 to the number of cells.
+        Number of cells to draw as queries, without replacement; 1 to the number of cells.
     method : str, Method or LikelihoodIndex, default "likelihood"
-        What ranks the cells: distances, or the likelihood with this index of the database; or the
-        text of a method (see `parse_method`), such as ``"edit+edit:5%"``. Queries are from the
-        middles of cells, and so the likelihood takes them.
+        The method that ranks the cells: a distance method, the likelihood index of this database,
+        or the text of a method (see `parse_method`), such as ``"edit+edit:5%"``. Queries are from
+        the centres of cells, and the likelihood method assumes that.
     distortion : str, distortion or sequence of distortions, default "medium"
-        What happens to the signatures: one of the paper's levels, or any of `queries.chain`,
-        as text or as values.
+        The distortion of the signatures: one of the paper's levels, or any of
+        `queries.distortion_text`, as text or as values.
     top : int, default 1
-        How many best candidates count (t); 1 to the number of cells.
+        Number of best candidates that count (t); 1 to the number of cells.
     seed : int, default 0
-        Seed of the sample and of all chances; 0 or more. Query number i is the same whatever
-        the number of queries.
+        Random seed; 0 or more. Query number i is the same whatever the number of queries.
     progress : callable, optional
-        Called with the number of queries done and the number of queries.
+        Called with the number of finished queries and the number of queries.
 
     Returns
     -------
     Evaluation
-        One row a query, the settings and the mean time a query.
+        One row for each query, the settings and the mean time of a query.
 
     Raises
     ------
     InputError
-        If a number is out of range, or the index is that of another database.
+        If a number is out of range, or the index belongs to another database.
     UnknownNameError
         If there is no distortion of that name.
 
     Notes
     -----
     Paper, section 4.2: the error is the distance from the true viewpoint to the nearest of the
-    best t candidates; the recall looks at the rank of the true cell among all cells. False
-    objects have the classes that occur in the database.
+    best t candidates; the recall uses the rank of the true cell among all cells. False objects
+    have the classes that occur in the database.
 
-    The likelihood method answers with the place around which most of the chance lies. That comes
-    first; then follow the other cells, likeliest first. Queries from anywhere, and several
-    methods on the same queries, are for `evaluation.spec`.
+    The first candidate of the likelihood method is the place with the most probability around it;
+    the other cells follow by falling likelihood. For queries from any place, and several methods on
+    the same queries, use an experiment (`ExperimentSpec`).
 
     Examples
     --------
@@ -141,77 +140,75 @@ def evaluate(
         distortion = parse_chain(distortion)
     chain = (distortion,) if isinstance(distortion, QueryDistortion) else tuple(distortion)
     spec = QuerySpec(number=queries, seeds=(seed,), distortions=chain)
-    used: AnyMethod
-    locator: Locator[Answer]
+    ranking: AnyMethod
+    index: LikelihoodIndex | None = None
     if isinstance(method, str):
-        used = parse_method(method)
-        if isinstance(used, LikelihoodMethod):
-            used = replace(used, on_grid=True)
-        locator = make_locator(database, used)
+        ranking = parse_method(method)
+        if isinstance(ranking, LikelihoodMethod):
+            ranking = replace(ranking, on_grid=True)
     elif isinstance(method, Method):
-        used, locator = method, make_locator(database, method)
+        ranking = method
     elif method.database is database:
-        used = LikelihoodMethod(noise=method.noise, on_grid=True)
-        locator = make_locator(database, used, index=method)
+        ranking, index = LikelihoodMethod(noise=method.noise, on_grid=True), method
     else:
         raise InputError(
             "the likelihood index belongs to another database; build it for the database to search."
         )
-    announce(queries * (QUERY_S + PAIR_S * len(database)), "evaluating")
-    drawn = draw_queries(database, spec)
-    outcomes = score_queries(database, locator, drawn, tops=(top,), progress=progress)
-    scored = scored_tables(database, drawn, outcomes)[top]
-    return make_evaluation(database, used, spec, scored, top=top)
+    locator = make_locator(database, ranking, index=index)
+    announce(queries * (QUERY_S + QUERY_CELL_S * len(database)), "evaluating")
+    sample = draw_queries(database, spec)
+    outcomes = score_queries(database, locator, sample, tops=(top,), progress=progress)
+    scored = scored_tables(database, sample, outcomes)[top]
+    return make_evaluation(database, ranking, spec, scored, top=top)
 
 
 def score_queries(
     database: SignatureDatabase,
     locator: Locator[Answer],
-    queries: Sequence[Query],
+    queries: Sequence[SimulatedQuery],
     *,
     tops: Sequence[int] = (1,),
     memo: DistanceMemo | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[int, list[dict[str, Any]]]:
-    """Let a method answer queries of known places, and score the answers.
+    """Locate queries from known places, and score the answers.
 
-    Return one row of outcomes a query for each of `tops` (how many best candidates count). `memo`
-    keeps distances of these queries that other methods have needed.
+    Return one row of outcomes for each query, by each of `tops` (number of best candidates that
+    count). `memo` holds distances of these queries that several methods share.
     """
     views = [query.asked.signature for query in queries if len(query.asked)]
     rankings = locator.rankings(views, memo=memo)
     outcomes: dict[int, list[dict[str, Any]]] = {top: [] for top in tops}
-    for done, query in enumerate(queries, start=1):
+    for count, query in enumerate(queries, start=1):
         if len(query.asked):
-            ranking = next(rankings)
-            pool = _Pool(database, query, ranking, max(*tops, *NEAR_PLACES))
-            shared = pool.shared()
+            scores = _QueryScores(database, query, next(rankings), max(*tops, *NEAR_PLACES))
+            shared = scores.shared()
             for top in tops:
-                outcomes[top].append(shared | pool.outcome(top))
+                outcomes[top].append(shared | scores.outcome(top))
         else:
             for top in tops:
                 outcomes[top].append(_unlocalized(len(database)))
         if progress is not None:
-            progress(done, len(queries))
+            progress(count, len(queries))
     return outcomes
 
 
 def scored_tables(
     database: SignatureDatabase,
-    queries: Sequence[Query],
+    queries: Sequence[SimulatedQuery],
     outcomes: Mapping[int, Sequence[Mapping[str, Any]]],
 ) -> dict[int, pd.DataFrame]:
-    """Return for each number of best candidates a table of what was asked and found.
+    """Return a table of the queries and their outcomes for each number of best candidates.
 
-    One row a query: the columns of `Evaluation.queries`, but ``x`` and ``y`` for ``geometry``, and
-    ``seconds``, which is NaN where nothing was asked.
+    One row for each query: the columns of `Evaluation.queries`, with ``x`` and ``y`` in place of
+    ``geometry``, and ``seconds``, which is NaN for an empty query.
     """
-    about = _query_table(database, queries)
+    query_table = _query_table(database, queries)
     scored = {}
     for top, rows in outcomes.items():
         table = pd.DataFrame(list(rows), columns=OUTCOME_COLUMNS)
         table["best_cell_id"] = table["best_cell_id"].astype("Int64")
-        scored[top] = pd.concat([about, table], axis=1)
+        scored[top] = pd.concat([query_table, table], axis=1)
     return scored
 
 
@@ -225,7 +222,7 @@ def make_evaluation(
     city: str | None = None,
     file_bytes: int | None = None,
 ) -> Evaluation:
-    """Return the evaluation of all queries that `scored_tables` gave; see `Evaluation`."""
+    """Return the `Evaluation` of a table of `scored_tables`."""
     points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
     seconds = scored["seconds"].to_numpy(dtype=np.float64)
     timed = seconds[~np.isnan(seconds)]
@@ -243,16 +240,16 @@ def make_evaluation(
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Return the versions of the software that decides the figures and their speed."""
-    parts = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
-    return {"semsig_gis": __version__, "python": platform.python_version(), **parts}
+    """Return the versions of the software that affects the figures and their speed."""
+    packages = {name: metadata.version(name) for name in ("numpy", "pandas", "rapidfuzz")}
+    return {"semsig_gis": __version__, "python": platform.python_version(), **packages}
 
 
-class _Pool:
-    """The best cells of a ranking with all that tie with the last of them, and their errors."""
+class _QueryScores:
+    """The best cells of a ranking, with all that tie with the last of them, and their errors."""
 
     def __init__(
-        self, database: SignatureDatabase, query: Query, ranking: Ranking, count: int
+        self, database: SignatureDatabase, query: SimulatedQuery, ranking: Ranking, count: int
     ) -> None:
         self.database, self.query, self.ranking = database, query, ranking
         self.cells = best_cells(ranking.scores, min(count, len(database)))
@@ -261,18 +258,18 @@ class _Pool:
         if ranking.place is not None:
             places[self.scores.argmin()] = ranking.place
         places -= query.xy
-        # So that a cell 50 m away is not a rounding beyond 50 m.
+        # Rounded, so that a cell exactly 50 m away counts as within 50 m.
         self.errors = np.round(np.sqrt((places**2).sum(axis=1)), 6)
         self.better = self.tied = np.empty(0)
 
     def shared(self) -> dict[str, Any]:
-        """Return the columns that do not depend on how many candidates count."""
+        """Return the columns that do not depend on the number of candidates."""
         query, ranking = self.query, self.ranking
         cells = len(ranking.scores)
         low, high = rank_range(ranking.scores, query.cell) if query.cell >= 0 else (cells, cells)
-        off, right = math.nan, math.nan
+        heading_error, right = math.nan, math.nan
         if ranking.heading is not None:
-            off = float(angular_distance(ranking.heading, query.asked.heading))
+            heading_error = float(angular_distance(ranking.heading, query.asked.heading))
         near = {
             f"near{count}": chance_within(**self._cut(count), metres=NEAR_METRES)
             for count in NEAR_PLACES
@@ -285,7 +282,7 @@ class _Pool:
             "rank_high": high,
             "chance": ranking.chance,
             "in_region": self._in_region(),
-            "heading_error": off,
+            "heading_error": heading_error,
             "seconds": ranking.seconds,
             **self._best(),
             **near,
@@ -293,35 +290,38 @@ class _Pool:
         }
 
     def outcome(self, top: int) -> dict[str, Any]:
-        """Return the columns that depend on how many candidates count."""
+        """Return the columns that depend on the number of candidates."""
         expected, within = expected_best(**self._cut(top))
         chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
         return {"error_m": expected, **chances}
 
     def _best(self) -> dict[str, Any]:
-        """Return the best candidate, or one of equals, and the next ones."""
+        """Return the columns of the best candidate, drawn from the tied ones, and of the next."""
         best = self.cells[self.scores == self.scores.min()]
-        shown = best[int(self.query.pick * len(best))]
-        # Equals follow in the order of the cells.
+        chosen_cell = best[int(self.query.pick * len(best))]
+        # The next cells by score; tied cells follow in the order of the cells.
         count = min(NEXT_CELLS + 1, len(self.scores))
         better, tied = top_candidates(self.scores, count)
         better = better[np.argsort(self.scores[better], kind="stable")]
-        after = self.cells[np.concatenate([better, tied[: count - len(better)]])]
-        after = after[after != shown][:NEXT_CELLS]
+        others = self.cells[np.concatenate([better, tied[: count - len(better)]])]
+        others = others[others != chosen_cell][:NEXT_CELLS]
         database, place = self.database, self.ranking.place
-        x, y = database.xy[shown].tolist() if place is None else place
-        listed = np.append(shown, after)
-        first, *others = cell_ids(database.columns[listed], database.rows[listed]).tolist()
+        x, y = database.xy[chosen_cell].tolist() if place is None else place
+        listed = np.append(chosen_cell, others)
+        best_id, *next_ids = cell_ids(database.columns[listed], database.rows[listed]).tolist()
         return {
-            "best_cell_id": first,
+            "best_cell_id": best_id,
             "best_x": x,
             "best_y": y,
             "tied": len(best),
-            "next_cell_ids": ",".join(map(str, others)),
+            "next_cell_ids": ",".join(map(str, next_ids)),
         }
 
     def _in_region(self) -> float:
-        """Return the chance that the true cell is in the region; its last cell is one of equals."""
+        """Return the probability that the true cell is in the region of 90 %.
+
+        The last cell of the region may tie with cells outside it: any of them may be the last one.
+        """
         chances, region, cell = self.ranking.chances, self.ranking.region, self.query.cell
         if chances is None or region is None:
             return math.nan
@@ -333,10 +333,13 @@ class _Pool:
         return float((chances[region] == least).sum() / (chances == least).sum())
 
     def _cut(self, count: int) -> dict[str, Any]:
-        """Return the errors of those that are surely among so many best, and of the tied."""
+        """Return the errors of the cells surely among the `count` best, and of the tied cells.
+
+        ``slots`` is how many of the tied cells are among the best, too.
+        """
         count = min(count, len(self.scores))
         slots = count - len(self.better)
-        if not 0 < slots <= len(self.tied):  # else the cut is among the same cells as before
+        if not 0 < slots <= len(self.tied):  # otherwise the same cells tie as for the last count
             better, tied = top_candidates(self.scores, count)
             self.better, self.tied = self.errors[better], self.errors[tied]
             slots = count - len(better)
@@ -344,8 +347,8 @@ class _Pool:
 
 
 def _unlocalized(cells: int) -> dict[str, Any]:
-    """Return the same columns for a query that had nothing to compare."""
-    untold = ("chance", "right", "in_region", "heading_error", "seconds", "best_x", "best_y")
+    """Return the outcome columns of an empty query, which cannot be located."""
+    missing = ("chance", "right", "in_region", "heading_error", "seconds", "best_x", "best_y")
     return {
         "best_cell_id": None,
         "next_cell_ids": "",
@@ -354,31 +357,35 @@ def _unlocalized(cells: int) -> dict[str, Any]:
         **{f"p{t}": 0.0 for t in THRESHOLDS},
         **{f"near{count}": 0.0 for count in NEAR_PLACES},
         **dict.fromkeys(("rank_low", "rank_high"), cells),
-        **dict.fromkeys(untold, math.nan),
+        **dict.fromkeys(missing, math.nan),
     }
 
 
-def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.DataFrame:
-    """Return what was asked, and the truth, one row a query."""
-    cells = np.array([one.cell for one in queries], np.int64)
-    known = cells >= 0
-    places = np.array([one.xy for one in queries], np.float64).reshape(-1, 2)
+def _query_table(database: SignatureDatabase, queries: Sequence[SimulatedQuery]) -> pd.DataFrame:
+    """Return one row for each query: the query and its true place."""
+    sights = [query.asked for query in queries]
+    cells = np.array([query.cell for query in queries], np.int64)
+    in_database = cells >= 0
+    places = np.array([query.xy for query in queries], np.float64).reshape(-1, 2)
     return pd.DataFrame(
         {
-            "seed": np.array([one.seed for one in queries], np.int64),
-            "number": np.array([one.number for one in queries], np.int64),
+            "seed": np.array([query.seed for query in queries], np.int64),
+            "number": np.array([query.number for query in queries], np.int64),
             "cell": cells,
             "cell_id": cell_ids(*database.grid.cells_at(places)),
             "types": [database.types(cell) if cell >= 0 else "" for cell in cells.tolist()],
-            "length": np.array([one.length for one in queries], np.int64),
-            "type_group": np.where(known, database.type_group_sizes[cells], 0),
-            "angle_group": np.where(known, database.angle_group_sizes[cells], 0),
-            "query_types": [database.taxonomy.decode(one.asked.codes) for one in queries],
-            "query_bearings": [_bearing_text(one.asked.bearings) for one in queries],
-            "query_ranges": [_range_text(one.asked.ranges) for one in queries],
-            "query_sectors": [_sector_text(one.asked.photo) for one in queries],
-            "query_length": np.array([len(one.asked) for one in queries], np.int64),
-            "heading": np.array([one.asked.heading for one in queries], np.float64),
+            "length": np.array([query.length for query in queries], np.int64),
+            "type_group": np.where(in_database, database.type_group_sizes[cells], 0),
+            "angle_group": np.where(in_database, database.angle_group_sizes[cells], 0),
+            "query_types": [database.taxonomy.decode(sight.codes) for sight in sights],
+            "query_bearings": [_bearing_text(sight.bearings) for sight in sights],
+            "query_ranges": [
+                "" if sight.ranges is None else ",".join(f"{value:.1f}" for value in sight.ranges)
+                for sight in sights
+            ],
+            "query_sectors": [_sector_text(sight.photo) for sight in sights],
+            "query_length": np.array([len(sight) for sight in sights], np.int64),
+            "heading": np.array([sight.heading for sight in sights], np.float64),
             "x": places[:, 0],
             "y": places[:, 1],
         }
@@ -386,25 +393,20 @@ def _query_table(database: SignatureDatabase, queries: Sequence[Query]) -> pd.Da
 
 
 def _bearing_text(bearings: NDArray[np.float64]) -> str:
-    """Return bearings as the command line takes them, to a tenth of a degree."""
+    """Return bearings as text for the command line, to a tenth of a degree."""
     tenths = np.floor(bearings * 10.0) / 10.0  # down, so that none becomes 360
     return ",".join(f"{value:.1f}" for value in tenths)
 
 
-def _range_text(ranges: NDArray[np.float64] | None) -> str:
-    """Return rough distances to a tenth of a metre, nothing where none were told."""
-    return "" if ranges is None else ",".join(f"{value:.1f}" for value in ranges)
-
-
 def _sector_text(photo: Photo) -> str:
-    """Return the sectors that were looked at, nothing for the full turn."""
+    """Return the observed sectors as text, empty for the full turn."""
     ends = [wrap_degrees(np.array(sector)) for sector in photo.sectors]
     return ",".join(_bearing_text(pair).replace(",", "-") for pair in ends)
 
 
 def _database_summary(database: SignatureDatabase, file_bytes: int | None) -> dict[str, Any]:
-    """Return what identifies a database, as plain values."""
-    covered = len(database) * database.grid.step**2 / 1e6
+    """Return the properties of a database that an evaluation stores, as plain values."""
+    area_km2 = len(database) * database.grid.step**2 / 1e6
     return {
         "cells": len(database),
         "mean_length": float(database.lengths.mean()),
@@ -414,5 +416,5 @@ def _database_summary(database: SignatureDatabase, file_bytes: int | None) -> di
         "levels": int(database.spec.levels),
         "crs": database.crs.to_string(),
         "version": database.version,
-        "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / covered,
+        "mb_per_km2": None if file_bytes is None else file_bytes / 1e6 / area_km2,
     }

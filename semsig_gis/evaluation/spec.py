@@ -1,4 +1,4 @@
-"""Experiments as values: what is searched, which queries are asked, and which methods answer."""
+"""Specification of experiments: the database, the queries and the methods; read from TOML."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ DISTRICT_KEYS = {"file": str, "name": str}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Districts:
-    """Polygons of a vector `file` by which figures are told; the field `name` names them."""
+    """Polygons of a vector `file` by which results are grouped; field `name` has their names."""
 
     file: str
     name: str
@@ -46,9 +46,9 @@ class Districts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One evaluation of an experiment: the names of a distortion and of a method in it.
+    """One evaluation of an experiment, given by the names of its distortion and its method.
 
-    `top` is how many best candidates count.
+    `top` is the number of best candidates that count.
     """
 
     distortion: str
@@ -57,40 +57,40 @@ class Case:
 
     @property
     def name(self) -> str:
-        """What stands for it, also as a folder."""
+        """Name of the evaluation, and of its folder."""
         return f"{self.distortion}/{self.method}-top{self.top}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentSpec:
-    """An experiment: every method answers the same queries, after each of some distortions.
+    """An experiment: every method locates the same queries, with every distortion.
 
     Parameters
     ----------
     database : str
-        File of the database that is searched.
+        File of the database to search.
     methods : mapping of str to Method or LikelihoodMethod
         The methods by name.
     distortions : mapping of str to tuple
-        What happens to the queries, each a chain of distortions, by name.
+        The chains of distortions by name.
     queries : int, default 500
-        How many of each seed.
+        Number of queries of each seed.
     seeds : tuple of int, default (0,)
-        Seeds of all chances.
+        Random seeds.
     seen_from : {"cells", "anywhere"}, default "cells"
         Where queries are seen from (see `QuerySpec`).
     city : str, optional
-        File of the database of the city that is looked at, if another than is searched.
+        File of the database of the observed city, if it is not the searched one.
     top : tuple of int, default (1,)
         Numbers of best candidates that count (t).
     districts : Districts, optional
-        Polygons by which the figures are told, too.
+        Polygons by which results are grouped in addition.
 
     Raises
     ------
     InputError
-        If there is no method or no distortion, a name cannot be that of a folder, a number is out
-        of range, or two noise models have one name.
+        If there is no method or no distortion, a name is not valid as a folder name, a number is
+        out of range, or two noise models have the same name.
     UnknownNameError
         If `seen_from` is neither.
 
@@ -118,10 +118,10 @@ class ExperimentSpec:
     districts: Districts | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        for what, named in (("methods", self.methods), ("distortions", self.distortions)):
-            if not named:
+        for what, items in (("methods", self.methods), ("distortions", self.distortions)):
+            if not items:
                 raise InputError(f"the experiment has no {what}; name at least one.")
-            for name in named:
+            for name in items:
                 if not re.fullmatch("[A-Za-z0-9_-]+", name):
                     raise InputError(
                         f"{name!r} cannot be a name in {what}; use only letters, digits, _ and -."
@@ -129,18 +129,18 @@ class ExperimentSpec:
         if not self.top or len(set(self.top)) < len(self.top) or min(self.top) < 1:
             raise InputError(f"top is {list(self.top)}; give different whole numbers from 1.")
         for name in self.distortions:
-            self.asked(name)
-        self.noises  # noqa: B018 - looks at their names
+            self.asked(name)  # checks the numbers
+        self.noises  # noqa: B018 - checks the names
 
     @property
     def noises(self) -> dict[str, Noise]:
         """The noise models of all methods and detectors, by name."""
-        chains = [one for chain in self.distortions.values() for one in chain]
-        return used_noises(self.methods.values(), chains)
+        distortions = [item for chain in self.distortions.values() for item in chain]
+        return used_noises(self.methods.values(), distortions)
 
     @property
     def cases(self) -> tuple[Case, ...]:
-        """All evaluations: each distortion, each method, each number of candidates."""
+        """All evaluations: every combination of distortion, method and number of candidates."""
         return tuple(
             Case(distortion=distortion, method=method, top=top)
             for distortion in self.distortions
@@ -149,7 +149,7 @@ class ExperimentSpec:
         )
 
     def asked(self, distortion: str) -> QuerySpec:
-        """Return the queries of one of the distortions, given by name."""
+        """Return the specification of the queries with a distortion, given by name."""
         return QuerySpec(
             number=self.queries,
             seeds=self.seeds,
@@ -158,7 +158,7 @@ class ExperimentSpec:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `parse_experiment` reads, with noise models that have no known name."""
+        """Return the fields that `parse_experiment` reads; built-in noise models only by name."""
         noises = {
             name: noise.to_dict()
             for name, noise in self.noises.items()
@@ -173,7 +173,7 @@ class ExperimentSpec:
             "top": list(self.top),
             "methods": {name: str(method) for name, method in self.methods.items()},
             "distortions": {
-                name: [chain_text([one]) for one in chain]
+                name: [chain_text([item]) for item in chain]
                 for name, chain in self.distortions.items()
             },
             **({} if self.districts is None else {"districts": asdict(self.districts)}),
@@ -188,12 +188,13 @@ class ExperimentSpec:
 def parse_experiment(
     text: str, *, where: str = "the experiment", folder: str | Path = "."
 ) -> ExperimentSpec:
-    """Read an experiment from TOML, which messages call `where`.
+    """Read an experiment from TOML; messages name it `where`.
 
-    It has the fields of `ExperimentSpec`: ``methods`` are texts such as ``"edit+edit:5%"``,
-    ``distortions`` texts or lists of them, such as ``"medium, view:90"``. Each of the table
-    ``noises`` is a table or the name of a file in `folder`. Raises UnknownNameError for an unknown
-    method, distortion or noise model, and InputError if a key or value cannot be used.
+    The keys are the fields of `ExperimentSpec`: ``methods`` are texts such as ``"edit+edit:5%"``,
+    ``distortions`` texts or lists of texts, such as ``"medium, view:90"``. In addition, ``noises``
+    has noise models by name, each a table or the name of a file in `folder`. Raises
+    UnknownNameError for an unknown method, distortion or noise model, and InputError if a key or
+    value is not valid.
     """
     try:
         values = parse_toml(text, where)
@@ -228,7 +229,7 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
     Parameters
     ----------
     path : str or Path
-        The file; files that it names are looked for beside it.
+        The file; the paths in it are relative to its folder.
 
     Returns
     -------
@@ -238,7 +239,7 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
     Raises
     ------
     InputError
-        If the file cannot be read, or does not hold an experiment.
+        If the file cannot be read, or does not contain an experiment.
 
     Examples
     --------
@@ -266,7 +267,7 @@ def open_experiment_spec(path: str | Path) -> ExperimentSpec:
 
 
 def _noise(name: str, noise: object, where: str, folder: Path) -> Noise:
-    """Return a noise model that is written out, or that of a file, under its name."""
+    """Return the noise model of a table or of a file, with the given name."""
     if isinstance(noise, str):
         values = open_noise(folder / noise).to_dict()
     elif isinstance(noise, dict):
@@ -288,7 +289,7 @@ def _chain(chain: object, name: str, where: str) -> str:
 
 
 def _whole_numbers(items: list[object], key: str, where: str) -> tuple[int, ...]:
-    # bool is an int to Python, never to a person
+    # In Python, True is an int; here it is an error.
     if not all(type(item) is int for item in items):
         raise InputError(f"{where} has {key} = {items!r}; write a list of whole numbers.")
     return tuple(item for item in items if isinstance(item, int))

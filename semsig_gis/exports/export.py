@@ -16,7 +16,7 @@ import numpy as np
 
 from semsig_gis.core import EmptyResultError, InputError, UnknownNameError, extra, nearest_name
 from semsig_gis.database import open_city, require_same_place
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
 from semsig_gis.exports.files import write_csv, write_flatgeobuf, write_geojson, write_geoparquet

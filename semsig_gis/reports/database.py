@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import Table, percent
 from semsig_gis.database import database_summary
-from semsig_gis.evaluation.paper import published as paris
+from semsig_gis.evaluation import published as paris
 from semsig_gis.reports.tables import distortion_rows, note_tables
 
 if TYPE_CHECKING:

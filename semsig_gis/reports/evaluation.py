@@ -10,7 +10,7 @@ import numpy as np
 
 from semsig_gis.core import ERROR_BREAKS, Table, figure, interval
 from semsig_gis.evaluation import DISTORTIONS, Evaluation, FalseClass, chain_text, percentile
-from semsig_gis.evaluation.paper import published as paris
+from semsig_gis.evaluation import published as paris
 from semsig_gis.localization import DEFAULT_RULE, NEAR_METRES, NEAR_PLACES
 from semsig_gis.reports.tables import short_percent
 

@@ -28,6 +28,9 @@ from .compression import HARMLESS_BYTES as HARMLESS_BYTES
 from .compression import check_compression_ratio as check_compression_ratio
 from .csv_layer import NO_GEOMETRY as NO_GEOMETRY
 from .detect import detect_catalogs as detect_catalogs
+from .fetch import fetch_layers as fetch_layers
+from .fetch import find_area as find_area
+from .fetch import open_cache as open_cache
 from .files import MERGING as MERGING
 from .files import PRUNING as PRUNING
 from .files import READERS as READERS
@@ -64,7 +67,6 @@ from .layer_spec import LayerSpec as LayerSpec
 from .layer_spec import Role as Role
 from .layer_spec import WidthBy as WidthBy
 from .mapillary import MOST_FEATURES as MOST_FEATURES
-from .mapillary import fetch_layers as fetch_layers
 from .numbers import decimal as decimal
 from .osm.elements import TagIndex as TagIndex
 from .osm.elements import has_tags as has_tags

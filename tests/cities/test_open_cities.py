@@ -10,8 +10,8 @@ import pytest
 from open_cities import CITIES, serve, write_files
 from servers import Server
 
-from semsig_gis.objects import assemble, choose_layers, fetch_layers, open_cache, read_files
-from semsig_gis.sources import data_folder, load_catalog, parse_area
+from semsig_gis.objects import assemble, choose_layers, read_files
+from semsig_gis.sources import data_folder, fetch_layers, load_catalog, open_cache, parse_area
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

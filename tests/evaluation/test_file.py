@@ -16,8 +16,8 @@ from sentences import refused
 from semsig_gis.core import DatabaseError, InputError
 from semsig_gis.evaluation import (
     NAMED_DISTORTIONS,
-    Detector,
     QuerySpec,
+    SimulatedDetector,
     evaluate,
     machine,
     open_evaluation,
@@ -47,9 +47,11 @@ EVALUATION = evaluate(
     number=st.integers(1, 99),
 )
 def test_settings_survive_json(
-    noise: NoiseSpec, kind: str, others: list[Detector], number: int
+    noise: NoiseSpec, kind: str, others: list[SimulatedDetector], number: int
 ) -> None:
-    asked = QuerySpec(number=number, seeds=(3, 0), distortions=(*others, Detector(noise=noise)))
+    asked = QuerySpec(
+        number=number, seeds=(3, 0), distortions=(*others, SimulatedDetector(noise=noise))
+    )
     by_chance = LikelihoodMethod(noise=noise, refined=True)
     method = by_chance if kind == "likelihood" else Method(keep=5, weights=EditWeights(insert=2))
     values = json.loads(json.dumps(settings_to_dict(method, asked), allow_nan=False))

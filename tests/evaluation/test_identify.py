@@ -35,7 +35,7 @@ from semsig_gis.evaluation import (
     try_cells,
 )
 from semsig_gis.evaluation.identifiability import result as identifiability_file
-from semsig_gis.evaluation.identifiability.analysis import _places
+from semsig_gis.evaluation.identifiability.analysis import _merged_places
 from semsig_gis.localization import NoiseSpec, build_index, named_noise
 from semsig_gis.observation import Photo
 
@@ -132,7 +132,7 @@ def test_places_of_several_looks_become_few() -> None:
     rng = np.random.default_rng(2)
     found = rng.integers(-1, 40, (120, 3))
     chances = rng.random((120, 3))
-    named, sums = _places(database, found, chances, radius=20.0)
+    named, sums = _merged_places(database, found, chances, radius=20.0)
     for cell in range(40):
         of_cell = slice(3 * cell, 3 * cell + 3)
         some = found[of_cell] >= 0

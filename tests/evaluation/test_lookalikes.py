@@ -165,8 +165,8 @@ def test_a_sample_stands_for_cells_that_are_not_likely(
     columns = symbol_columns(build_index(random_database(7, cells=400), named_noise("medium")))
     some = np.arange(0, 400, 5)
     whole = find_lookalikes(columns, temperature=temperature, looks=some)
-    monkeypatch.setattr(lookalikes, "SAMPLE", 200)
-    monkeypatch.setattr(lookalikes, "LIKELY", 100)
+    monkeypatch.setattr(lookalikes, "SAMPLE_CELLS", 200)
+    monkeypatch.setattr(lookalikes, "LIKELY_CELLS", 100)
     found = find_lookalikes(columns, temperature=temperature, looks=some)
     # What is likely is not drawn: the lookalikes are the same, and what is near them.
     for name in ("near", "cells", "sums"):

@@ -16,9 +16,9 @@ from semsig_gis.core import InputError, SemsigError
 from semsig_gis.database import ObjectStore
 from semsig_gis.evaluation import (
     DISTORTIONS,
-    Detector,
     Distortion,
     QuerySpec,
+    SimulatedDetector,
     changed_successes,
     common_cases,
     compare_evaluations,
@@ -311,7 +311,7 @@ def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
     # In far more cells than a handful, so that some places are hard to tell.
     cells = random_database(11, cells=300, longest=6, classes=2)
     noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
-    detector = Detector(noise=noise)
+    detector = SimulatedDetector(noise=noise)
     found = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=detector)
     told = found.queries.dropna(subset=["chance"])
     spread = math.sqrt(float((told["chance"] * (1.0 - told["chance"])).sum()))
@@ -319,7 +319,7 @@ def test_what_the_model_draws_comes_true_as_often_as_it_says() -> None:
     assert 0.2 < told["chance"].mean() < 0.95
     assert 0.86 < told["in_region"].mean() < 0.99
     # A detector that is worse than the method believes: its chances are too high.
-    bad = Detector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
+    bad = SimulatedDetector(noise=replace(noise, detection=0.5, clutter=3.0, bearing_sigma=30.0))
     wrong = evaluate(cells, queries=300, method=build_index(cells, noise), distortion=bad).queries
     assert wrong["chance"].mean() > wrong["right"].mean() + 0.1
 

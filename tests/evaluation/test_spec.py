@@ -11,9 +11,9 @@ from sentences import refused
 
 from semsig_gis.core import SemsigError
 from semsig_gis.evaluation import (
-    Detector,
     Districts,
     ExperimentSpec,
+    SimulatedDetector,
     open_experiment_spec,
     parse_chain,
     parse_experiment,
@@ -56,7 +56,7 @@ def experiments(draw: st.DrawFn) -> ExperimentSpec:
     if draw(st.booleans()):
         spec = replace(spec, methods={**spec.methods, "own": LikelihoodMethod(noise=own)})
     if draw(st.booleans()):
-        chain = (Detector(noise=own, half=9.5),)
+        chain = (SimulatedDetector(noise=own, half=9.5),)
         spec = replace(spec, distortions={**spec.distortions, "own": chain})
     return spec
 
@@ -151,6 +151,6 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 def test_two_noise_models_of_one_name(name: str) -> None:
     one, other = (NoiseSpec(clutter=value, name=name) for value in (1.0, 2.0))
     methods = {"a": LikelihoodMethod(noise=one)}
-    distortions = {"b": (Detector(noise=other),)}
+    distortions = {"b": (SimulatedDetector(noise=other),)}
     with refused(SemsigError, name, "a name of its own"):
         ExperimentSpec(database="city.parquet", methods=methods, distortions=distortions)

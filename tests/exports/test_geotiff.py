@@ -17,7 +17,7 @@ from sentences import refused
 from small_city import chances_of, small_city, small_evaluation, small_location
 
 from semsig_gis.core import ERROR_BREAKS, FAILURES, GridSpec, InputError
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation import error_field
 from semsig_gis.exports import (
     AMBIGUITY,
     CLEAR,

@@ -15,11 +15,10 @@ from semsig_gis.sources import (
     AccessToken,
     HttpError,
     HttpSpec,
-    fetch_layers,
     load_catalog,
     parse_area,
 )
-from semsig_gis.sources.mapillary import read_layers
+from semsig_gis.sources.mapillary import fetch_layers, read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -32,33 +32,34 @@ SHOWN = {
 def experiment_figures(results: Mapping[str, Evaluation]) -> pd.DataFrame:
     """Return all figures of the evaluations, given by the names of their cases.
 
-    One row a case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %) and
-    ``n`` (queries). Figures are shares, errors in metres, or ``heading_error_median`` in degrees.
+    One row for each case and figure: ``case``, ``figure``, ``value``, ``low`` and ``high`` (95 %)
+    and ``n`` (queries). Figures are shares, errors in metres, or ``heading_error_median`` in
+    degrees.
     """
-    parts = []
+    tables = []
     for name, evaluation in results.items():
         errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
-        turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
-        values = {label: (errors, percent) for label, percent in PERCENTILES.items()}
-        if not np.isnan(turns).all():
-            values["heading_error_median"] = (turns, 50)
+        heading_errors = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
+        columns = {label: (errors, percent) for label, percent in PERCENTILES.items()}
+        if not np.isnan(heading_errors).all():
+            columns["heading_error_median"] = (heading_errors, 50)
         rows = [
-            (label, *percentile(some, percent), int((~np.isnan(some)).sum()))
-            for label, (some, percent) in values.items()
+            (label, *percentile(values, percent), int((~np.isnan(values)).sum()))
+            for label, (values, percent) in columns.items()
         ]
         percentiles = pd.DataFrame(rows, columns=["figure", "value", "low", "high", "n"])
         figures = pd.concat([evaluation.means().reset_index(), percentiles], ignore_index=True)
         figures.insert(0, "case", name)
-        parts.append(figures)
-    return pd.concat(parts, ignore_index=True)
+        tables.append(figures)
+    return pd.concat(tables, ignore_index=True)
 
 
 def experiment_tables(
     spec: ExperimentSpec, results: Mapping[str, Evaluation], *, times: bool = True
 ) -> tuple[Table, ...]:
-    """Return the settings of an experiment, then for each distortion a table of its main figures.
+    """Return a table of the settings of an experiment, and one of main figures by distortion.
 
-    `times` tells whether to show the seconds of a query, which differ from run to run.
+    With `times`, the tables have the seconds of a query, which differ from run to run.
     """
     database = next(iter(results.values())).database
     megabytes = database["mb_per_km2"]
@@ -79,11 +80,11 @@ def experiment_tables(
         means = [case.means() for case in cases.values()]
         columns: dict[str, list[str]] = {"Method": list(cases)}
         for name, label in SHOWN.items():
-            if any(name in one.index for one in means):
-                columns[label] = [_mean(one, name) for one in means]
+            if any(name in table.index for table in means):
+                columns[label] = [_mean(table, name) for table in means]
         for label, percent in (("Median m", 50), ("90th percentile m", 90)):
             errors = [case.queries["error_m"].to_numpy(dtype=np.float64) for case in cases.values()]
-            columns[label] = [figure(percentile(one, percent)[0], ",.1f") for one in errors]
+            columns[label] = [figure(percentile(values, percent)[0], ",.1f") for values in errors]
         if times:
             columns["s a query"] = [f"{case.seconds_per_query:.4f}" for case in cases.values()]
         title = f"{distortion}: {chain_text(chain) or 'no distortion'}"
@@ -92,13 +93,13 @@ def experiment_tables(
 
 
 def experiment_markdown(spec: ExperimentSpec, results: Mapping[str, Evaluation]) -> str:
-    """Return the tables of an experiment as Markdown, the same whenever it is repeated."""
+    """Return the tables of an experiment as Markdown, without times, so that it is reproducible."""
     sections = [table.markdown() for table in experiment_tables(spec, results, times=False)]
     return "\n".join(["## Experiment\n", *sections])
 
 
 def _mean(means: pd.DataFrame, name: str) -> str:
-    """Return a figure, P(error <= 50 m) with its interval."""
+    """Return a figure as text, P(error <= 50 m) with its interval."""
     value = float(means["value"][name]) if name in means.index else np.nan
     if name != "p50" or np.isnan(value):
         return figure(value)

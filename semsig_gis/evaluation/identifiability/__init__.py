@@ -1,1 +1,1 @@
-"""How well each cell can be told from all others, before any query."""
+"""How well each cell can be distinguished from all others, before any query."""

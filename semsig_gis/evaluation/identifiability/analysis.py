@@ -1,8 +1,8 @@
-"""How well a query from each cell will be placed, found out before there is one.
+"""Estimate how well a query from each cell will be located, before there are queries.
 
-What comes of simulated queries from some cells, the *trials*, depends nearly alone on how like the
-other cells are to the cell and on how many objects it sees. Both are cheap to know for every cell,
-so that a curve through the trials gives the chances of all of them.
+The outcomes of simulated queries from some cells, the *trials*, depend almost only on the
+similarity of other cells and on the number of visible objects. Both are fast to compute for every
+cell, so that a curve fitted to the trials gives the probabilities of all cells.
 """
 
 from __future__ import annotations
@@ -44,16 +44,15 @@ if TYPE_CHECKING:
 
 TRIALS = 3000
 CLASS_TRIALS = 400  # without each class
-PLACES = 3  # that are named for each cell
+PLACES = 3  # lookalikes of each cell
 LEAST_VIEW, MOST_VIEW = 10, 360  # degrees
-DIRECTIONS = 8  # in which photos are looked at from each cell, at least
+DIRECTIONS = 8  # least number of photo directions from each cell
 CELLS_A_PART = 4096
 TEMPERATURES = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)
-DECIMALS = 3  # of all numbers: more than they are sure to, and short in a file
+DECIMALS = 3  # of all numbers: more than their accuracy, but short in a file
 
-TOUCHED_CLASSES = 4  # that the mean trial tells of
-# Seconds that a pair of cells takes: for telling how long and how far the work is.
-PAIR_S = 5e-10
+TRIAL_CLASSES = 4  # approximate number of classes of a trial
+CELL_PAIR_S = 5e-10  # approximate seconds of a pair of cells, to announce the duration
 
 
 def identify(
@@ -67,31 +66,31 @@ def identify(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Identifiability:
-    """Find out how well a query from each cell will be placed.
+    """Estimate how well a query from each cell will be located.
 
     Parameters
     ----------
     index : LikelihoodIndex
-        The cells, and how the detector fails; the answers know that, too.
+        The cells and the noise model of the detector, which the answers assume as well.
     radius : float, default 50
-        Metres that count as near, 0 to 1,000,000.
+        Distance that counts as near, 0 to 1,000,000 metres.
     view : float, default 360
-        Degrees that a query sees at once, 10 to 360: a photo in any direction, or the full turn.
+        Degrees that a query sees, 10 to 360: a photo in any direction, or the full turn.
     trials : int, default 3000
-        How many simulated queries to ask, 1 to 1,000,000.
+        Number of simulated queries, 1 to 1,000,000.
     class_trials : int, default 400
-        How many of them to ask again without each class, 1 or more.
+        Number of them that are repeated without each class, 1 or more.
     seed : int, default 0
-        Seed of all chances, 0 to 10**18.
+        Random seed, 0 to 10**18.
     threads : int, default 1
-        How many threads share the work, 1 to 1,024; the result does not depend on it.
+        Number of threads, 1 to 1,024; the result does not depend on it.
     progress : callable, optional
-        Called with how much is done and how much there is in all.
+        Called with the finished work and the total work.
 
     Returns
     -------
     Identifiability
-        Chances, lookalikes and gains of all cells.
+        Probabilities, lookalikes and gains of all cells.
 
     Raises
     ------
@@ -100,20 +99,20 @@ def identify(
 
     Notes
     -----
-    Queries are seen from the middles of the cells; a noise model with a position_sigma has them
-    elsewhere. Let l_d(c) be the log-likelihood of the signature of cell c, as a query, in cell d,
-    and F(c) the logarithm of the sum over the cells d beyond the radius of
-    ``exp(T (l_d(c) - l_c(c)))``, with the temperature T at which ``exp(T l_d(c))``, made to sum to
-    one, is nearest to the chances that the answers to the trials gave (least cross-entropy). What
-    came of the trials is fitted as a share that depends on F and on the logarithm of the number
-    of objects (`core.statistics`). The rest of the chance is divided by the same powers.
+    Queries are from the centres of the cells; the position_sigma of a noise model moves them. Let
+    l_d(c) be the log-likelihood of the signature of cell c, as a query, in cell d, and F(c) the
+    logarithm of the sum of ``exp(T (l_d(c) - l_c(c)))`` over the cells d beyond the radius. The
+    temperature T is the one with the least cross-entropy between the normalized ``exp(T l_d(c))``
+    and the probabilities in the answers to the trials. The outcomes of the trials are fitted as
+    shares that depend on F and on the logarithm of the number of objects (`core.statistics`). The
+    remaining probability is distributed over the lookalikes in proportion to the same powers.
 
-    A photo of fewer than 360 degrees is looked at from every cell in directions that are 45 degrees
-    apart or closer, and fitted as a query of its own; the results are means over the directions. In
-    a direction in which a cell sees nothing it cannot be found.
+    With a view of less than 360 degrees, photos in directions of at most 45 degrees apart are
+    compared from every cell, and each is fitted as a query; the results are means over the
+    directions. A cell cannot be found in a direction without visible objects.
 
-    For the gains, trials are asked again without each class, and the fit takes the logarithm of
-    the number of objects that are left as a third feature.
+    For the gains, trials are repeated without each class, and the logarithm of the number of
+    remaining objects is a third feature of the fit.
 
     The time grows with the square of the number of cells.
 
@@ -138,16 +137,16 @@ def identify(
     database, photos = index.database, _looks(view)
     cells, sample = len(database), trial_cells(len(database), trials, seed=seed)
     looks = np.random.default_rng([seed, 2]).integers(len(photos), size=trials)
-    again = slice(class_trials)
+    again = slice(class_trials)  # the trials that are repeated without each class
     seconds = (
         trials * TRIAL_S,
-        cells**2 * len(photos) * PAIR_S,
-        len(sample[again]) * TOUCHED_CLASSES * TRIAL_S,
+        cells**2 * len(photos) * CELL_PAIR_S,
+        len(sample[again]) * TRIAL_CLASSES * TRIAL_S,
     )
     announce(sum(seconds) / threads, "comparing cells")
     stages = _stages(progress, *seconds)
     columns = symbol_columns(index, looks=photos, threads=threads)
-    tried = try_cells(
+    outcomes = try_cells(
         index,
         sample,
         columns=columns,
@@ -157,8 +156,8 @@ def identify(
         threads=threads,
         progress=stages[0],
     )
-    temperature = _temperature(columns, tried, radius=radius, threads=threads)
-    like = find_lookalikes(
+    temperature = _temperature(columns, outcomes, radius=radius, threads=threads)
+    lookalikes = find_lookalikes(
         columns,
         temperature=temperature,
         radius=radius,
@@ -177,12 +176,12 @@ def identify(
         threads=threads,
         progress=stages[2],
     )
-    shares = _expected(columns, tried, like)
-    gains, classes = _gains(columns, tried, like, without=without)
-    rest = (1.0 - shares["near"]) / np.maximum(like.far, LEAST_SUM)
-    chances = rest[:, None] * like.sums
+    shares = _expected(columns, outcomes, lookalikes)
+    gains, classes = _gains(columns, outcomes, lookalikes, without=without)
+    rest = (1.0 - shares["near"]) / np.maximum(lookalikes.far, LEAST_SUM)
+    chances = rest[:, None] * lookalikes.sums
     mean = {name: _by_cell(values, cells) for name, values in shares.items()}
-    named, sums = _places(database, like.cells, chances, radius=radius)
+    places, place_chances = _merged_places(database, lookalikes.cells, chances, radius=radius)
     return Identifiability(
         database=database,
         noise=index.noise,
@@ -192,8 +191,8 @@ def identify(
         near=mean["near"].round(DECIMALS),
         found=mean["found"].round(DECIMALS),
         bits=mean["bits"].round(DECIMALS),
-        lookalikes=named,
-        lookalike_chances=sums.round(DECIMALS),
+        lookalikes=places,
+        lookalike_chances=place_chances.round(DECIMALS),
         gains=gains.round(DECIMALS) + 0.0,  # no -0.0
         classes=classes,
         trials=trials,
@@ -202,7 +201,7 @@ def identify(
 
 
 def _looks(view: float) -> tuple[Photo, ...]:
-    """Return the photos that are looked at from every cell."""
+    """Return the photos, or the full turn, that are compared from every cell."""
     if view == FULL_TURN:
         return (FULL_VIEW,)
     count = max(DIRECTIONS, math.ceil(FULL_TURN / view))
@@ -211,76 +210,80 @@ def _looks(view: float) -> tuple[Photo, ...]:
 
 
 def _by_cell(values: NDArray[np.float64], cells: int) -> NDArray[np.float64]:
-    """Return means over the looks from each cell, shape (n, ...)."""
+    """Return the means over the looks from each cell, shape (n, ...)."""
     return np.asarray(values.reshape(cells, -1, *values.shape[1:]).mean(axis=1))
 
 
-def _places(
+def _merged_places(
     database: SignatureDatabase,
-    found: NDArray[np.int64],
+    places: NDArray[np.int64],
     chances: NDArray[np.float64],
     *,
     radius: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the places of all looks from each cell as few, and the mean chance of each.
+    """Merge the places of all looks from each cell; return k places and their mean probabilities.
 
-    `found` and `chances` (looks, k) are row numbers, -1 for none, and the chance of each. Places
-    within the radius of each other are one, and those named are farther apart than twice that.
+    `places` and `chances`, shape (looks, k), are row numbers, -1 for none, and the probability of
+    each. The probabilities of places within the radius of each other are added, and the returned
+    places are more than two radii apart.
     """
-    cells, count = len(database), found.shape[1]
-    looks = len(found) // cells
+    cells, count = len(database), places.shape[1]
+    looks = len(places) // cells
     if looks == 1:
-        return found, chances
+        return places, chances
     at = np.stack([database.columns, database.rows], axis=1).astype(np.float64)
     steps = radius / database.grid.step + 1e-9
-    named = np.full((cells, count), -1)
+    merged = np.full((cells, count), -1)
     sums = np.zeros((cells, count))
     for low in range(0, cells, CELLS_A_PART):
         part = slice(low * looks, (low + CELLS_A_PART) * looks)
-        one = found[part].reshape(-1, looks * count)
-        mass = np.where(one < 0, 0.0, chances[part].reshape(one.shape)) / looks
-        apart = np.hypot(*np.moveaxis(at[one][:, :, None] - at[one][:, None], -1, 0))
-        rows = np.arange(len(one))
+        candidates = places[part].reshape(-1, looks * count)
+        mass = np.where(candidates < 0, 0.0, chances[part].reshape(candidates.shape)) / looks
+        offsets = at[candidates][:, :, None] - at[candidates][:, None]
+        apart = np.hypot(*np.moveaxis(offsets, -1, 0))
+        rows = np.arange(len(candidates))
         for place in range(count):
+            # Take the candidate with the highest sum around it, then clear its surroundings.
             total = np.where(mass > 0, ((apart <= steps) * mass[:, None]).sum(axis=2), 0.0)
             best = total.argmax(axis=1)
-            some = total[rows, best] > 0
-            named[low + rows[some], place] = one[rows, best][some]
+            with_mass = total[rows, best] > 0
+            merged[low + rows[with_mass], place] = candidates[rows, best][with_mass]
             sums[low + rows, place] = total[rows, best]
             mass[apart[rows, best] <= 2.0 * steps] = 0.0
-    return named, sums
+    return merged, sums
 
 
 def _stages(
     progress: Callable[[int, int], None] | None, *seconds: float
 ) -> list[Callable[[int, int], None] | None]:
-    """Return what each stage calls with its progress, to tell that of all, by expected seconds."""
+    """Return the progress function of each stage, which reports overall progress by seconds."""
     if progress is None:
         return [None] * len(seconds)
     ends = np.cumsum([0.0, *seconds]).tolist()
 
-    def tell(low: float, high: float, done: int, count: int) -> None:
-        progress(round(1000.0 * (low + (high - low) * done / count)), round(1000.0 * ends[-1]))
+    def report(low: float, high: float, finished: int, count: int) -> None:
+        progress(round(1000.0 * (low + (high - low) * finished / count)), round(1000.0 * ends[-1]))
 
-    return [partial(tell, low, high) for low, high in pairwise(ends)]
+    return [partial(report, low, high) for low, high in pairwise(ends)]
 
 
-def _temperature(columns: SymbolColumns, tried: Trials, *, radius: float, threads: int) -> float:
-    """Return the power that brings the likelihoods of signatures nearest to the answers."""
-    some = np.flatnonzero(np.isfinite(tried.lean))
-    if not len(some):
+def _temperature(columns: SymbolColumns, outcomes: Trials, *, radius: float, threads: int) -> float:
+    """Return the power with which likelihoods of signatures fit the answers to the trials best."""
+    trials = np.flatnonzero(np.isfinite(outcomes.lean))
+    if not len(trials):
         return 1.0
     fits = []
     for power in TEMPERATURES:
-        like = find_lookalikes(
+        lookalikes = find_lookalikes(
             columns,
             temperature=power,
             radius=radius,
-            looks=tried.cells[some] * len(columns.looks) + tried.looks[some],
+            looks=outcomes.cells[trials] * len(columns.looks) + outcomes.looks[trials],
             places=1,
             threads=threads,
         )
-        fits.append(float(np.mean(power * tried.lean[some] - np.log(like.near + like.far))))
+        totals = np.log(lookalikes.near + lookalikes.far)
+        fits.append(float(np.mean(power * outcomes.lean[trials] - totals)))
     return TEMPERATURES[int(np.argmax(fits))]
 
 
@@ -292,92 +295,96 @@ def _most_bits(cells: int) -> float:
     return max(float(np.log2(cells)), LEAST_SUM)
 
 
-def _seen(columns: SymbolColumns) -> NDArray[np.int64]:
-    """Return how many objects of each class each look shows, shape (looks, k)."""
+def _object_counts(columns: SymbolColumns) -> NDArray[np.int64]:
+    """Return the number of objects of each class in each look, shape (looks, k)."""
     return np.asarray(columns.counts.transpose(2, 0, 1).reshape(-1, columns.counts.shape[1]))
 
 
 def _expected(
-    columns: SymbolColumns, tried: Trials, like: Lookalikes
+    columns: SymbolColumns, outcomes: Trials, lookalikes: Lookalikes
 ) -> dict[str, NDArray[np.float64]]:
-    """Return what to expect of every look, by what came of the trials."""
-    shown = _seen(columns).sum(axis=1)
+    """Return the expected outcomes of every look, fitted to those of the trials."""
+    shown = _object_counts(columns).sum(axis=1)
     objects = np.log(np.maximum(shown, 1))
-    beyond = np.stack([_log(like.far), objects], axis=1)
-    others = np.stack([_log(like.far + np.maximum(like.near - 1.0, 0.0)), objects], axis=1)
+    beyond = np.stack([_log(lookalikes.far), objects], axis=1)
+    others = np.stack(
+        [_log(lookalikes.far + np.maximum(lookalikes.near - 1.0, 0.0)), objects], axis=1
+    )
     most = _most_bits(len(columns.database))
-    looks = tried.cells * len(columns.looks) + tried.looks
-    some = shown[looks] > 0
+    looks = outcomes.cells * len(columns.looks) + outcomes.looks
+    with_objects = shown[looks] > 0
 
     def fitted(
         features: NDArray[np.float64], values: NDArray[np.float64], blank: float
     ) -> NDArray[np.float64]:
-        # `blank` is what comes of a look that shows nothing.
-        if not some.any():
+        # `blank` is the outcome of a look without objects.
+        if not with_objects.any():
             return np.full(len(shown), blank)
-        fit = fit_shares(features[looks[some]], values[some])
+        fit = fit_shares(features[looks[with_objects]], values[with_objects])
         return np.where(shown > 0, fit.predict(features), blank)
 
-    near = fitted(beyond, tried.near, 0.0)
+    near = fitted(beyond, outcomes.near, 0.0)
     return {
-        "itself": np.minimum(fitted(others, tried.itself, 0.0), near),
+        "itself": np.minimum(fitted(others, outcomes.itself, 0.0), near),
         "near": near,
-        "found": fitted(beyond, tried.found.astype(np.float64), 0.0),
-        "bits": most * fitted(others, np.clip(tried.bits / most, 0.0, 1.0), 1.0),
+        "found": fitted(beyond, outcomes.found.astype(np.float64), 0.0),
+        "bits": most * fitted(others, np.clip(outcomes.bits / most, 0.0, 1.0), 1.0),
     }
 
 
 def _gains(
     columns: SymbolColumns,
-    tried: Trials,
-    like: Lookalikes,
+    outcomes: Trials,
+    lookalikes: Lookalikes,
     *,
     without: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], tuple[ClassGain, ...]]:
-    """Return what each class adds to the chance of the place, by cell and for the city.
+    """Return the gain in probability of the place by each class, by cell and for the city.
 
-    `without` is what came of the first trials without each class (`try_without_classes`).
+    `without` is the outcome of the first trials without each class (`try_without_classes`).
     """
     codes, cells = columns.table.codes, len(columns.database)
-    seen = _seen(columns)
-    shown = seen.sum(axis=1)
-    left = shown[:, None] - seen
-    far, objects = _log(like.far), np.log(np.maximum(shown, 1))
+    counts = _object_counts(columns)
+    shown = counts.sum(axis=1)
+    remaining = shown[:, None] - counts
+    far, objects = _log(lookalikes.far), np.log(np.maximum(shown, 1))
     again = slice(len(without[0]))
-    looks = (tried.cells * len(columns.looks) + tried.looks)[again]
+    looks = (outcomes.cells * len(columns.looks) + outcomes.looks)[again]
     whole = np.stack([far, objects, objects], axis=1)
 
     def features(number: int, rows: NDArray[np.int64] | slice) -> NDArray[np.float64]:
-        fewer = np.log(np.maximum(left[rows, number], 1))
-        return np.stack([(far + like.rise[:, number])[rows], objects[rows], fewer], axis=1)
+        fewer = np.log(np.maximum(remaining[rows, number], 1))
+        return np.stack([(far + lookalikes.rise[:, number])[rows], objects[rows], fewer], axis=1)
 
-    # What is left of looks that show nothing else needs no fit.
-    some = (left[looks] > 0) & np.isfinite(without[0])
+    # The fit needs only looks with objects of other classes.
+    usable = (remaining[looks] > 0) & np.isfinite(without[0])
     full = shown[looks] > 0
-    examples = [features(number, looks[some[:, number]]) for number in range(len(codes))]
+    examples = [features(number, looks[usable[:, number]]) for number in range(len(codes))]
     examples = [whole[looks[full]], *examples]
 
-    def gained(
+    def class_gains(
         with_all: NDArray[np.float64], values: NDArray[np.float64], *, blank: float
     ) -> NDArray[np.float64]:
-        # `blank` is what comes of a look that shows nothing.
-        told = [values[some[:, number], number] for number in range(len(codes))]
-        told = [with_all[again][full], *told]
-        if not len(np.concatenate(told)):
+        # `blank` is the outcome of a look without objects.
+        targets = [values[usable[:, number], number] for number in range(len(codes))]
+        targets = [with_all[again][full], *targets]
+        if not len(np.concatenate(targets)):
             return np.zeros((cells, len(codes)))
-        fit = fit_shares(np.concatenate(examples), np.concatenate(told))
+        fit = fit_shares(np.concatenate(examples), np.concatenate(targets))
         before = np.where(shown > 0, fit.predict(whole), blank)
         gains = np.empty((cells, len(codes)))
         for number in range(len(codes)):
             after = fit.predict(features(number, slice(None)))
-            after = np.where(left[:, number] > 0, after, blank)
+            after = np.where(remaining[:, number] > 0, after, blank)
             gains[:, number] = _by_cell(before - after, cells)
         return gains
 
     near, bits = without
     most = _most_bits(cells)
-    near_gains = gained(tried.near, near, blank=0.0)
-    bit_gains = gained(np.clip(tried.bits / most, 0, 1), np.clip(bits / most, 0, 1), blank=1.0)
+    near_gains = class_gains(outcomes.near, near, blank=0.0)
+    bit_gains = class_gains(
+        np.clip(outcomes.bits / most, 0, 1), np.clip(bits / most, 0, 1), blank=1.0
+    )
     of_city = zip(
         codes.tolist(), near_gains.mean(axis=0), most * bit_gains.mean(axis=0), strict=True
     )

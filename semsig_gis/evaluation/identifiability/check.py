@@ -1,4 +1,4 @@
-"""Whether the chances of cells come true, by queries that they were not learnt from."""
+"""Check the probabilities of cells with new simulated queries."""
 
 from __future__ import annotations
 
@@ -40,9 +40,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ChanceBin:
-    """Queries from cells with a chance from `low` to `high`: the mean of it, and the share found.
+    """Queries from cells with a probability from `low` to `high`.
 
-    That is `true`, with Wilson's 95 % interval from `true_low` to `true_high`.
+    `stated` is the mean probability, `true` the share of queries that were found, with Wilson's
+    95 % interval from `true_low` to `true_high`.
     """
 
     low: float
@@ -56,21 +57,21 @@ class ChanceBin:
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class IdentifiabilityCheck(Displayed):
-    """How the chances of cells compare with what came of queries.
+    """Comparison of the probabilities of cells with the outcomes of queries.
 
     Parameters
     ----------
     queries, seed : int
-        How many were asked, and the seed of their cells and of all chances.
+        Number of queries, and their random seed.
     found : float
-        Share of them whose best place was within the radius.
+        Share of queries with the best place within the radius.
     correlations : mapping of str to float
-        Rank correlation (Spearman's) with success by score of the cell: ``found`` and ``near`` of
-        `Identifiability`; for comparison ``length``, the number of objects, and ``type_group``, how
-        few cells have the same types. NaN where there is none.
+        Spearman's rank correlation with success by score of the cell: ``found`` and ``near`` of
+        `Identifiability`; for comparison ``length``, the number of objects, and ``type_group``, the
+        negative number of cells with the same types. NaN if a score or success is constant.
     attainable : float
-        The correlation of ``found`` if it were every cell's true chance; below 1, as success is yes
-        or no.
+        The correlation of ``found`` if it were the true probability of every cell; it is below 1,
+        because success is yes or no.
     bins : tuple of ChanceBin
         The tenths of ``found`` that have queries.
 
@@ -79,7 +80,7 @@ class IdentifiabilityCheck(Displayed):
     >>> from semsig_gis import build_index, identify, named_noise
     >>> index = build_index(demo_database, named_noise("medium"))
     >>> check = check_identifiability(identify(index, trials=20, class_trials=5), index, queries=50)
-    >>> sum(one.queries for one in check.bins)
+    >>> sum(item.queries for item in check.bins)
     50
     """
 
@@ -100,12 +101,14 @@ class IdentifiabilityCheck(Displayed):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields as plain values for JSON; None for a correlation that there is not."""
+        """Return the fields as plain values for JSON, with None for NaN."""
         return {
             **asdict(self),
-            "correlations": {name: finite_or_none(one) for name, one in self.correlations.items()},
+            "correlations": {
+                name: finite_or_none(value) for name, value in self.correlations.items()
+            },
             "attainable": finite_or_none(self.attainable),
-            "bins": [asdict(one) for one in self.bins],
+            "bins": [asdict(item) for item in self.bins],
         }
 
 
@@ -118,22 +121,22 @@ def check_identifiability(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> IdentifiabilityCheck:
-    """Ask fresh queries from random cells, and compare what comes of them with the chances.
+    """Answer new simulated queries from random cells, and compare success and probabilities.
 
     Parameters
     ----------
     identifiability : Identifiability
-        The chances of the cells.
+        The probabilities of the cells.
     index : LikelihoodIndex
-        The index that they were found out with.
+        The index from which they were computed.
     queries : int, default 2000
-        How many to ask, 1 to 1,000,000.
+        Number of queries, 1 to 1,000,000.
     seed : int, optional
-        Seed of the cells and of all draws, another than that of the trials; by default the next.
+        Random seed; it must not be that of the trials. The default is the next number.
     threads : int, default 1
-        How many queries are worked on at once.
+        Number of queries that are answered in parallel.
     progress : callable, optional
-        Called with the number of queries done and in all.
+        Called with the number of finished queries and the number of queries.
 
     Returns
     -------
@@ -143,7 +146,8 @@ def check_identifiability(
     Raises
     ------
     InputError
-        If a number is out of range, the seed is that of the trials, or the index is another.
+        If a number is out of range, the seed is that of the trials, or the index belongs to another
+        database or noise model.
 
     Examples
     --------
@@ -151,7 +155,7 @@ def check_identifiability(
     >>> index = build_index(demo_database, named_noise("medium"))
     >>> cells = identify(index, trials=200, class_trials=10)
     >>> check = check_identifiability(cells, index, queries=200)
-    >>> check.correlations["found"] > 0.2, sum(one.queries for one in check.bins)
+    >>> check.correlations["found"] > 0.2, sum(item.queries for item in check.bins)
     (True, 200)
     """
     if seed is None:
@@ -174,8 +178,8 @@ def check_identifiability(
     photos = None
     if identifiability.view < FULL_TURN:
         headings = np.random.default_rng([seed, 2]).uniform(0.0, FULL_TURN, queries).tolist()
-        photos = (Photo.looking(heading=one, fov=identifiability.view) for one in headings)
-    tried = try_cells(
+        photos = (Photo.looking(heading=angle, fov=identifiability.view) for angle in headings)
+    outcomes = try_cells(
         index,
         cells,
         queries=draw_trials(index, cells, photos=photos, seed=seed),
@@ -183,13 +187,14 @@ def check_identifiability(
         threads=threads,
         progress=progress,
     )
-    stated, success = identifiability.found[cells], tried.found.astype(np.float64)
+    stated, success = identifiability.found[cells], outcomes.found.astype(np.float64)
     scores = {
         "found": stated,
         "near": identifiability.near[cells],
         "length": database.lengths[cells],
         "type_group": -database.type_group_sizes[cells],
     }
+    # The rank correlation with a success that is drawn with the stated probability.
     ranks = _ranks(stated)
     spread = ranks.std() * math.sqrt(stated.mean() * (1.0 - stated.mean()))
     shared = float(((ranks - ranks.mean()) * stated).mean())
@@ -206,14 +211,14 @@ def check_identifiability(
 
 
 def _ranks(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Return ranks; those of equals are their mean."""
+    """Return the ranks of values; equal values get their mean rank."""
     return np.asarray(pd.Series(values).rank(), dtype=np.float64)
 
 
-def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    if not (np.ptp(one) and np.ptp(other)):
+def _correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    if not (np.ptp(first) and np.ptp(second)):
         return math.nan
-    return float(np.corrcoef(one, other)[0, 1])
+    return float(np.corrcoef(first, second)[0, 1])
 
 
 def _bins(stated: NDArray[np.float64], success: NDArray[np.float64]) -> tuple[ChanceBin, ...]:

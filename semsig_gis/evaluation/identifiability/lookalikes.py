@@ -1,8 +1,8 @@
-"""Which cells look like which: every cell compared with all others.
+"""Compare every cell with all others, to find the cells that look similar.
 
-The signature of each cell is the query here: the ratio of two likelihoods tells how far another
-cell is from looking the same to a detector. A real query is spoiled, which brings the ratios nearer
-to one: they are raised to a power, the *temperature*, before they are added up.
+Here, the query is the signature of each cell: a likelihood ratio measures how similar another cell
+looks to a detector. Real queries have errors, which bring the ratios nearer to one. So ratios are
+raised to a power, the *temperature*, before they are summed.
 """
 
 from __future__ import annotations
@@ -15,6 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semsig_gis.core import MOST_METRES, InputError, cell_ids, require_number
+from semsig_gis.evaluation.identifiability.kernels import (
+    BLOCK_CELLS,
+    BaseScores,
+    CellPlaces,
+    CellSample,
+    Entries,
+    compare_cells,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,27 +30,26 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation.identifiability.kernels import Bases, Sample
     from semsig_gis.evaluation.identifiability.symbol_tables import SymbolColumns
 
 CELLS_A_TASK = 1024
 LEAST_SUM = 1e-30  # of ratios, so that it has a logarithm
-LIKELY = 300  # cells that are compared one by one with each, about
-SAMPLE = 4096  # cells that stand for the others
-LEVELS = 20_000  # steps between cells before anything is added
-MOST_OCTAVES = 100.0  # powers of two beyond this are not told from it
+LIKELY_CELLS = 300  # approximate number of cells compared one by one with each cell
+SAMPLE_CELLS = 4096  # sample of all other cells
+BASE_LEVELS = 20_000  # range of base scores in steps, if sums have 16 bits
+MOST_OCTAVES = 100.0  # ratios are clipped at 2**100
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lookalikes:
-    """How like other cells are to each of c looks from cells.
+    """Similarity of other cells to each of c looks from cells.
 
-    `near` (c,) is the sum of the tempered ratios of likelihood over the circle around each cell,
-    `far` (c,) that over all other cells. `cells` (c, k) are row numbers of the likest cells outside
-    the circle whose own circles do not overlap, by falling sum, -1 where there are no more; `sums`
-    (c, k) is the sum over the circle of each, without what is in the circle of the compared cell.
-    `rise` (c, classes) is by how much the logarithm of `far` would rise without each class: without
-    its objects and the detections of its name. That some are detected under another is neglected.
+    `near` (c,) is the sum of the tempered likelihood ratios over the circle around each cell, `far`
+    (c,) the sum over all other cells. `cells` (c, k) are row numbers of the most similar cells
+    outside the circle, with circles that do not overlap, by falling sum; -1 if there are no more.
+    `sums` (c, k) is the sum over the circle of each, without the circle of the compared cell.
+    `rise` (c, classes) is the increase of the logarithm of `far` without each class, that is
+    without its objects and without detections of it. Misclassified objects are neglected.
     """
 
     near: NDArray[np.float64]
@@ -53,9 +60,9 @@ class Lookalikes:
 
 
 def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
-    """Return which cells of side `step` are within a radius (both in metres) of a cell, (a, 2).
+    """Return the cells of side `step` within a radius (both in metres) of a cell, shape (a, 2).
 
-    For each column of cells, the first and the last cell number less that of the cell.
+    For each column of cells: the first and the last cell id, minus the id of the middle cell.
     """
     reach = radius / step + 1e-9
     across = np.arange(-math.floor(reach), math.floor(reach) + 1)
@@ -64,7 +71,7 @@ def cell_circle(radius: float, step: float) -> NDArray[np.int64]:
 
 
 def city_extent(database: SignatureDatabase) -> float:
-    """Return metres within which all cells are from each other; a larger radius only costs time."""
+    """Return the diagonal of the city in metres; a larger radius only costs time."""
     sides = np.ptp(database.columns), np.ptp(database.rows)
     return database.grid.step * math.ceil(math.hypot(*sides))
 
@@ -80,38 +87,32 @@ def find_lookalikes(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Lookalikes:
-    """Compare looks from cells with all other cells, and name the likest `places`.
+    """Compare looks from cells with all other cells, and return the `places` most similar ones.
 
-    Of d looks of the columns, number l from cell c has the number ``c * d + l``; all by default.
-    `temperature` (above 0) is 1 for a query that is just the signature of the cell, less for one
-    that is spoiled; `radius` is what counts as near, in metres; InputError if one is out of range.
-    A ratio beyond 2 to the power of 100, or below its inverse, counts as that. Of the cells that
-    are not among the likeliest three hundred or so, a sample is added up, which `seed` draws.
+    With d looks of the columns, look l from cell c has the number ``c * d + l``; all by default.
+    `temperature` (above 0) is 1 for queries without errors and less for queries with errors;
+    `radius` is the distance that counts as near, in metres; InputError if one is out of range.
+    Ratios are clipped at 2**100 and 2**-100. About 300 likely cells are compared one by one; the
+    sum over the others is estimated from a sample, which is drawn with `seed`.
     """
-    from semsig_gis.evaluation.identifiability.kernels import (  # noqa: PLC0415 - numba loads slowly
-        BLOCK,
-        Entries,
-        Places,
-        compare_cells,
-    )
-
+    if not 0 < temperature < math.inf:
+        raise InputError(f"a temperature of {temperature} was given; give a power above 0.")
+    check_radius(radius)
     database = columns.database
-    _check(temperature, radius)
     directions = len(columns.looks)
     if looks is None:
         looks = np.arange(len(database) * directions)
     rows = np.asarray(looks, dtype=np.int64)
-    seen_from = rows // directions
+    viewpoints = rows // directions
     radius = min(radius, city_extent(database))
     powers = _powers(columns, temperature)
-    # Sums within 16 bits are added up twice as fast, but hold no cells with very many objects.
-    wide = database.lengths * 255 + LEVELS >= 2**16
-    wide |= (columns.constants < columns.constants.max() - LEVELS * columns.step).any(axis=0)
-    all_bases = {
-        much: _bases(columns, temperature, wide=much) for much in {*wide[seen_from].tolist()}
-    }
-    samples = {much: _sample(columns, bases, seed) for much, bases in all_bases.items()}
-    around = Places(
+    # Sums of 16 bits are twice as fast, but overflow for cells with very many objects.
+    wide = database.lengths * 255 + BASE_LEVELS >= 2**16
+    wide |= (columns.constants < columns.constants.max() - BASE_LEVELS * columns.step).any(axis=0)
+    widths = {*wide[viewpoints].tolist()}
+    bases = {is_wide: _bases(columns, temperature, wide=is_wide) for is_wide in widths}
+    samples = {is_wide: _sample(columns, bases[is_wide], seed) for is_wide in widths}
+    places_of_cells = CellPlaces(
         ids=database.cell_ids,
         at=np.stack([database.columns, database.rows], axis=1).astype(np.int64),
         circle=cell_circle(radius, database.grid.step),
@@ -123,7 +124,7 @@ def find_lookalikes(
         kinds=columns.kinds,
         bearing_units=database.bearing_units,
     )
-    like = Lookalikes(
+    lookalikes = Lookalikes(
         near=np.empty(len(rows)),
         far=np.empty(len(rows)),
         cells=np.empty((len(rows), places), np.int64),
@@ -132,8 +133,8 @@ def find_lookalikes(
     )
 
     def compare(part: slice) -> None:
-        much = bool(wide[seen_from[part]].any())
-        sample = samples[much]
+        is_wide = bool(wide[viewpoints[part]].any())
+        sample = samples[is_wide]
         compare_cells(
             rows[part],
             entries,
@@ -141,100 +142,93 @@ def find_lookalikes(
             columns.values,
             columns.constants,
             columns.step,
-            all_bases[much],
+            bases[is_wide],
             powers,
             sample,
-            around,
-            np.empty((2, max(BLOCK, len(sample.cells))), np.uint32 if much else np.uint16),
-            like.near[part],
-            like.far[part],
-            like.cells[part],
-            like.sums[part],
-            like.rise[part],
+            places_of_cells,
+            np.empty((2, max(BLOCK_CELLS, len(sample.cells))), np.uint32 if is_wide else np.uint16),
+            lookalikes.near[part],
+            lookalikes.far[part],
+            lookalikes.cells[part],
+            lookalikes.sums[part],
+            lookalikes.rise[part],
         )
 
-    _in_parts(compare, len(rows), threads, progress)
-    order = np.argsort(-like.sums, axis=1, kind="stable")
-    logs = np.log(np.maximum(like.rise, LEAST_SUM))
+    _run_in_parts(compare, len(rows), threads, progress)
+    order = np.argsort(-lookalikes.sums, axis=1, kind="stable")
+    # The kernel filled `rise` with the sums without each class.
+    logs = np.log(np.maximum(lookalikes.rise, LEAST_SUM))
     return replace(
-        like,
-        cells=np.take_along_axis(like.cells, order, axis=1),
-        sums=np.take_along_axis(like.sums, order, axis=1),
-        rise=logs - np.log(np.maximum(like.far, LEAST_SUM))[:, None],
+        lookalikes,
+        cells=np.take_along_axis(lookalikes.cells, order, axis=1),
+        sums=np.take_along_axis(lookalikes.sums, order, axis=1),
+        rise=logs - np.log(np.maximum(lookalikes.far, LEAST_SUM))[:, None],
     )
 
 
-def _bases(columns: SymbolColumns, temperature: float, *, wide: bool) -> Bases:
-    """Return what cells have before anything is added to it."""
-    from semsig_gis.evaluation.identifiability.kernels import Bases  # noqa: PLC0415
-
+def _bases(columns: SymbolColumns, temperature: float, *, wide: bool) -> BaseScores:
+    """Return the scores of all cells before the columns of a query are added."""
     constants = columns.constants.astype(np.float64) - columns.constants.max()
-    lowest = 1.0 - np.rint(constants.min() / columns.step) if wide else LEVELS
+    lowest = 1.0 - np.rint(constants.min() / columns.step) if wide else BASE_LEVELS
     levels = np.maximum(np.rint(constants / columns.step) + lowest, 1.0)
     trims = np.exp(temperature * (constants - columns.step * (levels - lowest)))
-    lifted = -temperature * columns.missed.transpose(0, 2, 1).astype(np.float64)
-    more = columns.values.shape[0] * columns.values.shape[2] - len(columns.database)
-    return Bases(
-        levels=np.pad(levels, [(0, 0), (0, more)]).astype(np.uint32 if wide else np.uint16),
+    lifts = -temperature * columns.missed.transpose(0, 2, 1).astype(np.float64)
+    # Blocks are whole: the last one has cells without a place, with level 0.
+    padding = columns.values.shape[0] * columns.values.shape[2] - len(columns.database)
+    return BaseScores(
+        levels=np.pad(levels, [(0, 0), (0, padding)]).astype(np.uint32 if wide else np.uint16),
         trims=np.maximum(trims, LEAST_SUM).astype(np.float32),
-        lifts=np.exp(np.minimum(lifted, MOST_OCTAVES * math.log(2.0))).astype(np.float32),
+        lifts=np.exp(np.minimum(lifts, MOST_OCTAVES * math.log(2.0))).astype(np.float32),
     )
 
 
 def _powers(columns: SymbolColumns, temperature: float) -> NDArray[np.float32]:
-    """Return the ratios of likelihood that whole steps make, the same number down and up."""
+    """Return the tempered likelihood ratio of each number of steps, from negative to positive."""
     nats = MOST_OCTAVES * math.log(2.0)
     steps = math.ceil(nats / (temperature * columns.step))
     exponents = temperature * columns.step * np.arange(-steps, steps + 1)
     return np.asarray(np.exp(np.clip(exponents, -nats, nats)), dtype=np.float32)
 
 
-def _sample(columns: SymbolColumns, bases: Bases, seed: int) -> Sample:
-    """Draw the cells that stand for those that are not likely."""
-    from semsig_gis.evaluation.identifiability.kernels import Bases, Sample  # noqa: PLC0415
-
+def _sample(columns: SymbolColumns, bases: BaseScores, seed: int) -> CellSample:
+    """Draw the cells that represent those that are not likely; none in a small city."""
     count = len(columns.database)
-    size = SAMPLE if count > SAMPLE else 0
+    size = SAMPLE_CELLS if count > SAMPLE_CELLS else 0
     cells = np.sort(np.random.default_rng([seed, 1]).permutation(count)[:size])
-    turns = np.stack([cells[: size // 2], cells[size // 2 :]], axis=1).ravel()
+    # As in a block: cells of the first and of the second half take turns.
+    interleaved = np.stack([cells[: size // 2], cells[size // 2 :]], axis=1).ravel()
     lifts = np.ascontiguousarray(bases.lifts[:, cells].transpose(0, 2, 1))
     kind, seeing = np.nonzero((lifts != 1.0).any(axis=0))
-    return Sample(
+    return CellSample(
         cells=cells,
         ids=columns.database.cell_ids[cells],
-        pairs=np.ascontiguousarray(columns.of(turns)).view(np.uint16),
-        bases=Bases(
+        pairs=np.ascontiguousarray(columns.of(interleaved)).view(np.uint16),
+        bases=BaseScores(
             levels=np.ascontiguousarray(bases.levels[:, cells]),
             trims=np.ascontiguousarray(bases.trims[:, cells]),
             lifts=lifts,
         ),
         starts=np.searchsorted(kind, np.arange(lifts.shape[1] + 1)),
         seeing=seeing,
-        rank=math.ceil(LIKELY * size / count),
+        rank=math.ceil(LIKELY_CELLS * size / count),
         weight=count / max(size, 1),
     )
 
 
-def _check(temperature: float, radius: float) -> None:
-    if not 0 < temperature < math.inf:
-        raise InputError(f"a temperature of {temperature} was given; give a power above 0.")
-    check_radius(radius)
-
-
-def check_radius(radius: float) -> None:
-    """Raise InputError unless a radius is a number of metres from 0 to a million."""
-    require_number("radius", radius, least=0, most=MOST_METRES, unit="metres")
-
-
-def _in_parts(
+def _run_in_parts(
     work: Callable[[slice], None],
     count: int,
     threads: int,
     progress: Callable[[int, int], None] | None,
 ) -> None:
-    """Do work in parts, several at once."""
+    """Call `work` for all parts of a range, in several threads."""
     parts = [slice(low, min(low + CELLS_A_TASK, count)) for low in range(0, count, CELLS_A_TASK)]
     with ThreadPoolExecutor(threads) as pool:
         for part, _ in zip(parts, pool.map(work, parts), strict=True):
             if progress is not None:
                 progress(part.stop, count)
+
+
+def check_radius(radius: float) -> None:
+    """Raise InputError unless a radius is from 0 to 1,000,000 metres."""
+    require_number("radius", radius, least=0, most=MOST_METRES, unit="metres")

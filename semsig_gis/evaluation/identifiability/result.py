@@ -1,7 +1,4 @@
-"""What is known of every cell before any query: how well one from it will be placed.
-
-`evaluation.identify.identify` finds it out.
-"""
+"""Result of `identify`: how well a query from each cell will be located; its columns and files."""
 
 from __future__ import annotations
 
@@ -35,16 +32,17 @@ if TYPE_CHECKING:
 
 
 NAME = "identifiability"
-FORMAT = 2  # raised whenever the same cells and noise give other numbers, or are written otherwise
+FORMAT = 2  # increase if the same cells and noise give other numbers, or other columns
 
-BANDS = (0.0, 0.1, 0.5, 0.9)  # lower ends of the chances to be found by which cells are counted
+BANDS = (0.0, 0.1, 0.5, 0.9)  # lower ends of the ranges of `found` in which cells are counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassGain:
-    """What the mean cell gains if a city publishes a class of objects.
+    """Gain of the mean cell if a city publishes a class of objects.
 
-    `near` is the gain in chance of the place within the radius, `bits` that in knowledge.
+    `near` is the gain in probability of the place within the radius, `bits` the gain in
+    information.
     """
 
     code: int
@@ -54,36 +52,36 @@ class ClassGain:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Identifiability(Displayed):
-    """How well a query from each of the n cells of a database will be placed.
+    """How well a query from each of the n cells of a database will be located.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     noise : NoiseSpec or NoiseMixture
-        How the detector fails.
+        Noise model of the detector.
     radius : float
-        Metres that count as near.
+        Distance that counts as near, in metres.
     view : float
-        Degrees that a query sees at once: 360, or those of a photo in any direction.
+        Degrees that a query sees: 360, or the field of view of a photo in any direction.
     itself, near : ndarray of float64, shape (n,)
-        Expected chances that the answer to a query from the cell gives to the cell itself, and to
-        the cells within the radius.
+        Expected probabilities that the answer to a query from the cell gives to the cell itself,
+        and to the cells within the radius.
     found : ndarray of float64, shape (n,)
-        Chance that the best place of the answer is within the radius.
+        Probability that the best place of the answer is within the radius.
     bits : ndarray of float64, shape (n,)
-        Expected entropy of the chances of all cells: what is left to be known.
+        Expected entropy of the probabilities of all cells: the missing information.
     lookalikes : ndarray of int64, shape (n, k)
-        Row numbers of the cells in whose surroundings, farther away than the radius, the answer
-        puts most of the rest; -1 where there are no more.
+        Row numbers of the cells, beyond the radius, with most of the remaining probability of the
+        answer around them; -1 if there are no more.
     lookalike_chances : ndarray of float64, shape (n, k)
-        Expected chance that it gives to the surroundings of each.
+        Expected probability around each of them.
     gains : ndarray of float64, shape (n, c)
-        What `near` gains by each class that occurs, in the order of `classes`.
+        Gain of `near` by each class that occurs, in the order of `classes`.
     classes : tuple of ClassGain
         The same for the city as a whole.
     trials, seed : int
-        Number of simulated queries, and the seed of all chances.
+        Number of simulated queries, and the random seed.
 
     Examples
     --------
@@ -121,24 +119,24 @@ class Identifiability(Displayed):
         }
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
-        """Draw the chance of every cell to be found (see `plot_identifiability`)."""
+        """Draw the probability of every cell to be found (see `plot_identifiability`)."""
         return plot_with("plot_identifiability", self, ax=ax, legend=legend)
 
     def explore(self) -> MapFrame:
-        """Show the chances and what is taken for what on a map (see `identifiability_map`)."""
+        """Show the probabilities and lookalikes on a map (see `identifiability_map`)."""
         return map_with("identifiability_map", self)
 
     def require_cells_of(self, database: SignatureDatabase) -> None:
-        """Raise InputError where another database has other cells."""
+        """Raise InputError if a database has other cells."""
         if not np.array_equal(self.database.cell_ids, database.cell_ids):
             raise InputError(
                 "the identifiability belongs to other cells; give that of this database."
             )
 
     def table(self, rows: slice = slice(None)) -> pa.Table:
-        """Return what is known of some of the cells, all by default, as columns.
+        """Return the results of some of the cells, all by default, as a table.
 
-        They are ``chance_itself``, ``chance_near``, ``chance_found``, ``bits_left``,
+        Its columns are ``chance_itself``, ``chance_near``, ``chance_found``, ``bits_left``,
         ``lookalike_1`` (cell id or null), ``lookalike_1_chance``, ..., and ``gain_NAME`` by class.
         """
         names = {item.code: item.name for item in self.database.taxonomy.classes}
@@ -160,7 +158,7 @@ class Identifiability(Displayed):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What is needed beside `table` to read it again, as values for JSON."""
+        """Values for JSON that are needed to open `table` again."""
         return {
             "format": FORMAT,
             "belongs_to": index_fingerprint(self.database, self.noise),
@@ -173,17 +171,17 @@ class Identifiability(Displayed):
         }
 
     def summary(self, *, object_counts: Mapping[int, int] | None = None) -> dict[str, Any]:
-        """Return what there is to say of the city as plain values for JSON.
+        """Return a summary of the city as plain values for JSON.
 
-        Chances and bits are those of the mean cell; ``bands`` count cells by the chance to be
-        found; ``classes``, the most useful first, have ``objects`` and ``chance_near_per_1000``
-        only if `object_counts` tells how many objects of each class code there are.
+        Probabilities and bits are means over the cells; ``bands`` count the cells by their
+        probability to be found. ``classes``, the most useful first, have ``objects`` and
+        ``chance_near_per_1000`` only with `object_counts`, the number of objects by class code.
         """
         kinds = {item.code: item for item in self.database.taxonomy.classes}
         cells = len(self.database)
         counts = np.bincount(np.digitize(self.found, BANDS) - 1, minlength=len(BANDS)).tolist()
         classes = []
-        for gain in sorted(self.classes, key=lambda one: -one.near):
+        for gain in sorted(self.classes, key=lambda item: -item.near):
             kind = kinds[gain.code]
             objects = None if object_counts is None else int(object_counts.get(gain.code, 0))
             classes.append(
@@ -216,26 +214,26 @@ class Identifiability(Displayed):
 
 
 def save_identifiability(identifiability: Identifiability, path: str | Path) -> None:
-    """Put what is known of the cells into the files of their database.
+    """Add the identifiability of the cells to the files of their database.
 
     Parameters
     ----------
     identifiability : Identifiability
-        What to save.
+        The result to save.
     path : str or Path
-        File of the database, or folder of its parts; it is replaced whole.
+        File of the database, or folder of its parts; it is replaced as a whole.
 
     Raises
     ------
     DatabaseError
-        If it is damaged, or is another database.
+        If it is damaged, or has other cells.
     InputError
-        If it cannot be written; it is unchanged then.
+        If it is not writable; then it is unchanged.
 
     Notes
     -----
-    The columns are those of `Identifiability.table`. Whoever builds or updates the database gets
-    one without them.
+    The columns are those of `Identifiability.table`. They are lost if the database is built again
+    or updated.
 
     Examples
     --------
@@ -258,24 +256,24 @@ def save_identifiability(identifiability: Identifiability, path: str | Path) -> 
 
 
 def open_identifiability(database: SignatureDatabase, path: str | Path) -> Identifiability | None:
-    """Read what `save_identifiability` put into the files of a database.
+    """Read the identifiability from the files of a database.
 
     Parameters
     ----------
     database : SignatureDatabase
-        The database, opened.
+        The open database.
     path : str or Path
         Its file, or the folder of its parts.
 
     Returns
     -------
     Identifiability or None
-        What is known of the cells; None where nothing was found out yet.
+        The result that `save_identifiability` wrote; None if there is none.
 
     Raises
     ------
     DatabaseError
-        If the files are damaged, or what they tell belongs to other signatures.
+        If the files are damaged, or the result belongs to other signatures.
 
     Examples
     --------
@@ -298,16 +296,16 @@ def open_identifiability(database: SignatureDatabase, path: str | Path) -> Ident
 def identifiability_of(
     database: SignatureDatabase, table: pa.Table, facts: dict[str, Any], path: str | Path
 ) -> Identifiability:
-    """Return what `Identifiability.table` and `Identifiability.facts` told, read from `path`.
+    """Return the result with a table and facts that were read from `path`.
 
-    DatabaseError if they are damaged, or belong to other signatures or another format.
+    DatabaseError if they are damaged, or belong to other signatures or to another format.
     """
     try:
         noise = noise_from_dict(facts["noise"])
-        fits = facts["format"] == FORMAT and (
+        belongs = facts["format"] == FORMAT and (
             facts["belongs_to"] == index_fingerprint(database, noise)
         )
-        identifiability = _parsed(database, noise, table, facts) if fits else None
+        identifiability = _parsed(database, noise, table, facts) if belongs else None
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         raise DatabaseError(
             f"the identifiability in {path} is damaged ({error}); run semsig identify again."

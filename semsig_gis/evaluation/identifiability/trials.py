@@ -1,4 +1,4 @@
-"""Trials: queries drawn from a noise model at known cells, and what localization makes of them."""
+"""Trials: simulated queries from known cells with a noise model, and their outcomes."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 from semsig_gis.core import each_in_order
 from semsig_gis.evaluation.identifiability.lookalikes import city_extent
 from semsig_gis.evaluation.identifiability.symbol_tables import symbol_columns
-from semsig_gis.evaluation.queries.distortion_text import ready_chain
-from semsig_gis.evaluation.queries.distortions import Detector
+from semsig_gis.evaluation.queries.distortion_text import prepare_chain
+from semsig_gis.evaluation.queries.distortions import SimulatedDetector
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 from semsig_gis.localization import CellScores, build_index, posterior, rerank
 from semsig_gis.observation import FULL_VIEW, View
@@ -31,21 +31,22 @@ if TYPE_CHECKING:
     from semsig_gis.observation import Photo
 
 
-LEANS = 300  # trials, by which likelihoods of signatures are brought near the answers
-# Cells that are re-ranked in a trial, whose answer counts among thousands, and of the others.
-RERANKED, SAMPLE = 300, 512
-HOPELESS = 20.0  # nats below the likeliest cell, at which a cell is left out of the sums
+LEANS = 300  # trials to fit the temperature of the likelihoods of signatures
+# Re-ranked cells of a trial: the likeliest, and a sample of the others.
+RERANKED, RERANKED_SAMPLE = 300, 512
+HOPELESS = 20.0  # nats; cells farther below the likeliest cell are omitted from the sums
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trials:
-    """What came of simulated queries, arrays of one item a query.
+    """Outcomes of simulated queries, one item for each query.
 
-    The answer to a query from a cell (a row number of `cells`), in one of the `looks`, gave the
-    chance `itself` to that cell and `near` to all cells near it; `found` tells whether the best
-    place is near, `bits` the entropy of all chances. `lean` is the mean, by these chances, of the
-    log-likelihood of what the look shows in a cell less that in the true one: for the first `LEANS`
-    whose look shows something, if columns were given and something was detected, else NaN.
+    A query is from a cell (a row number of `cells`) in one of the `looks`. `itself` is the
+    probability that its answer gives to that cell, `near` the one of all cells near it; `found` is
+    whether the best place is near, `bits` the entropy of all probabilities. `lean` is the mean, by
+    these probabilities, of the log-likelihood of the look in a cell minus that in the true cell. It
+    is computed for the first `LEANS` queries with visible objects, if columns are given; it is NaN
+    for others and for queries without detections.
     """
 
     cells: NDArray[np.int64]
@@ -58,13 +59,13 @@ class Trials:
 
 
 MOST_TRIALS = 1_000_000
-TRIAL_S = 1.5e-2  # about what one takes
+TRIAL_S = 1.5e-2  # approximate seconds of a trial
 
 
 def trial_cells(cells: int, count: int, *, seed: int = 0) -> NDArray[np.int64]:
-    """Return row numbers of the cells of `count` trials: all equally often, the rest drawn.
+    """Return row numbers of the cells of `count` trials, every cell almost equally often.
 
-    A larger count keeps the first ones.
+    The first cells do not depend on the count.
     """
     rng = np.random.default_rng([seed, 0])
     rounds = [rng.permutation(cells) for _ in range(-(-count // cells))]
@@ -78,16 +79,16 @@ def draw_trials(
     photos: Iterable[Photo] | None = None,
     seed: int = 0,
 ) -> Iterator[Signature]:
-    """Yield what a detector tells of cells, if it fails as the noise model of the index says.
+    """Yield simulated queries from cells, with the noise model of the index.
 
-    `cells` are row numbers, `photos` what is looked at from each, a full turn by default. Query
-    number i is the same whatever the number of queries.
+    `cells` are row numbers; `photos` is the view from each, a full turn by default. Query number i
+    is the same whatever the number of queries.
     """
-    detector = Detector(noise=index.noise)
-    spoil = ready_chain((detector,), CitySights.of(index.database))
+    detector = SimulatedDetector(noise=index.noise)
+    distort = prepare_chain((detector,), CitySights.of(index.database))
     looks = repeat(FULL_VIEW) if photos is None else photos
     for number, (cell, photo) in enumerate(zip(cells.tolist(), looks, strict=False)):
-        query = spoil(Sight.of_cell(index.database, cell), seed, number).signature
+        query = distort(Sight.of_cell(index.database, cell), seed, number).signature
         if photo.sectors and query.bearings is not None:
             query = View.of(query.select(photo.sees(query.bearings)), photos=(photo,))
         yield query
@@ -100,18 +101,19 @@ def try_cells(
     queries: Iterable[Signature] | None = None,
     columns: SymbolColumns | None = None,
     looks: NDArray[np.int64] | None = None,
-    left_out: tuple[int, NDArray[np.int64]] | None = None,
+    omitted_class: tuple[int, NDArray[np.int64]] | None = None,
     radius: float = 50.0,
     seed: int = 0,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trials:
-    """Ask one query from each of some cells, given by row number; by default simulated ones.
+    """Answer one query from each of some cells, given by row number; by default simulated ones.
 
-    The noise model of the index is that of the detector and of the answer alike; `radius` is what
-    counts as near, in metres. A query without objects is not answered: its chances are 0. `columns`
-    are what `Trials.lean` is worked out by; `looks` are the numbers of the looks of simulated
-    queries, the first by default.
+    Detector and answer have the same noise model, that of the index; `radius` is the distance that
+    counts as near, in metres. A query without objects gets no answer: its probabilities are 0.
+    `columns` are required for `Trials.lean`; `looks` are the numbers of the looks of simulated
+    queries, by default the first. `omitted_class` is a class row and the rows of the cells that
+    `index` has without this class.
     """
     numbers = np.zeros(len(cells), np.int64) if looks is None else looks
     if queries is None:
@@ -119,37 +121,38 @@ def try_cells(
         queries = draw_trials(index, cells, photos=photos, seed=seed)
     places = _without_signatures(index.database, slice(None))
     radius = min(radius, city_extent(places))
-    leaning = np.zeros(len(cells), np.bool_)
-    if columns is not None and left_out is None:
-        leaning[np.flatnonzero(columns.counts[numbers, :, cells].any(axis=1))[:LEANS]] = True
+    with_lean = np.zeros(len(cells), np.bool_)
+    if columns is not None and omitted_class is None:
+        with_lean[np.flatnonzero(columns.counts[numbers, :, cells].any(axis=1))[:LEANS]] = True
 
-    def ask(item: tuple[int, Signature]) -> tuple[float, ...]:
+    def answer(item: tuple[int, Signature]) -> tuple[float, ...]:
         trial, query = item
         cell, look = int(cells[trial]), int(numbers[trial])
         if not len(query):
             return 0.0, 0.0, 0.0, float(np.log2(len(places))), np.nan
         if columns is None:
             scores = index.scores(query)
-        elif left_out is None:
+        elif omitted_class is None:
             scores = CellScores(loglik=columns.scores(query, look))
         else:
-            number, rows = left_out
-            scores = CellScores(loglik=columns.scores(query, look, left_out=number)[rows])
-        own = partial(columns.loglik, cell, look) if columns and leaning[trial] else None
+            class_row, rows = omitted_class
+            scores = CellScores(loglik=columns.scores(query, look, omitted_class=class_row)[rows])
+        own = partial(columns.loglik, cell, look) if columns and with_lean[trial] else None
         return _outcome(index, places, cell, query, radius, scores, own)
 
-    rows: list[tuple[float, ...]] = []
-    for row in each_in_order(ask, zip(range(len(cells)), queries, strict=False), threads=threads):
-        rows.append(row)
+    outcomes: list[tuple[float, ...]] = []
+    trials = zip(range(len(cells)), queries, strict=False)
+    for outcome in each_in_order(answer, trials, threads=threads):
+        outcomes.append(outcome)
         if progress is not None:
-            progress(len(rows), len(cells))
-    itself, near, found, bits, lean = np.array(rows, dtype=np.float64).reshape(-1, 5).T
+            progress(len(outcomes), len(cells))
+    itself, near, success, bits, lean = np.array(outcomes, dtype=np.float64).reshape(-1, 5).T
     return Trials(
         cells=np.asarray(cells),
         looks=numbers,
         itself=itself,
         near=near,
-        found=found.astype(np.bool_),
+        found=success.astype(np.bool_),
         bits=bits,
         lean=lean,
     )
@@ -158,7 +161,7 @@ def try_cells(
 def _without_signatures(
     database: SignatureDatabase, cells: slice | NDArray[np.int64]
 ) -> SignatureDatabase:
-    """Return some cells alone, without what they see: far faster than to select them."""
+    """Return a database of some cells without their objects; much faster than `select`."""
     columns, nothing = database.columns[cells], slice(0)
     return replace(
         database,
@@ -180,11 +183,13 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     scores: CellScores,
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
-    """Return what comes of one query, in the order of `Trials`."""
-    loglik = rerank(index, query, scores, count=RERANKED, aside=False, sample=SAMPLE).loglik
-    kept = loglik > loglik.max() - HOPELESS
-    kept[cell] = True
-    cells = np.flatnonzero(kept)
+    """Return the outcome of one query, in the order of `Trials`."""
+    loglik = rerank(
+        index, query, scores, count=RERANKED, aside=False, sample=RERANKED_SAMPLE
+    ).loglik
+    possible = loglik > loglik.max() - HOPELESS
+    possible[cell] = True
+    cells = np.flatnonzero(possible)
     answer = posterior(_without_signatures(places, cells), loglik[cells])
     true = int(np.searchsorted(cells, cell))
     best, _ = answer.best_place(radius)
@@ -193,13 +198,15 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
         int(places.columns[cells[best]]) - int(places.columns[cell]),
         int(places.rows[cells[best]]) - int(places.rows[cell]),
     )
-    alike = None if own is None else own(cells)
+    own_loglik = None if own is None else own(cells)
     return (
         min(float(answer.chances[true]), near),
         near,
         float(apart <= radius + 1e-6),
         answer.entropy,
-        np.nan if alike is None else float((answer.chances * alike).sum() - alike[true]),
+        np.nan
+        if own_loglik is None
+        else float((answer.chances * own_loglik).sum() - own_loglik[true]),
     )
 
 
@@ -218,9 +225,9 @@ def leave_class_out(
     Returns
     -------
     database : SignatureDatabase
-        The cells that see other objects, too, and these objects; perhaps none.
+        The cells that see objects of other classes, with these objects; it may have no cells.
     rows : ndarray of int64, shape (n,)
-        For each cell of the given database, its row in the new one; -1 where it is not there.
+        For each cell of the given database, its row in the new one; -1 if it is not there.
 
     Examples
     --------
@@ -228,20 +235,20 @@ def leave_class_out(
     >>> bool((without.codes == 3).any()), len(without) == int((rows >= 0).sum())
     (False, True)
     """
-    kept = database.codes != code
-    lengths = np.add.reduceat(kept, database.offsets[:-1], dtype=np.int64)
-    some = lengths > 0
-    rows = np.where(some, np.cumsum(some) - 1, -1)
-    left = replace(
+    others = database.codes != code
+    lengths = np.add.reduceat(others, database.offsets[:-1], dtype=np.int64)
+    with_objects = lengths > 0
+    rows = np.where(with_objects, np.cumsum(with_objects) - 1, -1)
+    without_class = replace(
         database,
-        columns=database.columns[some],
-        rows=database.rows[some],
-        offsets=np.concatenate([[0], np.cumsum(lengths[some])]),
-        codes=database.codes[kept],
-        bearing_units=database.bearing_units[kept],
-        distance_units=database.distance_units[kept],
+        columns=database.columns[with_objects],
+        rows=database.rows[with_objects],
+        offsets=np.concatenate([[0], np.cumsum(lengths[with_objects])]),
+        codes=database.codes[others],
+        bearing_units=database.bearing_units[others],
+        distance_units=database.distance_units[others],
     )
-    return left, rows
+    return without_class, rows
 
 
 def try_without_classes(
@@ -255,12 +262,12 @@ def try_without_classes(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Ask simulated queries once more for each class, as if it had not been published.
+    """Repeat simulated queries for each class, with a city that has no data of this class.
 
-    The queries are those of `try_cells`, without detections of the class; the results (m, k) are
-    `Trials.near` and `Trials.bits` by class of ``index.table.codes``, NaN where neither the cell
-    sees the class nor the query tells of it. A cell that sees nothing else cannot be found: no
-    chance, and all bits are left.
+    The queries are those of `try_cells`, without detections of the class. The results (m, k) are
+    `Trials.near` and `Trials.bits` by class of ``index.table.codes``; NaN if the class is neither
+    visible from the cell nor detected. A cell that sees no other class cannot be found: its
+    probability is 0, and its entropy that of all cells.
     """
     codes = index.table.codes.tolist()
     columns = symbol_columns(index, threads=threads) if columns is None else columns
@@ -273,39 +280,39 @@ def try_without_classes(
     for number, code in enumerate(codes):
         without, rows = leave_class_out(index.database, code)
         sees = np.add.reduceat(index.database.codes == code, index.database.offsets[:-1])[cells]
-        told = [bool((query.codes == code).any()) for query in queries]
-        touched = np.array(told, np.bool_) | (sees > 0)
-        near[~touched, number] = bits[~touched, number] = np.nan
-        left = np.flatnonzero(touched & (rows[cells] >= 0))
-        if len(left):
+        detected = np.array([bool((query.codes == code).any()) for query in queries], np.bool_)
+        affected = detected | (sees > 0)
+        near[~affected, number] = bits[~affected, number] = np.nan
+        repeated = np.flatnonzero(affected & (rows[cells] >= 0))
+        if len(repeated):
             noise = _without_class(index.noise, names[code], len(codes))
             trials = try_cells(
                 build_index(without, noise),
-                rows[cells[left]],
-                queries=[_without_code(queries[one], code) for one in left.tolist()],
+                rows[cells[repeated]],
+                queries=[_without_code(queries[trial], code) for trial in repeated.tolist()],
                 columns=columns,
-                looks=numbers[left],
-                left_out=(number, np.flatnonzero(rows >= 0)),
+                looks=numbers[repeated],
+                omitted_class=(number, np.flatnonzero(rows >= 0)),
                 radius=radius,
                 threads=threads,
             )
-            near[left, number], bits[left, number] = trials.near, trials.bits
+            near[repeated, number], bits[repeated, number] = trials.near, trials.bits
         if progress is not None:
             progress((number + 1) * len(cells), len(codes) * len(cells))
     return near, bits
 
 
 def _without_code(query: Signature, code: int) -> Signature:
-    """Return the detections of a query that do not bear the name of a class."""
+    """Return the detections of a query that are not of a class."""
     return query if query.codes is None else query.select(query.codes != code)
 
 
 def _without_class(noise: Noise, name: str, classes: int) -> Noise:
-    """Return a noise model of so many classes for all of them but one."""
+    """Return a noise model of `classes` classes without one of them."""
 
     def without(spec: NoiseSpec) -> NoiseSpec:
         confusion = {own: row for own, row in spec.confusion.items() if own != name}
-        # Equal shares of the false objects are taken of the classes that are left.
+        # Without given shares, every class has an equal share of the false objects.
         clutter = spec.clutter if spec.clutter_shares else spec.clutter * (1.0 - 1.0 / classes)
         return replace(spec, confusion=confusion, clutter=clutter)
 

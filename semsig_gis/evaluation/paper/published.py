@@ -1,4 +1,4 @@
-"""What the source paper prints of Paris, to stand beside our figures."""
+"""Figures of Paris in the source paper, for comparison with our figures."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ GROUPS: Mapping[str, tuple[str, str]] = {
     "50%": ("1", "1"),
     "75%": ("1", "1"),
     "max": ("29,958", "1,240"),
-    # Of its 10,000 queries. It must mean types: at least 75 % of the 204,891 angle groups
-    # hold one cell, which is 49 % of the cells or more.
+    # Of its 10,000 queries. It must be by type: at least 75 % of the 204,891 angle groups have one
+    # cell, which is 49 % of the cells or more.
     "alone": ("41.8 %", ""),
     "entropy_bits": ("", ""),
 }
@@ -52,10 +52,10 @@ ACCURACY: Mapping[tuple[float, int], tuple[float, float | None]] = {
     (30.0, 24): (0.3861, None),
     (30.0, 32): (0.3766, None),
 }
-# Share of its 10,000 queries that have a distinct pattern.
-ALONE = 0.418
-# What its text reads off its plots; how exactly, it does not say. Of single measures and fusions,
-# the best of 100 candidates; of light and strong distortion, the first one of edit+edit at 5 %.
+# Share of its 10,000 queries with types that no other cell has.
+UNAMBIGUOUS = 0.418
+# Values that its text reads off its plots, with unknown precision. For single measures and fusions:
+# the best of 100 candidates; for light and strong distortion: the first candidate of edit+edit:5%.
 READ_OFF: Mapping[str, float] = {
     "single_none_p10": 0.90,  # more than
     "single_none_p0": 0.92,
@@ -67,7 +67,7 @@ READ_OFF: Mapping[str, float] = {
     "light_recall": 0.90,  # more than
     "strong_recall": 0.50,
 }
-# Its distortion: errors of each level, and bearing noise in degrees.
+# Its distortion: number of errors of each level, and bearing noise in degrees.
 ERRORS: Mapping[str, int] = {"light": 1, "medium": 7, "strong": 13}
 BEARING_SIGMA, BEARING_CLIP = 5.0, 30.0
 # Milliseconds of one query of length 14 over its 312,134 cells, by method.

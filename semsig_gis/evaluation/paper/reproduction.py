@@ -1,6 +1,6 @@
-"""Run all experiments of the source paper on a city, and gather what they find.
+"""Run all experiments of the source paper on a city, and collect their results.
 
-What is finished stays in the folder of the results, so that an interrupted run goes on there.
+Finished experiments stay in the folder of the results, so that an interrupted run can be resumed.
 """
 
 from __future__ import annotations
@@ -51,17 +51,17 @@ if TYPE_CHECKING:
 
 
 MEASURES = ("jaccard", "histogram", "edit")
-LEVELS = ("light", "medium", "strong")  # of distortion
-RANGES = (20.0, 30.0, 40.0)  # of sight, in metres
+DISTORTION_LEVELS = ("light", "medium", "strong")
+RANGES = (20.0, 30.0, 40.0)  # visibility ranges in metres
 SCALES = (8, 16, 24, 32)  # numbers of angle levels
 QUERIES = 10_000
-MANY = 100  # so many candidates count where the paper does not look at the first alone
-READ = 1_000  # queries of each reading of what the paper leaves open, unless fewer are asked
-FEWER = 500  # queries of the likelihood method, unless fewer are asked
+MANY = 100  # candidates that count, if the paper does not use only the first one
+READING_QUERIES = 1_000  # at most, for each possible reading of the paper
+LIKELIHOOD_QUERIES = 500  # at most
 
-# Names of methods in the experiments: measures of one part, fusions of the edit distance of types
-# with a measure of angles, fusions of edit distances by the share of the types, and the same in two
-# stages by the percentage that the first one keeps.
+# Names of the methods in the experiments: measures of types or angles, fusions of the edit distance
+# of types with a measure of angles, fusions of edit distances by the weight of the types, and the
+# same in two stages by the percentage of cells that the first stage keeps.
 SINGLES: Mapping[str, str] = {
     f"{part}-{measure}": f"{part}:{measure}" for measure in MEASURES for part in ("types", "angles")
 }
@@ -74,11 +74,11 @@ PERCENTS: Mapping[int, str] = {
     **{percent: f"stages-{percent}" for percent in (1, 5, 10, 20, 50)},
     100: "fusion-edit",
 }
-BEST = "stages-5"  # the one that the paper recommends
-FIRST_STAGE = "types-edit"  # its first stage alone
+BEST = "stages-5"  # recommended by the paper
+FIRST_STAGE = "types-edit"  # only its first stage
 OURS = "likelihood"
 
-# What the paper leaves open of the distortion.
+# Possible readings of the paper's distortion, which it does not describe completely.
 READINGS: Mapping[str, str] = {
     "kept-uniform": "order kept, false objects of any class",
     "kept-frequency": "order kept, false objects as frequent as true ones",
@@ -97,8 +97,8 @@ def paper_experiments(
 ) -> dict[str, ExperimentSpec]:
     """Return all experiments of the paper by name: ``"none"``, ``"medium"``, ``"levels"``, ...
 
-    ``ranges`` and ``scales`` are files of databases of the same city, by their range in metres and
-    by their number of angle levels; each adds an experiment: ``"range-20"``, ``"levels-8"``, ...
+    ``ranges`` and ``scales`` are files of databases of the same city by visibility range in metres
+    and by number of angle levels. Each adds an experiment: ``"range-20"``, ``"levels-8"``, ...
     """
     stages = {name: f"edit+edit:{k}%" for k, name in PERCENTS.items() if name not in FUSIONS}
     weights = {name: f"edit+edit:alpha={w}" for w, name in WEIGHTS.items() if name not in FUSIONS}
@@ -122,8 +122,9 @@ def paper_experiments(
             distortions={name: parse_chain(text) for name, text in distortions.items()},
         )
 
-    kept = {level: f"{level}:resort=false" for level in LEVELS}
-    medium = {"medium": kept["medium"]}
+    # The paper's readings by default: the order of the objects is kept.
+    levels = {level: f"{level}:resort=false" for level in DISTORTION_LEVELS}
+    medium = {"medium": levels["medium"]}
     both = (1, MANY)
     orders = {"kept": "medium:resort=false", "sorted": "medium"}
     readings = {
@@ -134,9 +135,15 @@ def paper_experiments(
     return {
         "none": spec({"none": ""}, {**SINGLES, **FUSIONS, **stages}, top=both),
         "medium": spec(medium, {**SINGLES, **FUSIONS, **weights, **stages}, top=both),
-        "levels": spec({level: kept[level] for level in ("light", "strong")}, best),
-        "readings": spec(readings, {**best, "raw": "edit+edit:5%:raw"}, number=min(queries, READ)),
-        "ours": spec(kept, {OURS: "likelihood:generic:on_grid"}, number=min(queries, FEWER)),
+        "levels": spec({level: levels[level] for level in ("light", "strong")}, best),
+        "readings": spec(
+            readings, {**best, "raw": "edit+edit:5%:raw"}, number=min(queries, READING_QUERIES)
+        ),
+        "ours": spec(
+            levels,
+            {OURS: "likelihood:generic:on_grid"},
+            number=min(queries, LIKELIHOOD_QUERIES),
+        ),
         **{f"range-{r:g}": spec(medium, stage_one, file=file) for r, file in ranges.items()},
         **{f"levels-{q}": spec(medium, best, file=file) for q, file in scales.items()},
     }
@@ -152,8 +159,8 @@ CITY = "city/city.parquet"
 VARIANTS = "variants"
 EXPERIMENTS = "experiments"
 NO_RANGES = (
-    "Other visibility ranges need the street objects of the database, which `semsig build` puts "
-    "beside it; they are not there."
+    "Other visibility ranges need the street objects of the database, which `semsig build` writes "
+    "next to it; they are missing."
 )
 
 
@@ -179,25 +186,25 @@ RUN = RunKind(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Reproduction(Displayed):
-    """What the experiments of the paper find on a city.
+    """Results of the paper's experiments on a city.
 
     Parameters
     ----------
     database : SignatureDatabase
         The city.
     summary : mapping
-        Its properties (see `database.properties.database_summary`).
+        Its properties (see `database_summary`).
     variants : mapping of float to mapping
-        The same of databases of other visibility ranges, by the range in metres.
+        Properties of databases of other visibility ranges, by the range in metres.
     experiments : mapping of str to mapping
-        By the names of `experiments.paper.reproduce.paper_experiments`, their evaluations by the
-        names of their cases.
+        Evaluations by the names of their cases, by the name of the experiment (see
+        `paper.reproduction.paper_experiments`).
     seconds : mapping of str to float
-        Mean seconds of one query by the texts of methods.
+        Mean seconds of one query by the text of the method.
     settings : mapping
-        What was run, as plain values: ``size``, ``database`` (a name), ``queries``, ``seed``.
+        The settings as plain values: ``size``, ``database`` (a name), ``queries``, ``seed``.
     missing : tuple of str
-        What could not be run, and why: whole sentences.
+        A sentence for each experiment that could not be run, with the reason.
 
     Examples
     --------
@@ -236,37 +243,38 @@ def reproduce(
     note: Callable[[str], None] | None = None,
     progress: Progress | None = None,
 ) -> Reproduction:
-    """Run all experiments of the paper, or what is left of them.
+    """Run all experiments of the paper, or resume them.
 
     Parameters
     ----------
     out : str or Path
-        Folder for the results; made if it is not there.
+        Folder for the results; created if missing.
     database : str or Path, optional
-        File of a signature database; a city like the paper's Paris is made up by default. Without
-        street objects beside it, there are no other visibility ranges.
+        File of a signature database; by default, a synthetic city like the paper's Paris is
+        generated. Without street objects next to the file, other visibility ranges are omitted.
     size : {"full", "small"}, default "full"
-        As many queries as the paper asks, and a city of its size; or few of a small one.
+        The number of queries and the size of the city of the paper, or few queries in a small city.
     queries : int, optional
-        How many queries; by default 10,000 or, if small, 300, but not more than there are cells.
+        Number of queries; by default 10,000 or, if small, 300, but at most the number of cells.
     seed : int, default 0
-        Seed of all chances.
+        Random seed.
     workers : int, default 0
-        How many processes answer; 0 answers here.
+        Number of processes that answer queries; 0 uses only this process.
     note : callable, optional
-        Called with a sentence about what is being done.
+        Called with a sentence about the current step.
     progress : callable, optional
-        Called with a label, it gives what is to be called with how much is done and in all.
+        Called with the label of a step; returns a function that is called with the finished and the
+        total work of the step, or None.
 
     Returns
     -------
     Reproduction
-        What was found.
+        The results.
 
     Raises
     ------
     InputError
-        If a setting cannot be used, or the folder holds results of other settings.
+        If a setting is not valid, or the folder contains results of other settings.
     DatabaseError
         If the database cannot be read.
 
@@ -290,7 +298,7 @@ def reproduce(
         "seed": seed,
         "versions": versions(),
     }
-    QuerySpec(seeds=(seed,))  # looks at the seed
+    QuerySpec(seeds=(seed,))  # checks the seed
     check_workers(workers, None)
     if database is not None:
         _check_queries(queries, city)
@@ -360,11 +368,14 @@ def _make_city(
 def _variants(
     city: City, folder: Path, show: Progress
 ) -> tuple[dict[float, Path], dict[int, Path]]:
-    """Return databases of other ranges (with street objects) and levels, built where missing."""
+    """Return databases of other visibility ranges and angle levels; build those that are missing.
+
+    Other ranges need the street objects of the city.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     database = city.database
-    ranges = {one: folder / f"range-{one:g}.parquet" for one in RANGES if city.has_store}
-    scales = {one: folder / f"levels-{one}.parquet" for one in SCALES}
+    ranges = {radius: folder / f"range-{radius:g}.parquet" for radius in RANGES if city.has_store}
+    scales = {levels: folder / f"levels-{levels}.parquet" for levels in SCALES}
     ranges.pop(database.spec.radius, None)
     scales.pop(database.spec.levels, None)
     for radius, path in ranges.items():
@@ -393,19 +404,20 @@ def time_queries(
     repetitions: int = 100,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, float]:
-    """Return the mean seconds that each method takes to compare one query with all cells.
+    """Return the mean seconds of each method to compare one query with all cells.
 
-    As in the paper's table: queries of mean length (cells with `length` objects, or the nearest),
-    one at a time, on one thread; what is worked out once for a database does not count.
+    As in the paper's table: queries of mean length (cells with `length` objects, or the nearest
+    number), one at a time, on one thread. Work that is done once for a database does not count.
     """
     if repetitions < 1:
         raise InputError(f"{repetitions} repetitions were asked for; give a whole number from 1.")
-    away = np.abs(database.lengths - length)
-    cells = np.random.default_rng(0).choice(np.flatnonzero(away == away.min()), repetitions)
+    differences = np.abs(database.lengths - length)
+    candidates = np.flatnonzero(differences == differences.min())
+    cells = np.random.default_rng(0).choice(candidates, repetitions)
     queries = [database.signature(int(cell)) for cell in cells]
     times = {}
-    for done, (name, method) in enumerate(methods.items(), start=1):
-        for _ in range(2):  # the second time, kernels for many queries are loaded
+    for count, (name, method) in enumerate(methods.items(), start=1):
+        for _ in range(2):  # not timed; the second call loads the kernels for many queries
             next(iter(score_cells(database, queries[:1], method)))
         seconds = []
         for query in queries:
@@ -414,5 +426,5 @@ def time_queries(
             seconds.append(time.perf_counter() - start)
         times[name] = float(np.mean(seconds))
         if progress is not None:
-            progress(done, len(methods))
+            progress(count, len(methods))
     return times

@@ -1,4 +1,4 @@
-"""Distortions one after the other, as plain text and at work: ``medium, compass:10, view:90``."""
+"""Chains of distortions: parse and write ``medium, compass:10, view:90``, and apply them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from semsig_gis.evaluation.queries.distortions import (
     BlockedSectors,
     ClassScores,
     CompassBias,
-    Detector,
     Distortion,
     FieldOfView,
     HiddenBehind,
     MissingClasses,
     Obstacles,
     RoughRanges,
+    SimulatedDetector,
     distortion_of,
 )
 from semsig_gis.localization import NOISES, NoiseMixture, NoiseSpec, named_noise
@@ -29,23 +29,23 @@ from semsig_gis.localization import NOISES, NoiseMixture, NoiseSpec, named_noise
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from semsig_gis.evaluation.queries.true_view import CitySights, Sight, Spoiling
+    from semsig_gis.evaluation.queries.true_view import CitySights, DistortFunction, Sight
     from semsig_gis.localization import Noise
 
 
 @runtime_checkable
 class QueryDistortion(Protocol):
-    """Anything that happens to a query between the street and the search: a frozen dataclass.
+    """A change of a query between the street and the search; a frozen dataclass.
 
-    `stream` keys its random numbers. It belongs to the kind of distortion for ever: another number
-    changes every seeded result.
+    `stream` is the key of its random numbers. Never change the number of a kind of distortion: it
+    would change all seeded results.
     """
 
     stream: ClassVar[int]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def ready(self, city: CitySights) -> Spoiling:
-        """Return what it does to a query of a city, with all chances from a generator."""
+    def prepare(self, city: CitySights) -> DistortFunction:
+        """Return the function that distorts a query of a city."""
 
 
 NAMED_DISTORTIONS: Mapping[str, QueryDistortion] = MappingProxyType(
@@ -59,12 +59,12 @@ NAMED_DISTORTIONS: Mapping[str, QueryDistortion] = MappingProxyType(
         "behind": HiddenBehind(),
         "obstacles": Obstacles(),
         "blocked": BlockedSectors(),
-        "detector": Detector(noise=named_noise("generic")),
+        "detector": SimulatedDetector(noise=named_noise("generic")),
         "ranges": RoughRanges(),
         "scores": ClassScores(),
     }
 )
-"""What each name stands for, before its settings."""
+"""Distortion of each name, with its default settings."""
 
 WORDS = {"true": True, "false": False}
 KINDS: Mapping[type, str] = {bool: "true or false", int: "a whole number", float: "a number"}
@@ -75,12 +75,12 @@ def parse_chain(
 ) -> tuple[QueryDistortion, ...]:
     """Read distortions from text such as ``medium, compass:10, view:90``.
 
-    A text holds them with commas between them, an iterable one each. Each is a name of
+    Separate distortions with commas, or give an iterable with one each. A distortion is a name of
     `NAMED_DISTORTIONS`; then, for all but the paper's levels, ``:VALUE`` for its first setting;
     then any number of ``:SETTING=VALUE``. Lists are written ``bench/bus_stop``, switches ``true``
-    and ``false``; a detector names one of `noises`. Blank text gives none. Raises UnknownNameError
-    for an unknown distortion, setting or noise model, and InputError for a value of the wrong kind
-    or out of range and for a setting given twice.
+    and ``false``; a detector takes the name of one of `noises`. Blank text is an empty chain.
+    Raises UnknownNameError for an unknown distortion, setting or noise model, and InputError for a
+    value of the wrong kind or out of range and for a setting given twice.
     """
     parts = text.split(",") if isinstance(text, str) else list(text)
     if isinstance(text, str) and not text.strip():
@@ -91,40 +91,41 @@ def parse_chain(
 def chain_text(distortions: Sequence[QueryDistortion]) -> str:
     """Write distortions as the shortest text that `parse_chain` reads.
 
-    Noise models are written by name alone, so `parse_chain` must be given those that the package
-    does not have.
+    Noise models are written only by name: give `parse_chain` the models that the package does not
+    have.
     """
-    return ", ".join(min(_texts(one), key=len) for one in distortions)
+    return ", ".join(min(_texts(distortion), key=len) for distortion in distortions)
 
 
-def ready_chain(
+def prepare_chain(
     distortions: Sequence[QueryDistortion], city: CitySights
 ) -> Callable[[Sight, int, int], Sight]:
     """Return the function that applies distortions to a query.
 
-    It takes what is seen, a seed and the number of the query. The random numbers of a distortion
-    depend on these, its kind and how many of that kind come before: a query meets the same compass
-    whatever else happens to it, and experiments that differ in one distortion differ in nothing
-    else. What ends up out of a view that is told is left out. Raises SemsigError if a distortion
-    does not fit the city.
+    It takes a sight, a seed and the number of the query. The random numbers of a distortion depend
+    on the seed, the number, the kind of distortion and how many of that kind come before it. So a
+    query has the same compass error whatever other distortions there are, and experiments that
+    differ in one distortion differ in nothing else. Objects outside a stated view are dropped at
+    the end. Raises SemsigError if a distortion does not fit the city.
     """
     repeats: Counter[int] = Counter()
     steps = []
-    for one in distortions:
-        steps.append(((one.stream, repeats[one.stream]), one.ready(city)))
-        repeats[one.stream] += 1
+    for distortion in distortions:
+        stream = distortion.stream
+        steps.append(((stream, repeats[stream]), distortion.prepare(city)))
+        repeats[stream] += 1
 
-    def spoil(sight: Sight, seed: int, number: int) -> Sight:
-        for stream, step in steps:
-            entropy = np.random.SeedSequence(seed, spawn_key=(number, *stream))
+    def distort(sight: Sight, seed: int, number: int) -> Sight:
+        for key, step in steps:
+            entropy = np.random.SeedSequence(seed, spawn_key=(number, *key))
             sight = step(sight, np.random.default_rng(entropy))
         return sight.in_view()
 
-    return spoil
+    return distort
 
 
 def _parsed(text: str, noises: Mapping[str, Noise]) -> QueryDistortion:
-    """Return the distortion of a text."""
+    """Parse one distortion."""
     name, *settings = text.split(":")
     base = distortion_of(name, NAMED_DISTORTIONS)
     keys = [item.name for item in fields(base)]
@@ -147,9 +148,9 @@ def _parsed(text: str, noises: Mapping[str, Noise]) -> QueryDistortion:
     return replace(base, **values)
 
 
-def _value(word: str, like: object, noises: Mapping[str, Noise], text: str) -> Any:  # noqa: ANN401
-    """Return a setting, of the kind that its default has."""
-    if isinstance(like, NoiseSpec | NoiseMixture):
+def _value(word: str, default: object, noises: Mapping[str, Noise], text: str) -> Any:  # noqa: ANN401
+    """Parse the value of a setting as the type of its default."""
+    if isinstance(default, NoiseSpec | NoiseMixture):
         if word not in noises:
             names = ", ".join(noises)
             raise UnknownNameError(
@@ -157,31 +158,32 @@ def _value(word: str, like: object, noises: Mapping[str, Noise], text: str) -> A
             )
         return noises[word]
     try:
-        if isinstance(like, bool):
+        if isinstance(default, bool):
             return WORDS[word]
-        if isinstance(like, int | float):
-            return type(like)(word)
+        if isinstance(default, int | float):
+            return type(default)(word)
     except (LookupError, ValueError) as error:
-        kind = KINDS[type(like)]
+        kind = KINDS[type(default)]
         raise InputError(
             f"distortion {text!r} cannot be read; give {kind} in place of {word!r}."
         ) from error
-    return tuple(part for part in word.split("/") if part) if isinstance(like, tuple) else word
+    return tuple(part for part in word.split("/") if part) if isinstance(default, tuple) else word
 
 
-def _texts(one: QueryDistortion) -> Iterator[str]:
-    """Yield what may stand for a distortion: a name and what differs from its settings."""
-    first, *others = [item.name for item in fields(one)]
+def _texts(distortion: QueryDistortion) -> Iterator[str]:
+    """Yield possible texts of a distortion: a name and the settings that are not the default."""
+    first, *others = [item.name for item in fields(distortion)]
+    values = {key: getattr(distortion, key) for key in (first, *others)}
     for name, base in NAMED_DISTORTIONS.items():
-        level = name in DISTORTIONS
-        # A level of the paper is a number of errors, whatever else differs.
-        if type(base) is not type(one) or (level and getattr(one, first) != getattr(base, first)):
+        is_level = name in DISTORTIONS
+        # A level of the paper fits only if its number of errors, the first setting, is the same.
+        if type(base) is not type(distortion) or (
+            is_level and values[first] != getattr(base, first)
+        ):
             continue
-        words = [name, "" if level else _word(getattr(one, first))]
+        words = [name, "" if is_level else _word(values[first])]
         words += [
-            f"{key}={_word(getattr(one, key))}"
-            for key in others
-            if getattr(one, key) != getattr(base, key)
+            f"{key}={_word(values[key])}" for key in others if values[key] != getattr(base, key)
         ]
         yield ":".join(filter(None, words))
 

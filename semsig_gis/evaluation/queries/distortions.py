@@ -1,6 +1,6 @@
-"""What happens to a query: the paper's errors, weak eyes, a narrow view, things in the way.
+"""Distortions of queries: the paper's errors, weak detectors, narrow views and obstacles.
 
-Or what more than types and bearings a detector tells: rough distances, scores of several classes.
+Two of them add observations instead: rough distances and class scores.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.evaluation.queries.true_view import CitySights, Sight, Spoiling
+    from semsig_gis.evaluation.queries.true_view import CitySights, DistortFunction, Sight
     from semsig_gis.localization import Noise, NoiseTable
 
 
@@ -47,16 +47,16 @@ LEAST_RIGHT, MOST_RIGHT = 0.51, 0.999
 
 
 class _AnyCity(ABC):
-    """A distortion that does the same whatever there is to see in a city."""
+    """A distortion that does not depend on the city."""
 
     __slots__ = ()
 
-    def ready(self, city: CitySights) -> Spoiling:  # noqa: ARG002 - other distortions need it
-        """Return what it does to a query."""
-        return self._spoil
+    def prepare(self, city: CitySights) -> DistortFunction:  # noqa: ARG002 - other distortions need it
+        """Return the function that distorts a query."""
+        return self._apply
 
     @abstractmethod
-    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight: ...
+    def _apply(self, sight: Sight, rng: np.random.Generator) -> Sight: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,15 +73,15 @@ class CompassBias(_AnyCity):
     def __post_init__(self) -> None:  # noqa: D105
         require_number("deviation of the compass", self.sigma, least=0, most=FULL_TURN)
 
-    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+    def _apply(self, sight: Sight, rng: np.random.Generator) -> Sight:
         return sight.turned(float(rng.normal(0.0, abs(self.sigma))))  # -0.0 is 0, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissingClasses:
-    """A detector that does not know some classes of the city.
+    """A detector that does not detect some classes of the city.
 
-    With `others`, the named classes are the ones it knows, and all others are missing.
+    With `others`, it detects only the given classes.
     """
 
     stream: ClassVar[int] = 2_848_656_676
@@ -89,25 +89,25 @@ class MissingClasses:
     classes: tuple[str, ...] = ()
     others: bool = False
 
-    def ready(self, city: CitySights) -> Spoiling:
-        """Return what it does to a query.
+    def prepare(self, city: CitySights) -> DistortFunction:
+        """Return the function that distorts a query.
 
-        Raises UnknownNameError if the taxonomy of the city has no class of a name.
+        Raises UnknownNameError if a class is not in the taxonomy of the city.
         """
-        named = [city.taxonomy.by_name(name).code for name in self.classes]
+        codes = [city.taxonomy.by_name(name).code for name in self.classes]
 
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG001
-            return sight.only(np.isin(sight.codes, named, invert=not self.others))
+        def apply(sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG001
+            return sight.only(np.isin(sight.codes, codes, invert=not self.others))
 
-        return spoil
+        return apply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldOfView(_AnyCity):
-    """A camera that looks in one direction, drawn at random, and sees part of the turn.
+    """A camera that looks in one random direction and sees part of the full turn.
 
-    It sees `degrees`, above 0 and at most 360. Bearings are still counted from north. Which part of
-    the turn was looked at is `told`, or not: then what is out of view counts as missed.
+    It sees `degrees`, above 0 and at most 360. Bearings are still from north. If `told`, the query
+    states its view; otherwise objects outside the view count as missed.
     """
 
     stream: ClassVar[int] = 20_362_731
@@ -121,34 +121,37 @@ class FieldOfView(_AnyCity):
                 f"a view of {self.degrees!r} degrees was given; give degrees above 0, at most 360."
             )
 
-    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+    def _apply(self, sight: Sight, rng: np.random.Generator) -> Sight:
         middle = rng.uniform(0.0, FULL_TURN)
-        seen = sight.only(angular_distance(sight.bearings, middle) <= self.degrees / 2.0)
+        visible = sight.only(angular_distance(sight.bearings, middle) <= self.degrees / 2.0)
         if not self.told:
-            return seen
-        return replace(seen, photo=_common(sight.photo, middle, self.degrees))
+            return visible
+        return replace(visible, photo=_common_view(sight.photo, middle, self.degrees))
 
 
-def _common(photo: Photo, heading: float, fov: float) -> Photo:
-    """Return the part of a photo that a narrower one shows, too; that one where there is none."""
+def _common_view(photo: Photo, heading: float, fov: float) -> Photo:
+    """Return the intersection of a photo and a view; the view if they do not overlap."""
     other = Photo.looking(heading=heading, fov=fov)
     if not (photo.sectors and other.sectors):
         return Photo(sectors=photo.sectors or other.sectors)
-    both = [
+    # Sectors may cross north, so each pair is compared one turn apart as well.
+    overlaps = [
         (max(low, start + turn), min(high, end + turn))
         for low, high in photo.sectors
         for start, end in other.sectors
         for turn in (-FULL_TURN, 0.0, FULL_TURN)
     ]
-    return Photo(sectors=tuple(one for one in both if one[0] < one[1]) or other.sectors)
+    return Photo(
+        sectors=tuple((low, high) for low, high in overlaps if low < high) or other.sectors
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HiddenBehind(_AnyCity):
-    """Objects that nearer objects hide.
+    """Occlusion of objects by nearer objects.
 
-    An object is hidden when a nearer one covers its bearing: one of `width` w metres (0 to 1,000)
-    at distance d covers ``atan(w / 2 d)`` to either side.
+    An object is hidden if a nearer one covers its bearing. An object of `width` w metres (0 to
+    1,000) at distance d covers ``atan(w / 2 d)`` on each side.
     """
 
     stream: ClassVar[int] = 3_881_164_136
@@ -158,16 +161,16 @@ class HiddenBehind(_AnyCity):
     def __post_init__(self) -> None:  # noqa: D105
         require_number("width of the objects", self.width, least=0, most=MOST_WIDTH_M)
 
-    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG002
+    def _apply(self, sight: Sight, rng: np.random.Generator) -> Sight:  # noqa: ARG002
         return sight.only(~_behind(sight, sight.bearings, sight.distances, self.width))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacles:
-    """Things at the kerb, on no map, that hide what is behind them.
+    """Unmapped obstacles, such as parked vans, that hide the objects behind them.
 
-    Their number around a place is a Poisson one with mean `count`; each is `width` metres wide and
-    stands anywhere within the range of the city. Both are from 0 to 1,000.
+    Their number around a place is Poisson distributed with mean `count`; each is `width` metres
+    wide, at a random place within the range of sight. Both are from 0 to 1,000.
     """
 
     stream: ClassVar[int] = 626_356_719
@@ -179,24 +182,24 @@ class Obstacles:
         require_number("number of obstacles", self.count, least=0, most=MOST_FALSE)
         require_number("width of the obstacles", self.width, least=0, most=MOST_WIDTH_M)
 
-    def ready(self, city: CitySights) -> Spoiling:
-        """Return what it does to a query."""
+    def prepare(self, city: CitySights) -> DistortFunction:
+        """Return the function that distorts a query."""
 
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+        def apply(sight: Sight, rng: np.random.Generator) -> Sight:
             count = int(rng.poisson(self.count))
             bearings = rng.uniform(0.0, FULL_TURN, count)
             distances = city.false_distances(count, rng)
             return sight.only(~_behind(sight, bearings, distances, self.width))
 
-        return spoil
+        return apply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockedSectors(_AnyCity):
-    """Sectors of the view in which nothing is seen, near or far.
+    """Sectors of the view in which nothing is seen.
 
-    There are `count` of them (0 or more), each of `degrees` (0 to 360) anywhere in the turn; they
-    may overlap.
+    There are `count` sectors (0 or more) of `degrees` (0 to 360) in random directions; they may
+    overlap.
     """
 
     stream: ClassVar[int] = 4_207_042_345
@@ -211,16 +214,16 @@ class BlockedSectors(_AnyCity):
                 "from 0 up and degrees from 0 to 360."
             )
 
-    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+    def _apply(self, sight: Sight, rng: np.random.Generator) -> Sight:
         middles = rng.uniform(0.0, FULL_TURN, self.count)
-        aside = angular_distance(sight.bearings[:, None], middles)
-        return sight.only((aside > self.degrees / 2.0).all(axis=1))
+        deviations = angular_distance(sight.bearings[:, None], middles)
+        return sight.only((deviations > self.degrees / 2.0).all(axis=1))
 
 
 def _behind(
     sight: Sight, bearings: NDArray[np.float64], distances: NDArray[np.float64], width: float
 ) -> NDArray[np.bool_]:
-    """Tell which objects are behind one of some things, all of one width."""
+    """Return which objects are hidden behind obstacles of the same width."""
     half = np.degrees(np.arctan2(width / 2.0, np.maximum(distances, NEAREST_M)))
     farther = sight.distances[:, None] > distances
     return np.asarray(
@@ -229,13 +232,13 @@ def _behind(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Detector:
-    """A detector that fails as a noise model says.
+class SimulatedDetector:
+    """A detector with the errors of a noise model.
 
-    An object at distance d metres is detected with chance ``p * 2 ** -((d / half) ** 2)``, where p
-    is that of the model: at `half` metres (above 0) only half of the objects are left. An uncertain
-    place of the model (``position_sigma``) is a step aside of the observer. Of a mixture, one model
-    is drawn for each query. As in `likelihood.noise.table`, no chance is quite 0 or 1.
+    An object at distance d metres is detected with probability ``p * 2 ** -((d / half) ** 2)``,
+    where p is that of the model: at `half` metres (above 0) half of the objects are detected. The
+    ``position_sigma`` of the model moves the observer. From a mixture, one model is drawn for each
+    query. As in `localization.noise.table`, no probability is exactly 0 or 1.
     """
 
     stream: ClassVar[int] = 4_129_241_295
@@ -250,10 +253,10 @@ class Detector:
                 f"half of the objects, from {NEAREST_M}, or infinity if distance does not matter."
             )
 
-    def ready(self, city: CitySights) -> Spoiling:
-        """Return what it does to a query.
+    def prepare(self, city: CitySights) -> DistortFunction:
+        """Return the function that distorts a query.
 
-        Raises InputError if the noise model names a class that the city does not have.
+        Raises InputError if the noise model has a class that is not in the taxonomy of the city.
         """
         tables, weights = noise_tables(
             self.noise,
@@ -263,50 +266,52 @@ class Detector:
             radius=city.reach,
         )
 
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+        def apply(sight: Sight, rng: np.random.Generator) -> Sight:
             table = tables[int(rng.choice(len(tables), p=weights))]
-            seen = self._detected(_from_aside(sight, table.position_sigma, rng), table, rng)
+            if table.position_sigma:
+                sight = _moved_sight(sight, *rng.normal(0.0, table.position_sigma, 2))
+            detections = self._detected(sight, table, rng)
             codes = np.repeat(table.codes, rng.poisson(table.clutter))
             false = rng.uniform(0.0, FULL_TURN, len(codes))
             distances = city.false_distances(len(codes), rng)
-            return seen.with_false(codes, false, distances).clockwise()
+            return detections.with_false(codes, false, distances).clockwise()
 
-        return spoil
+        return apply
 
     def _detected(self, sight: Sight, table: NoiseTable, rng: np.random.Generator) -> Sight:
-        """Return the objects that are detected, under the names and bearings they are given."""
+        """Return the detected objects with their reported classes and bearings."""
         length = min(len(sight), len(table.missed) - 1)
+        # Detection: by class, by fading with distance and by `half`.
         chances = 1.0 - table.missed[length, table.row_of[sight.codes]]
         kinds = table.row_of[sight.codes]
         chances *= table.fading[kinds, distance_units_of(sight.distances, table.reach)]
         chances *= np.exp2(-((sight.distances / self.half) ** 2))
-        seen = sight.only(rng.random(len(sight)) < chances)
-        kinds = table.row_of[seen.codes]
+        detections = sight.only(rng.random(len(sight)) < chances)
+        # Classification: a random row of the cumulative confusion matrix.
+        kinds = table.row_of[detections.codes]
         names = np.cumsum(table.named[length, kinds], axis=1)
-        labels = (rng.random(len(seen))[:, None] * names[:, -1:] >= names).sum(axis=1)
-        off = rng.normal(0.0, table.sigma[kinds])
+        labels = (rng.random(len(detections))[:, None] * names[:, -1:] >= names).sum(axis=1)
+        noise = rng.normal(0.0, table.sigma[kinds])
         return replace(
-            seen.renamed(table.codes[labels]), bearings=wrap_degrees(seen.bearings + off)
+            detections.renamed(table.codes[labels]),
+            bearings=wrap_degrees(detections.bearings + noise),
         )
 
 
-def _from_aside(sight: Sight, sigma: float, rng: np.random.Generator) -> Sight:
-    """Return what is seen a step aside."""
-    if not sigma:
-        return sight
-    turned = np.radians(sight.bearings)
-    dx, dy = rng.normal(0.0, sigma, 2)
-    x = sight.distances * np.sin(turned) - dx
-    y = sight.distances * np.cos(turned) - dy
+def _moved_sight(sight: Sight, dx: float, dy: float) -> Sight:
+    """Return the same objects seen from dx metres east and dy metres north."""
+    directions = np.radians(sight.bearings)
+    x = sight.distances * np.sin(directions) - dx
+    y = sight.distances * np.cos(directions) - dy
     return replace(sight, bearings=bearings(x, y), distances=np.hypot(x, y))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoughRanges(_AnyCity):
-    """A depth network, or a person's guess: how far away each object seems to be.
+    """Rough distances of the objects, from a depth network or a person's estimate.
 
-    The logarithm of a distance is off by a normal error of `percent` hundredths (0.1 to 300), which
-    the query states. A false object is anywhere within the range of the city, all places alike.
+    The logarithm of a distance has a normal error of `percent` hundredths (0.1 to 300), which the
+    query states. A false object is uniformly distributed within the range of sight.
     """
 
     stream: ClassVar[int] = 2_716_057_031
@@ -316,22 +321,22 @@ class RoughRanges(_AnyCity):
     def __post_init__(self) -> None:  # noqa: D105
         require_number("error of the ranges", self.percent, least=0.1, most=MOST_PERCENT, unit="%")
 
-    def _spoil(self, sight: Sight, rng: np.random.Generator) -> Sight:
+    def _apply(self, sight: Sight, rng: np.random.Generator) -> Sight:
         error = self.percent / 100.0
-        off = np.exp(rng.normal(0.0, error, len(sight)))
+        factors = np.exp(rng.normal(0.0, error, len(sight)))
         if sight.false is not None:
-            off[sight.false] = 1.0
-        ranges = np.clip(sight.distances * off, NEAREST_M, MAX_RANGE_M)
+            factors[sight.false] = 1.0
+        ranges = np.clip(sight.distances * factors, NEAREST_M, MAX_RANGE_M)
         return replace(sight, ranges=ranges, range_error=error)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassScores:
-    """A detector that gives each object scores of all classes of the city, instead of one name.
+    """A detector that gives each object a score for every class of the city, not one class.
 
-    The scores can be trusted: the chance that an object gets certain scores is proportional to the
-    score of its class in them. That of its own class is `right` in the mean (0.51 to 0.999).
-    Methods that use only names take the one with the best score.
+    The scores are calibrated: the probability of certain scores is proportional to the score of the
+    true class in them. The mean score of the true class is `right` (0.51 to 0.999). Methods that
+    use only one class take the one with the best score.
     """
 
     stream: ClassVar[int] = 1_530_938_417
@@ -341,21 +346,22 @@ class ClassScores:
     def __post_init__(self) -> None:  # noqa: D105
         require_number("mean score", self.right, least=LEAST_RIGHT, most=MOST_RIGHT)
 
-    def ready(self, city: CitySights) -> Spoiling:
-        """Return what it does to a query."""
+    def prepare(self, city: CitySights) -> DistortFunction:
+        """Return the function that distorts a query."""
         count = len(city.codes)
-        # Scores that come from a symmetric Dirichlet distribution, and a class that comes from the
-        # scores, are the same as a class, and scores from this distribution with one more for it.
+        # Drawing scores from a symmetric Dirichlet distribution and then a class from the scores is
+        # the same as drawing the class first and then the scores from the Dirichlet distribution
+        # in which the parameter of that class is one higher.
         spread = (1.0 - self.right) / (self.right * count - 1.0) if count > 1 else 1.0
 
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
+        def apply(sight: Sight, rng: np.random.Generator) -> Sight:
             own = np.searchsorted(city.codes, sight.codes)
-            parts = rng.standard_gamma(spread + np.eye(count)[own])
+            gammas = rng.standard_gamma(spread + np.eye(count)[own])
             scores = np.zeros((len(sight), CLASSES))
-            scores[:, city.codes] = parts / parts.sum(axis=1, keepdims=True)
+            scores[:, city.codes] = gammas / gammas.sum(axis=1, keepdims=True)
             return replace(sight, codes=scores.argmax(axis=1).astype(np.uint8), scores=scores)
 
-        return spoil
+        return apply
 
 
 FalseClass = Literal["uniform", "frequency"]
@@ -367,22 +373,22 @@ _MISS, _FALSE_DETECTION = 0, 1  # and 2, a false classification
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distortion:
-    """What happens to a signature between the street and the query.
+    """The paper's distortion: missed, false and misclassified objects, and bearing noise.
 
     Parameters
     ----------
     occurrences : int, default 7
-        How many times an object is missed, invented or misnamed; 0 or more.
+        Number of errors: each misses, adds or misclassifies an object; 0 or more.
     bearing_sigma : float, default 5.0
         Standard deviation of the noise on each bearing, in degrees; 0 or more.
     bearing_clip : float, default 30.0
         Largest absolute value of that noise, in degrees; 0 or more.
     resort : bool, default True
-        Whether the objects are put in clockwise order again after the noise, as a sweep would see
-        them (left open in the source, section 4.2, as the next).
+        Whether the objects are sorted clockwise again after the noise, as a sweep would see them.
+        The paper (section 4.2) does not say this, nor how false classes are drawn.
     false_class : {"uniform", "frequency"}, default "uniform"
-        Whether the class of a false object is drawn with equal chances or by how often each
-        class is seen in the database.
+        Whether the class of a false object is drawn with equal probabilities or by the frequency of
+        each class in the database.
 
     Raises
     ------
@@ -416,20 +422,21 @@ class Distortion:
                 f"{' or '.join(get_args(FalseClass))}."
             )
 
-    def ready(self, city: CitySights) -> Spoiling:
-        """Return what it does to a query of a city, whose classes false objects have."""
+    def prepare(self, city: CitySights) -> DistortFunction:
+        """Return the function that distorts a query; false objects have classes of the city."""
         chances = _class_chances(self, city.codes, city.frequencies)
 
-        def spoil(sight: Sight, rng: np.random.Generator) -> Sight:
-            codes, bearings, rows = _spoiled(sight.signature, self, (city.codes, chances), rng)
+        def apply(sight: Sight, rng: np.random.Generator) -> Sight:
+            codes, bearings, rows = _distorted(sight.signature, self, (city.codes, chances), rng)
             real = rows >= 0
-            seen = sight.only(rows[real]).renamed(codes[real])
-            seen = replace(seen, bearings=bearings[real])
+            detections = sight.only(rows[real]).renamed(codes[real])
+            detections = replace(detections, bearings=bearings[real])
             distances = city.false_distances(int((~real).sum()), rng)
-            seen = seen.with_false(codes[~real], bearings[~real], distances)
-            return seen.only(np.argsort(np.argsort(~real, kind="stable")))  # in their order again
+            detections = detections.with_false(codes[~real], bearings[~real], distances)
+            # The false objects are at the end; bring them back into the distorted order.
+            return detections.only(np.argsort(np.argsort(~real, kind="stable")))
 
-        return spoil
+        return apply
 
 
 DISTORTIONS: Mapping[str, Distortion] = MappingProxyType(
@@ -469,7 +476,7 @@ def named_distortion(name: str) -> Distortion:
 
 
 def distortion_of(name: str, distortions: Mapping[str, D]) -> D:
-    """Return a distortion by name; raises UnknownNameError if there is none."""
+    """Return a distortion by name; raise UnknownNameError if there is none."""
     if name not in distortions:
         *most, last = distortions
         hint = nearest_name(name, distortions)
@@ -487,20 +494,20 @@ def distort(
     weights: ArrayLike | None = None,
     rng: np.random.Generator,
 ) -> Signature:
-    """Return a signature as a faulty detector would have given it.
+    """Return a signature with the errors of a faulty detector.
 
     Parameters
     ----------
     signature : Signature
         Types and bearings, in clockwise order.
     distortion : Distortion
-        What to do to it.
+        The distortion.
     classes : array_like of int, shape (k,)
         Distinct class codes that a false object may have; at least one.
     weights : array_like of float, shape (k,), optional
-        How often each class is seen, not all zero; for the false class ``"frequency"`` only.
+        Frequency of each class, not all zero; only for the false class ``"frequency"``.
     rng : numpy.random.Generator
-        Source of the chances.
+        Source of random numbers.
 
     Returns
     -------
@@ -510,35 +517,35 @@ def distort(
     Raises
     ------
     InputError
-        If the signature lacks its types or its bearings, or the classes or weights do not serve.
+        If the signature lacks its types or its bearings, or the classes or weights are not valid.
 
     Notes
     -----
-    Paper, section 4.2. A false object is placed where its bearing belongs before the noise. A
-    miss or a false classification that finds no object, and a false classification that finds
-    no other class, change nothing but count as an occurrence.
+    Paper, section 4.2. A false object is inserted in the order of the bearings, before the noise. A
+    miss or a false classification without an object, and a false classification without another
+    class, change nothing but count as an occurrence.
 
     Examples
     --------
-    >>> seen = Signature(codes=np.array([1, 3], np.uint8), bearings=np.array([10.0, 200.0]))
+    >>> signature = Signature(codes=np.array([1, 3], np.uint8), bearings=np.array([10.0, 200.0]))
     >>> rng = np.random.default_rng(0)
-    >>> same = distort(seen, named_distortion("none"), classes=[1, 3], rng=rng)
+    >>> same = distort(signature, named_distortion("none"), classes=[1, 3], rng=rng)
     >>> same.codes.tolist(), same.bearings.tolist()
     ([1, 3], [10.0, 200.0])
     """
     false = np.asarray(classes, dtype=np.uint8)
     chances = _class_chances(distortion, false, weights)
-    codes, bearings, _ = _spoiled(signature, distortion, (false, chances), rng)
+    codes, bearings, _ = _distorted(signature, distortion, (false, chances), rng)
     return Signature(codes=codes, bearings=bearings)
 
 
-def _spoiled(
+def _distorted(
     signature: Signature,
     distortion: Distortion,
     false_classes: tuple[NDArray[np.uint8], NDArray[np.float64]],
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.int64]]:
-    """Return codes, bearings, and which object each was; -1 for a false one."""
+    """Return the distorted codes and bearings, and the original row of each object or -1."""
     if signature.codes is None or signature.bearings is None:
         raise InputError(
             "a signature without types or without bearings was given; give one with both."
@@ -562,16 +569,16 @@ def _spoiled(
                 codes[place] = _other_class(codes[place], *false_classes, rng)
     noise = rng.normal(0.0, distortion.bearing_sigma, len(bearings))
     limit = distortion.bearing_clip
-    seen = wrap_degrees(np.asarray(bearings, dtype=np.float64) + np.clip(noise, -limit, limit))
-    # A stable sort, so that objects on one bearing stay in the order they were in.
-    order = np.argsort(seen, kind="stable") if distortion.resort else np.arange(len(seen))
-    return np.array(codes, np.uint8)[order], seen[order], np.array(rows, np.int64)[order]
+    noisy = wrap_degrees(np.asarray(bearings, dtype=np.float64) + np.clip(noise, -limit, limit))
+    # A stable sort, so that objects of equal bearing stay in their order.
+    order = np.argsort(noisy, kind="stable") if distortion.resort else np.arange(len(noisy))
+    return np.array(codes, np.uint8)[order], noisy[order], np.array(rows, np.int64)[order]
 
 
 def _class_chances(
     distortion: Distortion, classes: NDArray[np.uint8], weights: ArrayLike | None
 ) -> NDArray[np.float64]:
-    """Return the chance of each class for a false object."""
+    """Return the probability of each class of a false object."""
     if classes.ndim != 1 or classes.size == 0 or len(np.unique(classes)) != classes.size:
         raise InputError(
             "the classes of false objects are not a list of distinct codes; give at least one."
@@ -599,7 +606,7 @@ def _other_class(
     chances: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> int:
-    """Return another class than `code`, or `code` itself when there is no other."""
+    """Draw another class than `code`; `code` itself if there is no other."""
     others = np.where(classes == code, 0.0, chances)
     total = others.sum()
     return int(rng.choice(classes, p=others / total)) if total > 0 else code

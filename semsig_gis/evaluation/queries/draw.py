@@ -1,8 +1,7 @@
-"""Queries of known places: seen from the cells or from anywhere, in this city or a later one.
+"""Simulated queries from known places: cells or any places, of this city or of another date.
 
-What is seen from a place is spoiled by distortions; what is left is asked. All chances come from a
-seed and the number of a query, so that query 17 is the same whatever else is asked, and however
-many.
+Distortions change the sight from a place, and the result is the query. All random numbers depend on
+a seed and the number of the query, so that query 17 is the same whatever the number of queries.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from semsig_gis.core import (
     require_number,
 )
 from semsig_gis.database import visible_objects_at
-from semsig_gis.evaluation.queries.distortion_text import ready_chain
+from semsig_gis.evaluation.queries.distortion_text import prepare_chain
 from semsig_gis.evaluation.queries.distortions import DISTORTIONS
 from semsig_gis.evaluation.queries.true_view import CitySights, Sight
 
@@ -38,31 +37,30 @@ if TYPE_CHECKING:
 SeenFrom = Literal["cells", "anywhere"]
 
 TRIES = 20
-"""How many places in a cell are tried for one outside the buildings."""
+"""Number of random places in a cell that are tried to find one outside the buildings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuerySpec:
-    """Which queries are asked.
+    """Number, seeds, places and distortions of simulated queries.
 
     Parameters
     ----------
     number : int, default 500
-        How many of each seed; at least 1.
+        Number of queries of each seed; at least 1.
     seeds : tuple of int, default (0,)
-        Seeds of all chances; different ones, each from 0 to 10**18.
+        Distinct random seeds, each from 0 to 10**18.
     seen_from : {"cells", "anywhere"}, default "cells"
-        The viewpoints of cells, as in the paper, or places anywhere in cells, outside of
-        buildings.
+        The viewpoints of cells, as in the paper, or random places in cells, outside buildings.
     distortions : tuple, default the paper's medium level
-        What happens to a query, in this order (see `queries.chain`).
+        The distortions, in order (see `queries.distortion_text`).
 
     Raises
     ------
     InputError
         If a number is out of range.
     UnknownNameError
-        If there is no such place to see from.
+        If `seen_from` is neither.
 
     Examples
     --------
@@ -92,13 +90,13 @@ class QuerySpec:
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class Query:
-    """A query and the truth about it.
+class SimulatedQuery:
+    """A simulated query with its true place.
 
-    It was seen from `xy`, metres in the CRS of the database, in the cell of row number `cell` there
-    (-1 where the database has no such cell), where `length` objects are seen. `number` counts from
-    0 for each seed. `asked` is what is asked after all distortions, and by how much its north is
-    off; `pick`, in [0, 1), chooses one of equally good answers.
+    It is seen from `xy`, metres in the CRS of the database, in the cell of row number `cell` (-1 if
+    the database has no such cell), where `length` objects are visible. `number` counts from 0 for
+    each seed. `asked` is the sight after all distortions, with the error of its north; `pick`, in
+    [0, 1), selects one of equally good answers.
     """
 
     seed: int
@@ -117,29 +115,29 @@ def draw_queries(
     store: ObjectStore | None = None,
     city: SignatureDatabase | None = None,
     part: slice = slice(None),
-) -> list[Query]:
-    """Draw queries of known places.
+) -> list[SimulatedQuery]:
+    """Draw simulated queries from known places.
 
     Parameters
     ----------
     database : SignatureDatabase
-        What is to be searched.
+        The database to search.
     spec : QuerySpec
-        Which queries.
+        Number, seeds, places and distortions of the queries.
     store : ObjectStore, optional
-        The street objects, and buildings if any, of the city that is looked at; needed for places
-        anywhere.
+        The street objects, and buildings if any, of the observed city; required if `seen_from` is
+        ``"anywhere"``.
     city : SignatureDatabase, optional
-        The city that is looked at, if it is not the one that the database tells of: the same city
-        at another date, say, in the same coordinate reference system. Places are in its cells.
+        The observed city, if it is not the searched one: for example the same city at another
+        date, in the same coordinate reference system. Places are in its cells.
     part : slice, optional
-        Which of the queries to draw, those of the first seed first; all by default.
+        The queries to draw, counted over all seeds in order; all by default.
 
     Returns
     -------
-    list of Query
-        For each seed so many queries. A detector knows the classes that the database has
-        somewhere; objects of others are not asked.
+    list of SimulatedQuery
+        ``spec.number`` queries for each seed. Objects of classes that no cell of the database sees
+        are not in the queries.
 
     Raises
     ------
@@ -168,23 +166,23 @@ def draw_queries(
             "queries from anywhere need the street objects of the city; build its database with "
             "them, or let queries be seen from cells."
         )
-    spoil = ready_chain(spec.distortions, CitySights.of(database))
-    codes_there = _codes_there(city, database)
+    distort = prepare_chain(spec.distortions, CitySights.of(database))
+    database_codes = _database_codes(city, database)
     queries = []
     for seed, numbers in _numbers(spec, part):
-        places, sights = _seen(city, spec, seed, numbers, store)
+        places, sights = _sights(city, spec, seed, numbers, store)
         cells = database.cells_at(places)
         for number, place, cell, sight in zip(numbers, places, cells, sights, strict=True):
-            codes = codes_there[sight.codes]
+            codes = database_codes[sight.codes]
             true = replace(sight, codes=codes).only(codes > 0)
             queries.append(
-                Query(
+                SimulatedQuery(
                     seed=seed,
                     number=number,
                     xy=(float(place[0]), float(place[1])),
                     cell=int(cell),
                     length=len(sight),
-                    asked=spoil(true, seed, number),
+                    asked=distort(true, seed, number),
                     pick=float(_random(seed, "pick", number).random()),
                 )
             )
@@ -192,7 +190,7 @@ def draw_queries(
 
 
 def check_count(what: str, count: int, cells: int) -> None:
-    """Raise InputError unless a number of queries or candidates is from 1 to that of the cells."""
+    """Raise InputError unless `count` is from 1 to the number of cells."""
     if not 1 <= count <= cells:
         raise InputError(
             f"{count} {what} were asked for; give a number from 1 to {cells}, the number of cells."
@@ -200,7 +198,7 @@ def check_count(what: str, count: int, cells: int) -> None:
 
 
 def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
-    """Yield the numbers of the queries of each seed that are in a part."""
+    """Yield each seed with the numbers of its queries that are in a part."""
     start, stop, _ = part.indices(spec.number * len(spec.seeds))
     for place, seed in enumerate(spec.seeds):
         first = place * spec.number
@@ -209,15 +207,15 @@ def _numbers(spec: QuerySpec, part: slice) -> Iterator[tuple[int, range]]:
             yield seed, range(low, high)
 
 
-def _seen(
+def _sights(
     city: SignatureDatabase,
     spec: QuerySpec,
     seed: int,
     numbers: range,
     store: ObjectStore | None,
 ) -> tuple[NDArray[np.float64], Iterator[Sight]]:
-    """Return places, and what is seen from each."""
-    # The first cells of one permutation: more queries keep the first ones.
+    """Return the places of the queries of a seed and the sight from each."""
+    # All queries come from one permutation, so that the first ones do not depend on their number.
     cells = np.random.default_rng(np.random.SeedSequence(seed)).permutation(len(city))
     if spec.seen_from == "cells" or store is None:
         cells = cells[numbers.start : numbers.stop]
@@ -242,24 +240,25 @@ def _seen(
 def _places(
     city: SignatureDatabase, cells: NDArray[np.int64], number: int, seed: int, store: ObjectStore
 ) -> NDArray[np.float64]:
-    """Return a place outside the buildings in each of the first cells that have one."""
+    """Return one place outside the buildings in each of the first cells that have such a place."""
     step = city.grid.step
     places: list[NDArray[np.float64]] = []
     for start in range(0, len(cells), number):
         block = cells[start : start + number]
-        aside = np.stack(
+        offsets = np.stack(
             [
                 _random(seed, "place", start + row).uniform(-0.5, 0.5, (TRIES, 2))
                 for row in range(len(block))
             ]
         )
-        tried = city.xy[block][:, None] + step * aside
+        candidates = city.xy[block][:, None] + step * offsets
         buildings = store.buildings_around(city.xy[block], distance=step)
-        free = np.ones(tried.shape[:2], np.bool_)
+        free = np.ones(candidates.shape[:2], np.bool_)
         if buildings is not None:
-            free = ~buildings.cover(tried.reshape(-1, 2)).reshape(free.shape)
-        stands = free.any(axis=1)
-        places.append(tried[stands, free.argmax(axis=1)[stands]])
+            free = ~buildings.cover(candidates.reshape(-1, 2)).reshape(free.shape)
+        # The first free candidate of each cell that has one.
+        usable = free.any(axis=1)
+        places.append(candidates[usable, free.argmax(axis=1)[usable]])
         if sum(map(len, places)) >= number:
             return np.concatenate(places)[:number]
     raise InputError(
@@ -268,14 +267,14 @@ def _places(
     )
 
 
-def _codes_there(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:
-    """Return the code that each class of a city has in a database, 0 where it is not seen there."""
+def _database_codes(city: SignatureDatabase, database: SignatureDatabase) -> NDArray[np.uint8]:
+    """Return the database's code of each class code of a city, 0 for classes it does not see."""
     present = set(database.present_codes.tolist())
     codes = {item.name: item.code for item in database.taxonomy.classes if item.code in present}
-    there = np.zeros(256, np.uint8)
+    database_codes = np.zeros(256, np.uint8)
     for item in city.taxonomy.classes:
-        there[item.code] = codes.get(item.name, 0)
-    return there
+        database_codes[item.code] = codes.get(item.name, 0)
+    return database_codes
 
 
 def _random(seed: int, stream: str, number: int) -> np.random.Generator:

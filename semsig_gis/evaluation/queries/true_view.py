@@ -1,8 +1,8 @@
-"""What is seen from one place, and told in some order: types, bearings and distances.
+"""Objects seen from one place: types, bearings and true distances.
 
-A detector tells types and bearings, and perhaps rough distances and scores of several classes. The
-true distances stay with them for as long as something that happens to the query, a weak eye or a
-parked van, depends on how far away things are.
+A detector reports types and bearings, and perhaps rough distances and class scores. The true
+distances are kept as well, because some distortions (a weak detector, a parked van) depend on how
+far away the objects are.
 """
 
 from __future__ import annotations
@@ -32,44 +32,44 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.observation import Photo
 
-    Spoiling = Callable[["Sight", np.random.Generator], "Sight"]
-    """What a distortion does to what is seen, with all chances from a generator."""
+    DistortFunction = Callable[["Sight", np.random.Generator], "Sight"]
+    """Function that distorts a sight with random numbers of a generator."""
 
-NEAREST_M = 0.01  # that anything stands, so that its width is an angle
+NEAREST_M = 0.01  # least distance of an object, so that its width can be turned into an angle
 _BY_OBJECT = ("codes", "bearings", "distances", "false", "ranges", "scores")
 
 
 @dataclass(frozen=True, eq=False, repr=False, slots=True, kw_only=True)
 class Sight(Displayed):
-    """What is seen from a place, or seems to be.
+    """The objects that are seen, or seem to be seen, from a place.
 
     Parameters
     ----------
     codes : ndarray of uint8, shape (n,)
         Class code of each object.
     bearings : ndarray of float64, shape (n,)
-        Degrees clockwise from what is taken for north, in [0, 360).
+        Degrees clockwise from the assumed north, in [0, 360).
     distances : ndarray of float64, shape (n,)
         Metres; of a false object, how far away it seems to be.
     heading : float, default 0
         Degrees to add to the bearings to have them from true north, in [0, 360).
     false : ndarray of bool, shape (n,), or None
-        Whether each object is a false one; None where none is.
+        Whether each object is a false one; None if there are no false objects.
     ranges, scores : ndarray of float64 or None
-        Rough distances and scores of classes that a detector gives, as in `View`.
+        Rough distances and class scores of a detector, as in `View`.
     range_error : float, default NaN
-        The relative error that it states of the rough distances, as in `View`.
+        Stated relative error of the rough distances, as in `View`.
     photo : Photo, default the full turn
-        The directions that are stated to have been looked at.
+        The directions that are stated as observed.
 
     Examples
     --------
-    >>> seen = Sight(
+    >>> sight = Sight(
     ...     codes=np.array([1, 3], np.uint8),
     ...     bearings=np.array([350.0, 90.0]),
     ...     distances=np.array([5.0, 20.0]),
     ... )
-    >>> seen.clockwise().codes.tolist(), len(seen.only(seen.distances < 10.0))
+    >>> sight.clockwise().codes.tolist(), len(sight.only(sight.distances < 10.0))
     ([3, 1], 1)
     """
 
@@ -96,7 +96,7 @@ class Sight(Displayed):
 
     @property
     def signature(self) -> Signature:
-        """What a detector reports of it: a `View` if that is more than types and bearings."""
+        """What a detector reports: a `View` if it has more than types and bearings."""
         if self.ranges is None and self.scores is None and self.photo == FULL_VIEW:
             return Signature(self.codes, self.bearings)
         return View(
@@ -119,18 +119,18 @@ class Sight(Displayed):
         )
 
     def only(self, objects: ArrayLike) -> Sight:
-        """Return some of the objects: those of a mask, or of numbers in the order wanted."""
+        """Return some of the objects, given by a mask or by their numbers in order."""
         index = np.asarray(objects)
         columns = {name: getattr(self, name) for name in _BY_OBJECT}
-        kept = {name: values[index] for name, values in columns.items() if values is not None}
-        return replace(self, **kept)
+        selected = {name: values[index] for name, values in columns.items() if values is not None}
+        return replace(self, **selected)
 
     def in_view(self) -> Sight:
-        """Return the objects in the directions that are stated to have been looked at."""
+        """Return the objects in the directions that are stated as observed."""
         return self.only(self.photo.sees(self.bearings)) if self.photo.sectors else self
 
     def renamed(self, codes: NDArray[np.uint8]) -> Sight:
-        """Return the objects by other names; where a name changes, its scores are sure of it."""
+        """Return the objects with other class codes; a changed class gets a score of 1."""
         scores = self.scores
         if scores is not None:
             scores = np.where((codes == self.codes)[:, None], scores, np.eye(CLASSES)[codes])
@@ -142,8 +142,8 @@ class Sight(Displayed):
         bearings: NDArray[np.float64],
         distances: NDArray[np.float64],
     ) -> Sight:
-        """Return the objects, and then false ones; their rough distances are just these."""
-        more = {
+        """Return the objects followed by false ones; rough distances of these have no error."""
+        false = {
             "codes": codes,
             "bearings": bearings,
             "distances": distances,
@@ -151,21 +151,23 @@ class Sight(Displayed):
             "ranges": np.maximum(distances, NEAREST_M),
             "scores": np.eye(CLASSES)[codes],
         }
-        one = self if self.false is not None else replace(self, false=np.zeros(len(self), np.bool_))
-        columns = {name: getattr(one, name) for name in _BY_OBJECT}
+        columns = {name: getattr(self, name) for name in _BY_OBJECT}
+        if self.false is None:
+            columns["false"] = np.zeros(len(self), np.bool_)
+        # A column that the detector does not give stays empty.
         joined: dict[str, Any] = {
-            name: np.concatenate([values, more[name]])
+            name: np.concatenate([values, false[name]])
             for name, values in columns.items()
             if values is not None
         }
-        return replace(one, **joined)
+        return replace(self, **joined)
 
     def clockwise(self) -> Sight:
-        """Return the objects sorted by bearing; those on one bearing stay in their order."""
+        """Return the objects sorted by bearing; equal bearings stay in their order."""
         return self.only(np.argsort(self.bearings, kind="stable"))
 
     def turned(self, degrees: float) -> Sight:
-        """Return the same with bearings so many degrees larger, clockwise from the new north."""
+        """Return the sight with all bearings increased by `degrees`, sorted from the new north."""
         return replace(
             self,
             bearings=wrap_degrees(self.bearings + degrees),
@@ -176,10 +178,10 @@ class Sight(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class CitySights:
-    """What there is to see in a city: what false objects are made of.
+    """Classes that are visible in a city and the range of sight, for drawing false objects.
 
-    `codes` (k,) are the classes of `taxonomy` that are seen somewhere, ascending; `frequencies`
-    (k,) how often each is seen; `reach` the range of sight in metres.
+    `codes` (k,) are the classes of `taxonomy` that are visible somewhere, ascending; `frequencies`
+    (k,) is how often each is seen; `reach` is the range of sight in metres.
     """
 
     taxonomy: Taxonomy
@@ -189,7 +191,7 @@ class CitySights:
 
     @classmethod
     def of(cls, database: SignatureDatabase) -> CitySights:
-        """Return what is seen in the cells of a database."""
+        """Return the classes that the cells of a database see."""
         codes = database.present_codes
         return cls(
             taxonomy=database.taxonomy,
@@ -199,5 +201,5 @@ class CitySights:
         )
 
     def false_distances(self, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Draw distances of false objects in metres, spread evenly over the circle within reach."""
+        """Draw distances of false objects in metres, uniform over the area within reach."""
         return self.reach * np.sqrt(rng.random(count))

@@ -170,15 +170,15 @@ def _meaning(value: object, where: str, classes: set[str]) -> Meaning:
     """Return the meaning of an entry of a map."""
     item: Mapping[str, Any] = value if isinstance(value, dict) else {"class": value}
     check_keys(item, MEANING_KEYS, where, ("class",))
-    classes_value = item["class"]
-    shares = {classes_value: 1.0} if isinstance(classes_value, str) else classes_value
+    entry = item["class"]
+    shares = {entry: 1.0} if isinstance(entry, str) else entry
     numbers = isinstance(shares, dict) and all(
         isinstance(share, int | float) and not isinstance(share, bool) and 0 < share <= 1
         for share in shares.values()
     )
     if not shares or not numbers or sum(shares.values()) > 1 + ROUNDING:
         raise CatalogError(
-            f"{where} has class = {classes_value!r}; write the name of a class, or a table of classes with "
+            f"{where} has class = {entry!r}; write the name of a class, or a table of classes with "
             "their chances, which sum to 1 at most."
         )
     for name in shares:

@@ -1,4 +1,4 @@
-"""Evaluations among the results of the paper's experiments, and how alike its city is to ours."""
+"""Select evaluations of the paper's experiments; adjust for its share of unambiguous queries."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def case_of(
     results: Reproduction, experiment: str, method: str, distortion: str = "", *, top: int = 1
 ) -> Evaluation:
-    """Return an evaluation; the distortion is by default that of the experiment's name."""
+    """Return an evaluation; by default, the distortion has the name of the experiment."""
     return results.experiments[experiment][f"{distortion or experiment}/{method}-top{top}"]
 
 
@@ -29,18 +29,21 @@ def level_case(results: Reproduction, name: str) -> Evaluation:
     return case_of(results, name if name in results.experiments else "levels", BEST, name)
 
 
-def is_alone(case: Evaluation) -> NDArray[np.bool_]:
-    """Return which queries come from a cell that shares its types with no other."""
+def is_unambiguous(case: Evaluation) -> NDArray[np.bool_]:
+    """Return whether no other cell has the types of the true cell, for each query."""
     return np.asarray(case.queries["type_group"] == 1)
 
 
 def reweighted(case: Evaluation, figure: Figure) -> Share:
-    """Return a share if as many queries were unambiguous as in the paper."""
-    values, alone = share_values(case, figure), is_alone(case)
-    if alone.all() or not alone.any():
+    """Return a share, weighted as if the share of unambiguous queries were that of the paper."""
+    values, unambiguous = share_values(case, figure), is_unambiguous(case)
+    if unambiguous.all() or not unambiguous.any():
         return Share.of(values)
-    parts = ((paris.ALONE, values[alone]), (1.0 - paris.ALONE, values[~alone]))
-    mean = sum(weight * float(some.mean()) for weight, some in parts)
-    variance = sum(weight**2 * float(some.var()) / len(some) for weight, some in parts)
-    off = 1.96 * float(np.sqrt(variance))
-    return Share(mean, max(mean - off, 0.0), min(mean + off, 1.0))
+    strata = (
+        (paris.UNAMBIGUOUS, values[unambiguous]),
+        (1.0 - paris.UNAMBIGUOUS, values[~unambiguous]),
+    )
+    mean = sum(weight * float(stratum.mean()) for weight, stratum in strata)
+    variance = sum(weight**2 * float(stratum.var()) / len(stratum) for weight, stratum in strata)
+    half_width = 1.96 * float(np.sqrt(variance))
+    return Share(mean, max(mean - half_width, 0.0), min(mean + half_width, 1.0))

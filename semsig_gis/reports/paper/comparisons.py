@@ -1,4 +1,4 @@
-"""Sections of the paper's report in which methods are compared: measures, fusions, two stages."""
+"""Sections of the paper's report that compare methods: measures, fusions and two stages."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A section in which some methods are compared.
+    """A section that compares some methods.
 
-    `figures` are columns: a distortion, metres and per cent. `best` are rows with the best of some
-    methods beside what the paper says of its best: row, methods, distortion, metres and the paper's
-    share. `plots` are kinds of a distortion, with the paper's points. `top` candidates count, but
-    for recalls.
+    `figures` are the columns: distortion, metres and per cent. `best` are rows that compare the
+    best of some methods with the paper's best: row, methods, distortion, metres and the paper's
+    share. `plots` are a distortion, a kind of plot and the paper's points. `top` candidates count,
+    except for recalls.
     """
 
     name: str
@@ -70,13 +70,13 @@ class Comparison:
     def _plot(self, results: Reproduction, distortion: str, kind: str, paper: Points) -> Plot:
         top = self.top if kind == "error" else 1
         level = "no" if distortion == "none" else distortion
-        which = "first candidate" if top == 1 else f"best of {top} candidates"
-        shown = f"error of the {which}" if kind == "error" else "recall"
+        candidates = "first candidate" if top == 1 else f"best of {top} candidates"
+        measure = f"error of the {candidates}" if kind == "error" else "recall"
         curves = (
             curve_of(case_of(results, distortion, method, top=top), label, kind, band=False)
             for method, label in self.labels.items()
         )
-        title = f"{self.subject}, {level} distortion: {shown}"
+        title = f"{self.subject}, {level} distortion: {measure}"
         return plot_of(f"{self.name}-{distortion}", title, kind, curves, paper)
 
 
@@ -112,7 +112,7 @@ COMPARISONS = (
         title="Fusion of types and angles",
         text=(
             "Half of the edit distance of the types and half of a distance of the angles. The "
-            "paper's text reports 0.92 and 0.93 without distortion. Best of {MANY} candidates."
+            f"paper's text reports 0.92 and 0.93 without distortion. Best of {MANY} candidates."
         ),
         subject="Fusion",
         labels={**FUSION_LABELS, **EDIT_LABELS},
@@ -147,9 +147,9 @@ COMPARISONS = (
         name="stages",
         title="Fusion in two stages",
         text=(
-            "The edit distance of the types keeps so many per cent of the cells, and the fusion "
-            "ranks these. 100 % is the fusion. Only the first candidate counts. The paper finds "
-            "the errors of up to 10 % almost those of 100 %, and the recall lower."
+            "The edit distance of the types selects a percentage of the cells; the fusion ranks "
+            "these. 100 % is the fusion. Only the first candidate counts. In the paper, the errors "
+            "with up to 10 % are almost the same as with 100 %, and the recall is lower."
         ),
         subject="Two stages",
         labels={name: f"{percent} %" for percent, name in PERCENTS.items()},

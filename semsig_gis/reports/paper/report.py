@@ -1,4 +1,4 @@
-"""The report of the paper's experiments: tables and plots of ours beside the paper's figures."""
+"""The report of the paper's experiments: tables and plots of our figures and the paper's."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 from semsig_gis.evaluation import (
     BEST,
+    DISTORTION_LEVELS,
     DISTORTIONS,
     FIRST_STAGE,
-    LEVELS,
     OURS,
     READ_OFF,
     READINGS,
     machine,
 )
 from semsig_gis.evaluation import published as paris
-from semsig_gis.reports.paper.cases import case_of, is_alone, level_case, reweighted
+from semsig_gis.reports.paper.cases import case_of, is_unambiguous, level_case, reweighted
 from semsig_gis.reports.paper.comparisons import COMPARISONS, NAMES
 from semsig_gis.reports.report_model import Curve, Number, Plot, Report, Section
 from semsig_gis.reports.scenes import example_scenes
@@ -59,9 +59,9 @@ PARIS_P50, PARIS_RECALL10 = paris.ACCURACY[30.0, 16]
 
 
 def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
-    """Put together what was found: the paper's figures, what it leaves open, the likelihood.
+    """Return the report: the paper's figures, its possible readings and the likelihood method.
 
-    `command` is what was run.
+    `command` is the command line of the run.
     """
     settings = results.settings
     first = next(iter(results.experiments["none"].values()))
@@ -70,14 +70,14 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
         headline=reproduction_headline(results),
         text=(
             (
-                "Semantic signatures tell where in a city a view was taken from the street "
-                "objects in it. Here the experiments of the source paper are run again. Its city "
-                "is Paris in the open data of its time, so its figures can be compared with ours "
-                "only where the cities are alike."
+                "Semantic signatures locate a view in a city by the street objects in it. This "
+                "report repeats the experiments of the source paper. Its city is Paris in the open "
+                "data of its time, so its figures can be compared with ours only as far as the "
+                "cities are similar."
             ),
             (
-                "Shares come with intervals of 95 % (Wilson), which show how much chance there "
-                "is in the choice of the queries. Ties are scored by their expectation."
+                "Shares have intervals of 95 % (Wilson), which show the random error of the "
+                "sample of queries. Ties are scored by their expectation."
             ),
             *results.missing,
         ),
@@ -97,7 +97,7 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
             _distortion_section(results),
             *(comparison.section(results) for comparison in COMPARISONS),
             _time_section(results),
-            _alone_section(results),
+            _unambiguous_section(results),
             *_range_sections(results),
             _scale_section(results),
             _reading_section(results),
@@ -109,7 +109,7 @@ def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
 
 
 def reproduction_headline(results: Reproduction) -> str:
-    """Return in one sentence how the recommended method does, the paper's figure and ours."""
+    """Return one sentence with the paper's and our figure of the recommended method."""
     best, ours = case_of(results, "medium", BEST), case_of(results, "ours", OURS, "medium")
     shares = [short_percent(share_of(case, P50).ours or 0.0) for case in (best, ours)]
     return (
@@ -141,7 +141,7 @@ def _section(
 def _shares(
     case: Evaluation, row: str, paper: Mapping[Figure, float | None] | None = None
 ) -> list[Number]:
-    """Return the two shares that the paper tells of its recommended method."""
+    """Return the two shares that the paper gives for its recommended method."""
     return [
         share_of(case, figure).number(row, COLUMNS[figure], (paper or {}).get(figure))
         for figure in (P50, RECALL10)
@@ -149,7 +149,7 @@ def _shares(
 
 
 def _just_5(results: Reproduction, experiment: str, row: str, column: str) -> Number:
-    """Return the recall at 10 % if just 5 % of the cells are kept, whatever ties with the last.
+    """Return the recall at 10 % if exactly 5 % of the cells are kept, without tied ones.
 
     Then the best 10 % are those of the first stage.
     """
@@ -165,18 +165,18 @@ def _just_5(results: Reproduction, experiment: str, row: str, column: str) -> Nu
 def _object_section(results: Reproduction) -> Section:
     total = sum(paris.OCCURRENCES.values())
     numbers = []
-    for one in results.summary["occurrences"]:
-        row, paper = one["title"], paris.OCCURRENCES.get(one["name"])
+    for item in results.summary["occurrences"]:
+        row, paper = item["title"], paris.OCCURRENCES.get(item["name"])
         share = None if paper is None else paper / total
         numbers += [
-            Number(row, "occurrences", one["number"], paper=paper, decimals=0),
-            Number(row, "share of all", one["share"], paper=share),
+            Number(row, "occurrences", item["number"], paper=paper, decimals=0),
+            Number(row, "share of all", item["share"], paper=share),
         ]
     return _section(
         "objects",
         "Street objects",
-        "Paper, Table 1. An object counts once in every signature that it is in; the "
-        "paper's numbers are of that kind, for they sum to 14 for each of its signatures.",
+        "Paper, Table 1. An object counts once in every signature that contains it. The paper "
+        "must count in the same way, because its numbers sum to 14 for each of its signatures.",
         numbers=numbers,
     )
 
@@ -194,15 +194,16 @@ def _database_section(results: Reproduction) -> Section:
             ours = facts["groups"][part][key]
             row = f"groups by {part}: {key}"
             numbers.append(Number(row, "", ours, paper=paper, decimals=decimals))
-    for part, alone in (("type", paris.ALONE), ("angle", None)):
+    for part, paper_share in (("type", paris.UNAMBIGUOUS), ("angle", None)):
         row = f"cells alone in their group by {part}"
-        numbers.append(Number(row, "", facts["groups"][part]["alone"], paper=alone, decimals=3))
+        ours = facts["groups"][part]["alone"]
+        numbers.append(Number(row, "", ours, paper=paper_share, decimals=3))
     return _section(
         "database",
         "Database",
-        "Paper, Tables 2a and 2b. A group is all cells with one sequence of types, or of "
-        "angle levels. The paper's area is that of its city; ours is that of the cells. "
-        "Its share of cells alone is that of its queries; it does not say by which part.",
+        "Paper, Tables 2a and 2b. A group is all cells with the same sequence of types, or of "
+        "angle levels. The paper's area is that of its city; ours is that of the cells. Its share "
+        "of cells alone in their group is that of its queries, by type or by angle.",
         numbers=numbers,
     )
 
@@ -212,22 +213,21 @@ def _example_sections(results: Reproduction) -> Iterator[Section]:
     yield _section(
         "successful",
         "Successful queries",
-        "The first queries of the two-stage fusion at 5 %, medium distortion, whose "
-        "answer is right within 50 m. Signatures are as the database has them, before "
-        "the distortion.",
+        "The first queries of the two-stage fusion at 5 %, medium distortion, with an answer "
+        "within 50 m. Signatures are those of the database, before the distortion.",
         scenes=example_scenes(evaluation, results.database, successful=True),
     )
     yield _section(
         "failed",
         "Failed queries",
-        "The first ones whose answer is not. They see few objects, and of common classes.",
+        "The first queries with an answer farther away. They see few objects of common classes.",
         scenes=example_scenes(evaluation, results.database, successful=False),
     )
 
 
 def _distortion_section(results: Reproduction) -> Section:
     numbers = []
-    for name in LEVELS:
+    for name in DISTORTION_LEVELS:
         level, case = DISTORTIONS[name], level_case(results, name)
         length = float(case.queries["query_length"].mean())
         empty = case.unlocalized / len(case.queries)
@@ -239,12 +239,12 @@ def _distortion_section(results: Reproduction) -> Section:
             numbers.append(Number(name, column, ours, paper=paper, decimals=0))
         numbers.append(Number(name, "mean objects asked", length, decimals=2))
         numbers.append(Number(name, "left empty", empty))
-    seen = float(case.queries["length"].mean())
+    length = float(case.queries["length"].mean())
     return _section(
         "distortion",
         "Distortion",
         "Each error is, with equal chance, an object missed, an object made up, or a class "
-        f"mistaken. The queries see a mean of {seen:.2f} objects before.",
+        f"mistaken. Before the distortion, the queries see a mean of {length:.2f} objects.",
         numbers=numbers,
     )
 
@@ -263,10 +263,9 @@ def _time_section(results: Reproduction) -> Section:
     return _section(
         "times",
         "Retrieval times",
-        "Mean time to compare a query of 14 objects with all cells, of 100 queries, asked "
-        "one by one on one thread. The paper used another computer and another program, so "
-        f"that only orders of magnitude compare; it has 312,134 cells, we "
-        f"{len(results.database):,}.",
+        "Mean time to compare a query of 14 objects with all cells, for 100 queries, one by one on "
+        "one thread. The paper used another computer and another program, so that only orders of "
+        f"magnitude can be compared; it has 312,134 cells, we {len(results.database):,}.",
         numbers=numbers,
     )
 
@@ -275,7 +274,7 @@ def _time_section(results: Reproduction) -> Section:
 
 
 def _level_section(results: Reproduction) -> Section:
-    cases = {name: level_case(results, name) for name in ("none", *LEVELS)}
+    cases = {name: level_case(results, name) for name in ("none", *DISTORTION_LEVELS)}
     highest = {P10: READ_OFF["light_small_error"], RECALL10: READ_OFF["light_recall"]}
     lowest = {P10: READ_OFF["strong_small_error"], RECALL10: READ_OFF["strong_recall"]}
     medium = {P50: PARIS_P50, RECALL10: PARIS_RECALL10}
@@ -302,14 +301,14 @@ def _level_section(results: Reproduction) -> Section:
         "levels",
         "The recommended method: edit + edit, 5 %",
         (
-            "Only the first candidate counts. For medium the paper prints figures. Of the "
-            "levels together its text says that small errors range from 0.25 to 0.70, and "
-            "recalls of top ranks from 0.50 to more than 0.90, without saying of which level, "
-            "error and rank. The highest may be of light distortion or of none; both have it."
+            "Only the first candidate counts. For medium distortion the paper prints figures. For "
+            "all levels together, its text gives shares of small errors from 0.25 to 0.70, and "
+            "recalls of top ranks from 0.50 to more than 0.90, without the level, error and rank. "
+            "The highest may be for light or no distortion; it is shown for both."
         ),
         (
-            "If cells tie with the last of the 5 %, all of them are kept here. If just 5 % "
-            "are, the best 10 % are those of the first stage, the edit distance of the types: "
+            "If cells tie with the last of the 5 %, all of them are kept here. If exactly 5 % are "
+            "kept, the best 10 % are those of the first stage, the edit distance of the types; "
             "that recall is shown as well."
         ),
         numbers=[*numbers, _just_5(results, "medium", "medium", JUST_5)],
@@ -323,37 +322,37 @@ def _plots(
     cases: Mapping[str, Evaluation],
     paper: Mapping[str, Points],
     *,
-    alone: bool = False,
+    unambiguous: bool = False,
 ) -> Iterator[Plot]:
-    """Yield the errors and the recalls of all queries, or of unambiguous ones alone."""
+    """Yield plots of the errors and the recalls of all queries, or only of unambiguous ones."""
     for kind in ("error", "recall"):
         curves = [
-            curve_of(case, label, kind, is_alone(case) if alone else slice(None))
+            curve_of(case, label, kind, is_unambiguous(case) if unambiguous else slice(None))
             for label, case in cases.items()
         ]
         yield plot_of(name, f"{kind.title()} of {subject}", kind, curves, paper.get(kind, ()))
 
 
-def _alone_section(results: Reproduction) -> Section:
-    cases = {name: level_case(results, name) for name in LEVELS}
-    queries = Share.of(is_alone(cases["medium"]).astype(np.float64))
-    numbers = [queries.number("queries", "share alone", paris.ALONE)]
+def _unambiguous_section(results: Reproduction) -> Section:
+    cases = {name: level_case(results, name) for name in DISTORTION_LEVELS}
+    queries = Share.of(is_unambiguous(cases["medium"]).astype(np.float64))
+    numbers = [queries.number("queries", "share alone", paris.UNAMBIGUOUS)]
     for name, case in cases.items():
         for figure in (P50, RECALL10):
-            share = share_of(case, figure, is_alone(case))
+            share = share_of(case, figure, is_unambiguous(case))
             numbers.append(share.number(name, COLUMNS[figure]))
     return _section(
         "alone",
         "Unambiguous queries",
-        "The same, of the queries whose cell shares its types with no other cell before "
-        "the distortion. The paper shows these only as plots.",
+        "The same for queries from cells with types that no other cell has, before the "
+        "distortion. The paper shows these only as plots.",
         numbers=numbers,
-        plots=_plots("alone", "unambiguous queries", cases, {}, alone=True),
+        plots=_plots("alone", "unambiguous queries", cases, {}, unambiguous=True),
     )
 
 
 def _range_sections(results: Reproduction) -> Iterator[Section]:
-    """Yield the section about visibility ranges, if there are other ones."""
+    """Yield the section about visibility ranges, if there are databases of other ranges."""
     if not results.variants:
         return
     spec = results.database.spec
@@ -380,9 +379,10 @@ def _range_sections(results: Reproduction) -> Iterator[Section]:
             "built databases."
         ),
         (
-            "The last column asks whether the range matters by itself, or by how many "
-            "objects are seen: then queries that see as many are found as often at every "
-            "range, and a difference from the paper is one of the cities."
+            "The last column shows whether the range itself matters, or only the number of "
+            "objects that are seen. In the second case, queries that see equally many objects are "
+            "found equally often at every range, and differences from the paper are due to the "
+            "cities."
         ),
         numbers=numbers,
         plots=[_parameter_plot("ranges", "visibility range in metres", numbers, ranges)],
@@ -403,7 +403,7 @@ def _scale_section(results: Reproduction) -> Section:
     return _section(
         "scales",
         "Angle levels",
-        "The same with bearings in so many levels.",
+        "The same with other numbers of angle levels.",
         numbers=numbers,
         plots=[_parameter_plot("scales", "angle levels", numbers, rows)],
     )
@@ -412,17 +412,18 @@ def _scale_section(results: Reproduction) -> Section:
 def _parameter_plot(
     name: str, x_label: str, numbers: Iterable[Number], rows: Mapping[str, float]
 ) -> Plot:
-    """Return ours and the paper's shares by a parameter, whose values are given by row."""
+    """Return a plot of our and the paper's shares by a parameter; `rows` has its values by row."""
     curves = []
     for column in (COLUMNS[P50], COLUMNS[RECALL10]):
-        shown = [one for one in numbers if one.column == column and one.ours is not None]
-        known = [one for one in shown if one.paper is not None]
-        if shown:
-            ours = {end: tuple(getattr(one, end) for one in shown) for end in ("low", "high")}
-            x, y = (tuple(rows[one.row] for one in shown), tuple(one.ours or 0.0 for one in shown))
-            curves.append(Curve(label=f"ours, {column}", x=x, y=y, **ours))
-        if known:
-            x, y = (tuple(rows[one.row] for one in known), tuple(one.paper or 0.0 for one in known))
+        ours = [item for item in numbers if item.column == column and item.ours is not None]
+        paper = [item for item in ours if item.paper is not None]
+        if ours:
+            ends = {end: tuple(getattr(item, end) for item in ours) for end in ("low", "high")}
+            x, y = tuple(rows[item.row] for item in ours), tuple(item.ours or 0.0 for item in ours)
+            curves.append(Curve(label=f"ours, {column}", x=x, y=y, **ends))
+        if paper:
+            x = tuple(rows[item.row] for item in paper)
+            y = tuple(item.paper or 0.0 for item in paper)
             curves.append(Curve(label=f"paper, {column}", x=x, y=y))
     return Plot(
         name=f"{name}-shares",
@@ -449,21 +450,21 @@ def _reading_section(results: Reproduction) -> Section:
         numbers.append(reweighted(medium, figure).number(row, COLUMNS[figure], theirs))
     row = "as the first, but just 5 % of the cells are kept, not all that tie"
     numbers.append(_just_5(results, "medium", row, COLUMNS[RECALL10]))
-    errors = [one for one in numbers if one.column == COLUMNS[P50] and one.difference is not None]
-    nearest = min(errors, key=lambda one: abs(one.difference or 0.0))
+    errors = [n for n in numbers if n.column == COLUMNS[P50] and n.difference is not None]
+    nearest = min(errors, key=lambda number: abs(number.difference or 0.0))
     queries = len(case_of(results, "readings", BEST, next(iter(READINGS))).queries)
     return _section(
         "readings",
         "What the paper leaves open",
         (
             "The paper does not say whether a query is sorted again after bearing noise, which "
-            "class a false object has, and whether distances are brought to a scale of 0 to 1 "
-            "before they are added up. Here is the recommended method after each of them, with "
-            f"{queries:,} queries of medium distortion. Its figures are of Paris."
+            "class a false object has, and whether distances are scaled to 0 to 1 before they are "
+            "added. This is the recommended method with each of these readings and "
+            f"{queries:,} queries of medium distortion. The paper's figures are of Paris."
         ),
         (
-            "The last row but one looks at the city: it weighs the queries of the first "
-            f"reading so that {100 * paris.ALONE:.1f} % are unambiguous, as in the paper."
+            "The last row but one adjusts for the city: it weights the queries of the first "
+            f"reading so that {100 * paris.UNAMBIGUOUS:.1f} % are unambiguous, as in the paper."
         ),
         f"Nearest to the paper's {PARIS_P50} is: {nearest.row}, with {nearest.ours:.4f}.",
         numbers=numbers,
@@ -471,7 +472,7 @@ def _reading_section(results: Reproduction) -> Section:
 
 
 def _likelihood_section(results: Reproduction) -> Section:
-    cases = {name: case_of(results, "ours", OURS, name) for name in LEVELS}
+    cases = {name: case_of(results, "ours", OURS, name) for name in DISTORTION_LEVELS}
     numbers = []
     for name, case in cases.items():
         numbers += _shares(case, f"{name}: likelihood")
@@ -479,9 +480,9 @@ def _likelihood_section(results: Reproduction) -> Section:
     return _section(
         "likelihood",
         "The likelihood method",
-        "Not in the paper. A model of how detectors fail replaces the distances; it does not "
-        "know the level of the distortion. The method that the paper recommends is shown beside "
-        f"it. {len(case.queries):,} queries, only the first candidate.",
+        "Not in the paper. A noise model of detectors replaces the distances; it does not know the "
+        "level of the distortion. The method that the paper recommends is shown for comparison. "
+        f"{len(case.queries):,} queries, only the first candidate.",
         numbers=numbers,
         plots=(
             plot_of(

@@ -1,4 +1,4 @@
-"""Experiments from end to end: the files, interrupted runs, what is refused."""
+"""Experiments from end to end: result files, interrupted runs, invalid experiments."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from worlds import CORNER, TOWN, World, contents, save_town
 from semsig_gis.core import MACHINE_PREFIX, DatabaseError, InputError, SemsigError
 from semsig_gis.evaluation import (
     Districts,
-    ExperimentWork,
-    Part,
+    OpenExperiment,
+    QueryBatch,
     evaluate,
     open_results,
     parse_experiment,
@@ -32,7 +32,7 @@ from semsig_gis.evaluation import (
     run_experiments,
     score_queries,
 )
-from semsig_gis.evaluation.experiments import run
+from semsig_gis.evaluation.experiments import batches
 from semsig_gis.localization import Method, parse_method
 
 if TYPE_CHECKING:
@@ -41,9 +41,11 @@ if TYPE_CHECKING:
 
     from distributed import LocalCluster
 
-    from semsig_gis.evaluation import ExperimentSpec, Query
+    from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import ExperimentSpec, SimulatedQuery
+    from semsig_gis.localization import Answer, Locator
 
-PART_QUERIES = 10
+BATCH_QUERIES = 10
 SPEC = parse_experiment("""
 database = "city.parquet"
 queries = 13
@@ -59,11 +61,11 @@ SAME_IN_EVERY_RUN = {"experiment.toml", "inputs.json", "figures.csv", "report.md
 
 
 def interrupt(spec: ExperimentSpec, out: Path, folder: Path, *, after: int) -> None:
-    """Run an experiment until so many answers are done."""
+    """Interrupt an experiment when `after` answers are finished."""
 
-    def stop(done: int, total: int) -> None:
+    def stop(finished: int, total: int) -> None:
         assert total == spec.queries * len(spec.distortions) * len(spec.methods)
-        if done >= after:
+        if finished >= after:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -71,8 +73,8 @@ def interrupt(spec: ExperimentSpec, out: Path, folder: Path, *, after: int) -> N
     assert not out.exists()
 
 
-def run_to_the_end(folder: Path, tmp_path: Path, results: Path) -> None:
-    """Run the experiment, of which something may be there; the files must be as of one run."""
+def resume(folder: Path, tmp_path: Path, results: Path) -> None:
+    """Run the experiment to its end; the files must be those of an uninterrupted run."""
     run_experiment(SPEC, tmp_path / "out", folder=folder)
     assert contents(tmp_path / "out") == contents(results)
 
@@ -82,16 +84,16 @@ def never(*_: object, **__: object) -> None:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _small_parts() -> Iterator[None]:
-    """Answer few queries at a time, though no other process does."""
+def _small_batches() -> Iterator[None]:
+    """Use small batches in this process; other processes use the default."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "PART_QUERIES", PART_QUERIES)
+        patch.setattr(batches, "BATCH_QUERIES", BATCH_QUERIES)
         yield
 
 
 @pytest.fixture
-def _parts_as_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "PART_QUERIES", 100)
+def _default_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batches, "BATCH_QUERIES", 100)
 
 
 @pytest.fixture(scope="module")
@@ -112,13 +114,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def results(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the results of a run that nothing interrupted."""
+    """Return the results of an uninterrupted run."""
     out = tmp_path_factory.mktemp("results") / "all"
     run_experiment(SPEC, out, folder=folder)
     return out
 
 
-def test_a_folder_holds_everything(results: Path) -> None:
+def test_result_folder_has_all_files_and_figures(results: Path) -> None:
     files = contents(results)
     cases = {case.name for case in SPEC.cases}
     expected = {
@@ -133,8 +135,8 @@ def test_a_folder_holds_everything(results: Path) -> None:
     assert set(figures["case"]) == cases
     for name, evaluation in open_results(results).items():
         assert open_results(results / name)[""].summary() == evaluation.summary()
-        mine = figures[figures["case"] == name].set_index("figure")
-        assert mine["value"]["p50"] == pytest.approx(evaluation.cdf([50])[0])
+        case_figures = figures[figures["case"] == name].set_index("figure")
+        assert case_figures["value"]["p50"] == pytest.approx(evaluation.cdf([50])[0])
         timing = json.loads((results / name / "timing.json").read_text("utf-8"))
         assert timing["machine"]["processors"] >= 1
         assert evaluation.database["mb_per_km2"] > 0
@@ -144,41 +146,41 @@ def test_a_folder_holds_everything(results: Path) -> None:
     assert "s a query" not in report
 
 
-def test_all_methods_see_the_same_queries(results: Path) -> None:
-    asked = ["seed", "number", "cell", "query_types", "query_bearings", "heading", "geometry"]
-    found = open_results(results)
+def test_all_methods_answer_the_same_queries(results: Path) -> None:
+    columns = ["seed", "number", "cell", "query_types", "query_bearings", "heading", "geometry"]
+    cases = open_results(results)
     for distortion in SPEC.distortions:
-        tables = [
-            found[case.name].queries[asked] for case in SPEC.cases if case.distortion == distortion
+        first, *others = [
+            cases[case.name].queries[columns]
+            for case in SPEC.cases
+            if case.distortion == distortion
         ]
-        for table in tables[1:]:
-            assert_geodataframe_equal(table, tables[0])
-    none, phone = (found[f"{name}/paper-top1"].queries for name in ("none", "phone"))
+        for table in others:
+            assert_geodataframe_equal(table, first)
+    none, phone = (cases[f"{name}/paper-top1"].queries for name in ("none", "phone"))
     assert none.geometry.equals(phone.geometry)
     assert none["query_bearings"].tolist() != phone["query_bearings"].tolist()
 
 
-def test_an_experiment_is_what_an_evaluation_is(results: Path) -> None:
-    found = open_results(results)["none/paper-top3"]
-    alone = evaluate(
+def test_a_case_equals_a_single_evaluation(results: Path) -> None:
+    case = open_results(results)["none/paper-top3"]
+    single = evaluate(
         TOWN.database, queries=13, method=Method.parse("edit+edit:5%"), distortion="", top=3
     )
-    assert_geodataframe_equal(found.queries, alone.queries)
+    assert_geodataframe_equal(case.queries, single.queries)
 
 
-@pytest.mark.parametrize("done", [1, 21, 40, 52])
-def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
-    done: int, folder: Path, results: Path, tmp_path: Path
+@pytest.mark.parametrize("finished", [1, 21, 40, 52])
+def test_interrupted_run_ends_with_the_same_bytes(
+    finished: int, folder: Path, results: Path, tmp_path: Path
 ) -> None:
-    interrupt(SPEC, tmp_path / "out", folder, after=done)
-    run_to_the_end(folder, tmp_path, results)
+    interrupt(SPEC, tmp_path / "out", folder, after=finished)
+    resume(folder, tmp_path, results)
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-@pytest.mark.usefixtures("_parts_as_elsewhere")
-def test_a_run_that_was_killed_ends_with_the_same_bytes(
-    folder: Path, results: Path, tmp_path: Path
-) -> None:
+@pytest.mark.usefixtures("_default_batches")
+def test_killed_run_ends_with_the_same_bytes(folder: Path, results: Path, tmp_path: Path) -> None:
     spec = folder / "killed.toml"
     spec.write_text(SPEC.to_toml(), encoding="utf-8")
     command = [sys.executable, *f"-m semsig_gis.cli experiment {spec} --out".split()]
@@ -192,83 +194,92 @@ def test_a_run_that_was_killed_ends_with_the_same_bytes(
                 break
             time.sleep(0.002)
         process.wait()
-    run_to_the_end(folder, tmp_path, results)
+    resume(folder, tmp_path, results)
 
 
-@pytest.mark.usefixtures("_parts_as_elsewhere")
+@pytest.mark.usefixtures("_default_batches")
 def test_workers_write_the_same_files_as_one_process(
     folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
 ) -> None:
-    seen: list[int] = []
-    options: dict[str, Any] = {"progress": lambda done, _: seen.append(done)}
+    steps: list[int] = []
+    options: dict[str, Any] = {"progress": lambda finished, _: steps.append(finished)}
     address = cluster.scheduler_address
     run_experiment(SPEC, tmp_path / "out", folder=folder, scheduler=address, **options)
     assert contents(tmp_path / "out") == contents(results)
-    assert sorted(seen) == [26, 52]
+    assert sorted(steps) == [26, 52]
 
 
-@pytest.mark.usefixtures("_parts_as_elsewhere")
-def test_several_experiments_at_once_are_as_one_by_one(
+@pytest.mark.usefixtures("_default_batches")
+def test_several_experiments_write_the_same_files_as_single_ones(
     folder: Path, results: Path, tmp_path: Path, cluster: LocalCluster
 ) -> None:
     other = replace(SPEC, queries=5, seeds=(3, 4))
-    run_experiment(other, tmp_path / "alone", folder=folder)
+    run_experiment(other, tmp_path / "single", folder=folder)
     specs = {tmp_path / "a": SPEC, tmp_path / "b": other}
-    found = run_experiments(specs, folder=folder, scheduler=cluster.scheduler_address)
+    first = run_experiments(specs, folder=folder, scheduler=cluster.scheduler_address)
     assert contents(tmp_path / "a") == contents(results)
-    assert contents(tmp_path / "b") == contents(tmp_path / "alone")
-    again = run_experiments(specs, folder=folder)
-    for out, evaluations in found.items():
-        assert list(again[out]) == list(evaluations)
+    assert contents(tmp_path / "b") == contents(tmp_path / "single")
+    second = run_experiments(specs, folder=folder)
+    for out, evaluations in first.items():
+        assert list(second[out]) == list(evaluations)
 
 
-def test_parts_that_fail_are_told_and_the_others_are_kept(
+def test_failed_batches_are_reported_and_the_others_are_kept(
     folder: Path, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(database: Any, locator: Any, queries: Sequence[Query], **options: Any) -> object:  # noqa: ANN401
-        if len(queries) < PART_QUERIES:
+    def fail(
+        database: SignatureDatabase,
+        locator: Locator[Answer],
+        queries: Sequence[SimulatedQuery],
+        **options: Any,  # noqa: ANN401
+    ) -> object:
+        if len(queries) < BATCH_QUERIES:
             raise OSError("the disk hiccups")
         return score_queries(database, locator, queries, **options)
 
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", fail)
+    monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", fail)
     with refused(DatabaseError, "2 of the 4 parts", "disk hiccups", "out.partial", "kept"):
         run_experiment(SPEC, tmp_path / "out", folder=folder)
     monkeypatch.undo()
     parts = tmp_path / "out.partial" / "_parts"
     assert len(list(parts.iterdir())) == 4
-    run_to_the_end(folder, tmp_path, results)
+    resume(folder, tmp_path, results)
 
 
-def test_killed_at_the_very_end(folder: Path, results: Path, tmp_path: Path) -> None:
+def test_run_killed_after_its_rename_is_cleaned_up(
+    folder: Path, results: Path, tmp_path: Path
+) -> None:
     shutil.copytree(results, tmp_path / "out")
     (tmp_path / "out" / "_parts").mkdir()
     (tmp_path / "out" / "_parts" / "none.paper.00000.parquet").write_bytes(b"left")
-    run_to_the_end(folder, tmp_path, results)
+    resume(folder, tmp_path, results)
 
 
-def test_killed_at_the_very_beginning(folder: Path, results: Path, tmp_path: Path) -> None:
+def test_run_killed_before_its_inputs_are_written_is_resumed(
+    folder: Path, results: Path, tmp_path: Path
+) -> None:
     (tmp_path / "out.partial").mkdir()
     shutil.copy(results / "experiment.toml", tmp_path / "out.partial")
-    run_to_the_end(folder, tmp_path, results)
+    resume(folder, tmp_path, results)
 
 
-def test_a_part_that_is_damaged_is_done_again(folder: Path, results: Path, tmp_path: Path) -> None:
+def test_damaged_batches_are_answered_again(folder: Path, results: Path, tmp_path: Path) -> None:
     interrupt(SPEC, tmp_path / "out", folder, after=52)
     parts = tmp_path / "out.partial" / "_parts"
     first, second, *_ = sorted(parts.iterdir())
     first.write_bytes(first.read_bytes()[:-50])
     pd.read_parquet(second).iloc[1:].to_parquet(second)
     (parts / f"{MACHINE_PREFIX}left").mkdir()
-    run_to_the_end(folder, tmp_path, results)
+    resume(folder, tmp_path, results)
 
 
-def test_results_that_are_there_are_not_made_again(
+def test_finished_results_are_opened(
     folder: Path, results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", never)
+    monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", never)
     before = contents(results)
-    found = run_experiment(SPEC, results, folder=folder)
-    assert list(found) == [case.name for case in SPEC.cases]
+    evaluations = run_experiment(SPEC, results, folder=folder)
+    assert list(evaluations) == [case.name for case in SPEC.cases]
     assert contents(results) == before
 
 
@@ -297,7 +308,7 @@ def test_an_unfinished_run_of_another_experiment_is_refused(folder: Path, tmp_pa
     other = replace(SPEC, queries=5)
     with refused(InputError, "out.partial", "queries"):
         run_experiment(other, out, folder=folder)
-    shutil.rmtree(tmp_path / "out.partial" / "_parts")  # nothing is lost
+    shutil.rmtree(tmp_path / "out.partial" / "_parts")  # without answers it may be replaced
     run_experiment(other, out, folder=folder)
     assert len(open_results(out)["none/paper-top1"].queries) == 5
 
@@ -325,10 +336,10 @@ def test_folders_of_other_things_are_refused(folder: Path, tmp_path: Path) -> No
         open_results(tmp_path / "photos")
 
 
-def test_experiments_that_do_not_fit(folder: Path, tmp_path: Path) -> None:
+def test_experiments_that_do_not_fit_their_inputs_are_refused(folder: Path, tmp_path: Path) -> None:
     chain = parse_experiment(SPEC.to_toml().replace("view:180", "missing:bnech")).distortions
-    alone = tmp_path / "city.parquet"
-    shutil.copyfile(folder / alone.name, alone)
+    without_store = tmp_path / "city.parquet"
+    shutil.copyfile(folder / without_store.name, without_store)
     for changes, words in (
         ({"queries": 10**6}, ["1000000 queries", "number of cells"]),
         ({"top": (10**6,)}, ["1000000 candidates"]),
@@ -338,16 +349,16 @@ def test_experiments_that_do_not_fit(folder: Path, tmp_path: Path) -> None:
         ({"districts": Districts(file="none.gpkg", name="part")}, ["none.gpkg"]),
         ({"districts": Districts(file="parts.gpkg", name="nom")}, ["'nom'", "part"]),
         ({"districts": Districts(file="city.parquet", name="nom")}, ["cannot be read"]),
-        ({"database": str(alone), "seen_from": "anywhere"}, ["city.objects"]),
+        ({"database": str(without_store), "seen_from": "anywhere"}, ["city.objects"]),
     ):
         with refused(SemsigError, *words):
             run_experiment(replace(SPEC, **changes), tmp_path / "out", folder=folder)
         assert not (tmp_path / "out").exists()
-    # Nothing is in the way of another.
+    # The refused experiments left nothing behind that prevents a valid one.
     run_experiment(replace(SPEC, queries=5), tmp_path / "out", folder=folder)
 
 
-def test_a_later_city_is_looked_at_from_anywhere(folder: Path, tmp_path: Path) -> None:
+def test_queries_from_anywhere_in_a_later_city(folder: Path, tmp_path: Path) -> None:
     spec = replace(
         SPEC,
         queries=20,
@@ -356,31 +367,31 @@ def test_a_later_city_is_looked_at_from_anywhere(folder: Path, tmp_path: Path) -
         methods={**SPEC.methods, "generic": parse_method("likelihood:light:refined:heading=10")},
         districts=Districts(file="parts.gpkg", name="part"),
     )
-    found = run_experiment(spec, tmp_path / "out", folder=folder)
+    evaluations = run_experiment(spec, tmp_path / "out", folder=folder)
     inputs = json.loads((tmp_path / "out" / "inputs.json").read_text("utf-8"))["inputs"]
     names = ["city.parquet", "later.parquet", "later.objects", "city.objects", "parts.gpkg"]
     assert list(inputs) == names
-    refined = found["phone/generic-top1"]
+    refined = evaluations["phone/generic-top1"]
     assert refined.city == "later.parquet"
     assert refined.queries["heading_error"].notna().any()
-    lost = refined.queries[refined.queries["cell"] == -1]
-    assert len(lost)
-    assert (lost[["rank_low", "rank_high"]] == len(TOWN.database)).all(axis=None)
-    assert (lost["type_group"] == 0).all()
+    outside = refined.queries[refined.queries["cell"] == -1]
+    assert len(outside)
+    assert (outside[["rank_low", "rank_high"]] == len(TOWN.database)).all(axis=None)
+    assert (outside["type_group"] == 0).all()
     districts = pd.read_csv(tmp_path / "out" / "phone" / "generic-top1" / "districts.csv")
     assert districts["n"].sum() == 20
     assert districts["district"].tolist()[0] == "west"
     assert set(districts["district"]) <= {"west", "nook", "elsewhere"}
-    assert set(open_results(tmp_path / "out")) == set(found)
+    assert set(open_results(tmp_path / "out")) == set(evaluations)
 
 
 def test_progress_counts_every_answer(folder: Path, tmp_path: Path) -> None:
-    seen: list[tuple[int, int]] = []
-    run_experiment(SPEC, tmp_path / "out", folder=folder, progress=lambda *step: seen.append(step))
-    assert seen == [(done, 52) for done in (20, 26, 46, 52)]
+    steps: list[tuple[int, int]] = []
+    run_experiment(SPEC, tmp_path / "out", folder=folder, progress=lambda *step: steps.append(step))
+    assert steps == [(count, 52) for count in (20, 26, 46, 52)]
 
 
-def test_an_evaluation_that_is_missing(results: Path, tmp_path: Path) -> None:
+def test_missing_evaluation_is_refused(results: Path, tmp_path: Path) -> None:
     shutil.copytree(results, tmp_path / "out")
     shutil.rmtree(tmp_path / "out" / "none" / "paper-top1")
     with refused(DatabaseError, "queries.parquet", "does not exist"):
@@ -401,28 +412,30 @@ medium = "medium"
 """)
 
 
-def test_the_parts_are_all_the_work(folder: Path) -> None:
-    work = ExperimentWork(MANY_METHODS, folder)
-    assert work.parts == tuple(Part(name, n) for name in ("none", "medium") for n in range(3))
-    assert [work.queries_in(part) for part in work.parts] == [10, 10, 6] * 2
+def test_batches_cover_all_queries(folder: Path) -> None:
+    experiment = OpenExperiment(MANY_METHODS, folder)
+    expected = [QueryBatch(name, number) for name in ("none", "medium") for number in range(3)]
+    assert list(experiment.batches) == expected
+    assert [experiment.batch_size(batch) for batch in experiment.batches] == [10, 10, 6] * 2
 
 
-def test_methods_that_share_distances_answer_as_alone(
+def test_shared_distances_do_not_change_the_answers(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    work = ExperimentWork(MANY_METHODS, folder)
+    experiment = OpenExperiment(MANY_METHODS, folder)
 
     def answers(place: Path) -> dict[str, pd.DataFrame]:
         place.mkdir()
-        work.answer(place, Part("medium", 1))
+        experiment.answer(place, QueryBatch("medium", 1))
         files = sorted(place.iterdir())
         return {file.name: pd.read_parquet(file).drop(columns="seconds") for file in files}
 
     together = answers(tmp_path / "together")
-    assert list(together) == [f"medium.{name}.00001.parquet" for name in sorted(work.spec.methods)]
+    methods = sorted(MANY_METHODS.methods)
+    assert list(together) == [f"medium.{name}.00001.parquet" for name in methods]
     seeds = together["medium.fusion.00001.parquet"]["seed"]
     assert seeds.value_counts().to_dict() == {0: 3, 5: 7}
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.MEMO_BYTES", 1)
+    monkeypatch.setattr(batches, "MEMO_BYTES", 1)
     one_by_one = answers(tmp_path / "one_by_one")
     for name, table in together.items():
         assert_frame_equal(one_by_one[name], table)

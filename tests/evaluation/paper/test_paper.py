@@ -101,7 +101,7 @@ def test_a_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPa
     before = contents(reproduced)
     for name in ("build_database", "time_queries", "save_database"):
         monkeypatch.setattr(f"semsig_gis.evaluation.paper.reproduction.{name}", never)
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.run.score_queries", never)
+    monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", never)
     database = reproduced.parent / "city.parquet"
     found = reproduce(reproduced, database=database, queries=QUERIES)
     assert found.settings["queries"] == QUERIES
@@ -244,7 +244,7 @@ def test_every_figure_that_the_paper_prints_stands_beside_ours(report: Report) -
           for text in paris.GROUPS[key]),
         *(value for pair in paris.ACCURACY.values() for value in pair if value is not None),
         *paris.QUERY_MS.values(),
-        paris.ALONE,
+        paris.UNAMBIGUOUS,
     ]  # fmt: skip
     assert set(printed) <= set(told)
     points = [y for part in report.sections for plot in part.plots for _, y, _ in plot.paper]

@@ -23,7 +23,6 @@ from semsig_gis.evaluation import (
     BlockedSectors,
     ClassScores,
     CompassBias,
-    Detector,
     Distortion,
     FieldOfView,
     HiddenBehind,
@@ -31,12 +30,13 @@ from semsig_gis.evaluation import (
     Obstacles,
     QuerySpec,
     RoughRanges,
+    SimulatedDetector,
     chain_text,
     distort,
     draw_queries,
     named_distortion,
     parse_chain,
-    ready_chain,
+    prepare_chain,
 )
 from semsig_gis.localization import NOISES, NoiseSpec
 
@@ -64,7 +64,9 @@ any_distortion: st.SearchStrategy[QueryDistortion] = st.one_of(
     st.builds(HiddenBehind, width=st.floats(0, 5)),
     st.builds(Obstacles, count=st.floats(0, 9), width=st.floats(0, 9)),
     st.builds(BlockedSectors, count=st.integers(0, 5), degrees=st.floats(0, 360)),
-    st.builds(Detector, noise=st.sampled_from(list(KNOWN.values())), half=st.floats(1, 99)),
+    st.builds(
+        SimulatedDetector, noise=st.sampled_from(list(KNOWN.values())), half=st.floats(1, 99)
+    ),
 )
 chains = st.lists(any_distortion, max_size=4).map(tuple)
 
@@ -103,7 +105,7 @@ def test_any_order_of_any_distortions_gives_a_query(
 ) -> None:
     before = rows(one)
     for order in itertools.islice(itertools.permutations(chain), 6):
-        seen, again = (ready_chain(order, CITY)(one, seed, number) for _ in range(2))
+        seen, again = (prepare_chain(order, CITY)(one, seed, number) for _ in range(2))
         assert set(seen.codes.tolist()) <= set(CLASSES)
         assert ((seen.bearings >= 0) & (seen.bearings < 360)).all()
         assert (seen.distances >= 0).all()
@@ -118,17 +120,17 @@ def test_a_kind_has_the_same_chances_in_any_company(
     one: Sight, chain: tuple[QueryDistortion, ...], seed: int
 ) -> None:
     others = tuple(item for item in chain if not isinstance(item, CompassBias))
-    alone = ready_chain([CompassBias(sigma=20.0)], CITY)(one, seed, 3)
+    alone = prepare_chain([CompassBias(sigma=20.0)], CITY)(one, seed, 3)
     for place in (0, len(others)):
         order = (*others[:place], CompassBias(sigma=20.0), *others[place:])
-        assert ready_chain(order, CITY)(one, seed, 3).heading == alone.heading
+        assert prepare_chain(order, CITY)(one, seed, 3).heading == alone.heading
 
 
 def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
-    spoil = ready_chain([CompassBias(), CompassBias()], CITY)
+    spoil = prepare_chain([CompassBias(), CompassBias()], CITY)
     headings = {spoil(many(1), seed, number).heading for seed in (0, 1) for number in (0, 1, 2)}
     assert len(headings) == 6
-    once = ready_chain([CompassBias()], CITY)(many(1), 0, 0).heading
+    once = prepare_chain([CompassBias()], CITY)(many(1), 0, 0).heading
     twice = spoil(many(1), 0, 0).heading
     assert twice != pytest.approx(2.0 * once % 360.0)
 
@@ -136,7 +138,7 @@ def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
 def test_misses_and_clutter_add_up() -> None:
     # Seen in half of the turn, half of what is left is detected.
     half = NoiseSpec(detection=0.5, misnamed=0.0, clutter=0.0, name="half")
-    spoil = ready_chain(parse_chain("view:180, detector:half", noises={"half": half}), CITY)
+    spoil = prepare_chain(parse_chain("view:180, detector:half", noises={"half": half}), CITY)
     kept = np.array([len(spoil(many(1), 0, number)) for number in range(4000)])
     assert kept.mean() == pytest.approx(0.25, abs=0.04)
 
@@ -180,7 +182,7 @@ ORIGIN = np.zeros(1)
         (Obstacles, "width", [-1.0, nan, inf], ["width of the obstacles", "from 0"]),
         (BlockedSectors, "count", [-1], ["sectors", "from 0"]),
         (BlockedSectors, "degrees", [-1.0, nan, inf], ["degrees", "from 0 to 360"]),
-        (partial(Detector, noise=MINE), "half", [0.0, -3.0, nan], ["from 0.01"]),
+        (partial(SimulatedDetector, noise=MINE), "half", [0.0, -3.0, nan], ["from 0.01"]),
         (RoughRanges, "percent", [0.0, -5.0, 301.0, nan], ["error of the ranges", "to 300 %"]),
         (ClassScores, "right", [0.5, 1.0, nan], ["mean score", "from 0.51"]),
         (QuerySpec, "number", [0], ["queries", "from 1"]),
@@ -214,7 +216,7 @@ def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: l
 )
 def test_texts_of_distortions(kind: type[SemsigError], text: str, words: list[str]) -> None:
     with refused(kind, *words):
-        ready_chain(parse_chain(text, noises={**KNOWN, "misspelt": MISSPELT}), CITY)
+        prepare_chain(parse_chain(text, noises={**KNOWN, "misspelt": MISSPELT}), CITY)
 
 
 def spoil(

@@ -35,16 +35,16 @@ from semsig_gis.evaluation import (
     CitySights,
     ClassScores,
     CompassBias,
-    Detector,
     Distortion,
     FieldOfView,
     HiddenBehind,
     MissingClasses,
     Obstacles,
     RoughRanges,
+    SimulatedDetector,
     distort,
     parse_chain,
-    ready_chain,
+    prepare_chain,
 )
 from semsig_gis.localization import (
     LONGEST_TABLE,
@@ -156,7 +156,7 @@ def test_order_kept_or_sorted_again_hold_the_same_objects(one: Sight, seed: int)
 
 @given(one=sights, how=paper_errors, seed=seeds)
 def test_objects_keep_their_distances(one: Sight, how: Distortion, seed: int) -> None:
-    seen = how.ready(CITY)(one, np.random.default_rng(seed))
+    seen = how.prepare(CITY)(one, np.random.default_rng(seed))
     codes, bearings = distorted(one.signature, how, seed, weights=CITY.frequencies.tolist())
     assert seen.codes.tolist() == codes.tolist()
     assert seen.bearings.tolist() == bearings.tolist()
@@ -264,12 +264,12 @@ NAMES = {1: "alignment_tree", 3: "street_light", 5: "traffic_light", 10: "bench"
 
 
 def spoiled(how: QueryDistortion, one: Sight, seed: int = 0) -> Sight:
-    return how.ready(CITY)(one, np.random.default_rng(seed))
+    return how.prepare(CITY)(one, np.random.default_rng(seed))
 
 
 def assert_shown(how: QueryDistortion, seed: int, chance: float, distance: float = 10.0) -> None:
     """Check how often one object is left."""
-    spoil, rng = how.ready(CITY), np.random.default_rng(seed)
+    spoil, rng = how.prepare(CITY), np.random.default_rng(seed)
     shown = sum(len(spoil(many(1, distance=distance), rng)) for _ in range(1500))
     assert_rate(shown, 1500, chance)
 
@@ -277,7 +277,7 @@ def assert_shown(how: QueryDistortion, seed: int, chance: float, distance: float
 @settings(max_examples=30)
 @given(sigma=st.floats(0.5, 40.0), seed=seeds)
 def test_moments_of_a_compass(sigma: float, seed: int) -> None:
-    spoil = CompassBias(sigma=sigma).ready(CITY)
+    spoil = CompassBias(sigma=sigma).prepare(CITY)
     rng = np.random.default_rng(seed)
     off = np.array([away(spoil(many(2), rng).bearings, 90.0) for _ in range(1500)])
     assert (off[:, 0] == off[:, 1]).all()  # the same for all objects of a query
@@ -337,7 +337,7 @@ def test_of_a_view_of_a_view_the_common_part_is_told(
     first: float, second: float, seed: int
 ) -> None:
     chain = (FieldOfView(degrees=first), FieldOfView(degrees=second))
-    both = ready_chain(chain, CITY)(all_round(3600), seed, 0)
+    both = prepare_chain(chain, CITY)(all_round(3600), seed, 0)
     if len(both):
         assert both.photo.width == pytest.approx(len(both) / 10.0, abs=0.3)
         assert both.photo.sees(both.bearings).all()
@@ -345,7 +345,7 @@ def test_of_a_view_of_a_view_the_common_part_is_told(
 
 def test_nothing_false_is_out_of_a_view_that_is_told() -> None:
     for text, inside in (("view:40, errors:13", True), ("view:40:told=false, errors:13", False)):
-        seen = [ready_chain(parse_chain(text), CITY)(many(0), 0, number) for number in range(300)]
+        seen = [prepare_chain(parse_chain(text), CITY)(many(0), 0, number) for number in range(300)]
         gaps = [np.diff([*one.bearings, one.bearings[0] + 360.0]).max() for one in seen if len(one)]
         assert bool(min(gaps) >= 320.0) is inside
 
@@ -367,7 +367,7 @@ def test_rough_ranges_are_off_by_their_error(percent: float) -> None:
 def test_false_objects_are_anywhere_on_the_disc(text: str) -> None:
     noise = replace(PERFECT, clutter=70.0, name="F")
     chain = parse_chain(text.replace("F", "detector:F"), noises={"F": noise})
-    seen = [ready_chain(chain, CITY)(many(0), 0, number) for number in range(40)]
+    seen = [prepare_chain(chain, CITY)(many(0), 0, number) for number in range(40)]
     squares = (np.concatenate([one.ranges for one in seen if one.ranges is not None]) / REACH) ** 2
     assert len(squares) > 300
     assert 0.0 < squares.min() <= squares.max() <= 1.0
@@ -468,7 +468,7 @@ def test_detection_naming_and_bearings_are_those_of_the_model(
     noise = replace(noise, bearing_sigma_by_class={"bench": noise.bearing_sigma / 3})
     table = table_of(noise)
     kind = int(table.row_of[code])
-    seen = spoiled(Detector(noise=noise), many(TRIALS, code=code, distance=17.0), seed)
+    seen = spoiled(SimulatedDetector(noise=noise), many(TRIALS, code=code, distance=17.0), seed)
     assert (np.diff(seen.bearings) >= 0).all()
     assert seen.heading == 0.0
     true = seen.only(seen.distances == 17.0)  # false objects seem to be anywhere else
@@ -486,7 +486,7 @@ def test_detection_naming_and_bearings_are_those_of_the_model(
 @given(noise=noise_specs(), seed=seeds)
 def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> None:
     table = table_of(noise)
-    spoil = Detector(noise=noise).ready(CITY)
+    spoil = SimulatedDetector(noise=noise).prepare(CITY)
     rng = np.random.default_rng(seed)
     found = [spoil(many(0), rng) for _ in range(600)]
     for code, mean in zip(table.codes, table.clutter, strict=True):
@@ -501,7 +501,9 @@ def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> No
 
 @given(half=st.floats(3.0, 60.0), distance=st.floats(0.0, REACH), seed=seeds)
 def test_detection_falls_with_distance(half: float, distance: float, seed: int) -> None:
-    seen = spoiled(Detector(noise=PERFECT, half=half), many(TRIALS, distance=distance), seed)
+    seen = spoiled(
+        SimulatedDetector(noise=PERFECT, half=half), many(TRIALS, distance=distance), seed
+    )
     nearby = 1.0 - float(table_of(PERFECT).missed[LONGEST_TABLE, 1])
     chance = nearby * 0.5 ** ((distance / half) ** 2)
     # Hardly a false object in a thousand signatures.
@@ -510,7 +512,7 @@ def test_detection_falls_with_distance(half: float, distance: float, seed: int) 
 
 
 def test_a_step_aside_turns_near_objects_most() -> None:
-    spoil = Detector(noise=replace(PERFECT, position_sigma=0.5)).ready(CITY)
+    spoil = SimulatedDetector(noise=replace(PERFECT, position_sigma=0.5)).prepare(CITY)
     rng = np.random.default_rng(1)
     for distance in (5.0, 25.0):
         bearings = np.concatenate(
@@ -525,7 +527,7 @@ def test_a_step_aside_turns_near_objects_most() -> None:
 
 def test_of_a_mixture_one_model_makes_a_query() -> None:
     both = NoiseMixture(specs=(replace(PERFECT, detection=0.05), PERFECT), weights=(0.25, 0.75))
-    spoil = Detector(noise=both).ready(CITY)
+    spoil = SimulatedDetector(noise=both).prepare(CITY)
     rng = np.random.default_rng(2)
     shares = np.array([len(spoil(many(200), rng)) / 200 for _ in range(800)])
     assert ((shares < 0.2) | (shares > 0.9)).all()
@@ -534,7 +536,7 @@ def test_of_a_mixture_one_model_makes_a_query() -> None:
 
 def test_the_levels_of_the_paper_lose_objects_by_number() -> None:
     # Of few objects, seven errors leave a smaller share than of many.
-    spoil = Detector(noise=named_noise("medium")).ready(CITY)
+    spoil = SimulatedDetector(noise=named_noise("medium")).prepare(CITY)
     rng = np.random.default_rng(3)
     few, lots = (
         np.mean([(spoil(many(n), rng).distances == 10.0).sum() / n for _ in range(600)])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation import Query, SeenFrom
+    from semsig_gis.evaluation import SeenFrom, SimulatedQuery
 
 TOWN = random_town()
 DATABASE = TOWN.database
@@ -33,7 +33,7 @@ PLAIN = QuerySpec(number=40, distortions=())
 ANYWHERE = replace(PLAIN, seen_from="anywhere")
 
 
-def rows(query: Query) -> list[tuple[int, float]]:
+def rows(query: SimulatedQuery) -> list[tuple[int, float]]:
     return list(zip(query.asked.codes.tolist(), query.asked.bearings.tolist(), strict=True))
 
 
@@ -120,7 +120,7 @@ def test_more_queries_than_places_outside() -> None:
         draw_queries(DATABASE, replace(ANYWHERE, number=200), store=store_with(house))
 
 
-def row_of(city: SignatureDatabase, query: Query) -> int:
+def row_of(city: SignatureDatabase, query: SimulatedQuery) -> int:
     """Return the row of the cell from whose viewpoint a query is seen, -1 if there is none."""
     (found,) = np.nonzero((city.xy == query.xy).all(axis=1))
     return int(found[0]) if len(found) else -1

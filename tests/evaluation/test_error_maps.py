@@ -12,8 +12,7 @@ from sentences import refused
 from small_city import small_city, small_evaluation
 
 from semsig_gis.core import InputError
-from semsig_gis.evaluation import ENOUGH, RADII, guess_error
-from semsig_gis.evaluation.error_field import error_field
+from semsig_gis.evaluation import ENOUGH_QUERIES, RADII, error_field, guess_error
 
 CITY, EVALUATION = small_city()[0], small_evaluation()
 XY = np.stack([EVALUATION.queries.geometry.x, EVALUATION.queries.geometry.y], axis=1)
@@ -55,7 +54,7 @@ def test_the_radius_grows_until_enough_queries_speak() -> None:
     moved = queries.set_geometry(gpd.points_from_xy(*apart.T, crs=queries.crs))
     field = error_field(dataclasses.replace(EVALUATION, queries=moved), CITY)
     assert field.radius in RADII[1:]
-    assert np.median(field.at(apart)[1]) >= ENOUGH
+    assert np.median(field.at(apart)[1]) >= ENOUGH_QUERIES
     one = dataclasses.replace(EVALUATION, queries=queries[:1])
     assert error_field(one, CITY).radius == RADII[-1]
 

@@ -1,4 +1,4 @@
-"""Where queries fail, and by how much: means of those around every place of a city."""
+"""Maps of failures and errors: weighted means of the queries around every place of a city."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation.result import Evaluation
 
-RADII = (250.0, 500.0, 1000.0, 2500.0, 5000.0)  # metres, of which the data decide
-ENOUGH = 5.0
-"""How many queries must speak of a place, lest its mean be of a few alone."""
+RADII = (250.0, 500.0, 1000.0, 2500.0, 5000.0)  # metres; the first with enough queries is used
+ENOUGH_QUERIES = 5.0
+"""Least effective number of queries at the median place, so that means are not of single ones."""
 
-PIXELS = 10  # to a radius
-MOST_PIXELS = 1 << 10  # across a city as wide as high
+RADIUS_PIXELS = 10
+MOST_PIXELS = 1 << 10  # across a square city
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ErrorField(Displayed):
-    """What became of the queries around each pixel of a grid.
+    """Share of failed queries and mean error around each pixel of a grid.
 
     Parameters
     ----------
     radius : float
-        How far away a query counts, in metres; the nearer, the more.
+        Distance up to which a query counts, in metres; nearer queries count more.
     grid : GridSpec
         The pixels, in the CRS of the city; pixel (0, 0) is the one in the south-west.
     failed : ndarray of float64, shape (rows, columns)
-        Weighted share of these queries that failed, from south to north; NaN where none is near.
+        Weighted share of these queries that failed, from south to north; NaN without queries.
     errors : ndarray of float64, shape (rows, columns)
-        Weighted mean of their expected errors in metres; NaN where none is near.
+        Weighted mean of their expected errors in metres; NaN without queries.
     speaking : ndarray of float64, shape (rows, columns)
-        Their effective number (Kish): so many of equal weight would say as much.
+        Effective number of queries (Kish): the number of equal weight with the same variance.
 
     Examples
     --------
@@ -65,15 +65,16 @@ class ErrorField(Displayed):
         }
 
     def at(self, xy: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the share that failed and how many speak at places, shape (..., 2).
+        """Return the failed share and the effective number of queries at places, shape (..., 2).
 
-        Both are interpolated between the pixels around.
+        Both are interpolated between the four nearest pixels.
         """
         places = (xy - np.array(self.grid.origin)) / self.grid.step - 0.5
         first = np.floor(places).astype(np.int64)
         rest = places - first
         rows, columns = self.failed.shape
-        failed, speaking, told = (np.zeros(xy.shape[:-1]) for _ in range(3))
+        # `valid` is the weight of the pixels that have a value.
+        failed, speaking, valid = (np.zeros(xy.shape[:-1]) for _ in range(3))
         for right, up in itertools.product((0, 1), repeat=2):
             column, row = first[..., 0] + right, first[..., 1] + up
             inside = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
@@ -81,36 +82,36 @@ class ErrorField(Displayed):
             weight = np.abs(1 - right - rest[..., 0]) * np.abs(1 - up - rest[..., 1]) * inside
             failed += weight * np.nan_to_num(self.failed[pixel])
             speaking += weight * self.speaking[pixel]
-            told += weight * np.isfinite(self.failed[pixel])
-        known = told >= 0.5  # noqa: PLR2004 - the nearest pixels are known
-        return np.divide(failed, told, out=np.full(told.shape, np.nan), where=known), speaking
+            valid += weight * np.isfinite(self.failed[pixel])
+        enough = valid >= 0.5  # noqa: PLR2004 - at least half of the weight
+        return np.divide(failed, valid, out=np.full(valid.shape, np.nan), where=enough), speaking
 
 
 def guess_error(database: SignatureDatabase) -> float:
-    """Return how far two random cells lie apart: the error of a guess (root mean square)."""
+    """Return the root mean square distance of two random cells: the error of a guess."""
     return math.sqrt(2.0 * float(database.xy.var(axis=0).sum())) or database.grid.step
 
 
 def error_field(
     evaluation: Evaluation, database: SignatureDatabase, *, radius: float | None = None
 ) -> ErrorField:
-    """Return which share of the queries around every place failed, and by how much they are off.
+    """Return the share of failed queries and the mean error around every place.
 
     Parameters
     ----------
     evaluation : Evaluation
-        The queries and what became of them.
+        The queries and their outcomes.
     database : SignatureDatabase
-        The database that was searched.
+        The searched database.
     radius : float, optional
-        How far away a query counts, in metres, at least the step of the grid; by default the first
-        of 250, 500, 1,000, 2,500 and 5,000 m with which 5 queries or more speak of half of their
-        places.
+        Distance up to which a query counts, in metres, at least the step of the grid; by default
+        the first of 250, 500, 1,000, 2,500 and 5,000 m with an effective number of at least 5
+        queries at half of the places of the queries.
 
     Returns
     -------
     ErrorField
-        The field, as far as a query is near.
+        The field, with NaN at places without queries.
 
     Raises
     ------
@@ -119,9 +120,8 @@ def error_field(
 
     Notes
     -----
-    A query at distance d counts with the quartic kernel (1 - (d / r)^2)^2 of the radius r. An error
-    counts with at most that of a guess, `guess_error`, so that queries of which nothing was left
-    count, too.
+    A query at distance d counts with the quartic kernel (1 - (d / r)^2)^2 of the radius r. Errors
+    are limited to that of a guess (`guess_error`), so that queries without objects count, too.
 
     Examples
     --------
@@ -131,10 +131,10 @@ def error_field(
     >>> bool(0.0 <= np.nanmin(field.failed) and np.nanmax(field.failed) <= 1.0)
     True
     """
-    evaluation.rows_in(database)  # refuses another database
+    evaluation.rows_in(database)  # raises InputError for another database
     queries = evaluation.queries
     xy = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
-    # As far as the pixels are not too many in all.
+    # The radius must not be so small that there are too many pixels.
     across = math.sqrt(float(np.ptp(xy, axis=0).prod()))
     least = max(2.0 * across / MOST_PIXELS, database.grid.step)
     if radius is not None and not (math.isfinite(radius) and radius >= least):
@@ -144,9 +144,9 @@ def error_field(
         )
     errors = np.minimum(queries["error_m"].to_numpy(np.float64), guess_error(database))
     values = np.stack([~evaluation.successful, errors], axis=1)
-    for some in RADII if radius is None else (radius,):
-        field = _field(xy, values, database.grid, max(some, least))
-        if np.median(field.at(xy)[1]) >= ENOUGH:
+    for metres in RADII if radius is None else (radius,):
+        field = _field(xy, values, database.grid, max(metres, least))
+        if np.median(field.at(xy)[1]) >= ENOUGH_QUERIES:
             break
     return field
 
@@ -154,10 +154,11 @@ def error_field(
 def _field(
     xy: NDArray[np.float64], values: NDArray[np.float64], grid: GridSpec, radius: float
 ) -> ErrorField:
-    """Return the means of two values of queries: whether they failed, and their errors."""
+    """Return the weighted means of two values of queries: whether they failed, and their errors."""
+    # The pixels: a whole number of cells wide, and a margin of the radius around the queries.
     across = math.sqrt(float((np.ptp(xy, axis=0) + 2.0 * radius).prod()))
-    finest = max(radius / PIXELS, across / MOST_PIXELS)
-    step = grid.step * max(1, round(finest / grid.step))  # pixels hold whole cells
+    finest = max(radius / RADIUS_PIXELS, across / MOST_PIXELS)
+    step = grid.step * max(1, round(finest / grid.step))
     reach = math.ceil(radius / step)
     columns, rows = GridSpec(step, grid.origin).cells_at(xy)
     corner = np.array([columns.min() - reach, rows.min() - reach])
@@ -165,11 +166,12 @@ def _field(
     origin = np.array(grid.origin) + corner * step
     width, height = (pixels.max(axis=0) + reach + 1).tolist()
     failed, errors, weights, squares = np.zeros((4, height, width))
-    aside = (xy - origin) / step - 0.5 - pixels
+    offsets = (xy - origin) / step - 0.5 - pixels
+    # Each query adds its weighted values to every pixel within the radius.
     for right, up in itertools.product(range(-reach, reach + 1), repeat=2):
-        away = ((aside - [right, up]) ** 2).sum(axis=1) * (step / radius) ** 2
-        near = away < 1.0
-        weight = (1.0 - away[near]) ** 2
+        squared = ((offsets - [right, up]) ** 2).sum(axis=1) * (step / radius) ** 2
+        near = squared < 1.0
+        weight = (1.0 - squared[near]) ** 2
         pixel = pixels[near, 1] + up, pixels[near, 0] + right
         np.add.at(weights, pixel, weight)
         np.add.at(squares, pixel, weight**2)
