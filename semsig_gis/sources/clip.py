@@ -138,7 +138,7 @@ def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np
         places = shapely.centroid(places)
     narrowed = _narrowed(area.polygon, area)
     shapely.prepare(narrowed)
-    # The rows so far are not covered by the area; of these, keep the ones that do not touch it.
+    # All these rows are not covered by the area; of these, keep the ones that do not touch it.
     disjoint = ~shapely.intersects(narrowed, places)
     outside[outside] = disjoint
     return outside, places[disjoint]

@@ -19,9 +19,9 @@ from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.rows import (
     WGS84,
     RowRules,
+    choose_crs,
     fits_the_globe,
     raw_layer,
-    settle_crs,
     usable_crs,
 )
 from semsig_gis.sources.vector import by_pyogrio
@@ -119,7 +119,7 @@ def read_layer(
     if layer.geometry == NO_GEOMETRY:
         raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
     rules = RowRules(spec, layer.fields, filters=filters, where=where)
-    table = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
+    table = _read_member(member, layer, rules.fields, expected=spec.crs, requested=crs, where=where)
     return raw_layer(table.rows, rules, table.crs, by_file=table.by_file, notes=table.notes)
 
 
@@ -144,7 +144,9 @@ def read_tables(
     for member, layer in layers:
         if names := choose(layer.fields):
             fields = tuple(field for field in layer.fields if field in names)
-            yield _read_member(member, layer, fields, expected=None, given=crs, where=str(member))
+            yield _read_member(
+                member, layer, fields, expected=None, requested=crs, where=str(member)
+            )
 
 
 def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
@@ -166,12 +168,14 @@ def _read_member(
     fields: tuple[str, ...],
     *,
     expected: str | None,
-    given: str | None,
+    requested: str | None,
     where: str,
 ) -> TableRows:
-    """Read a layer; its CRS is that of the file, or the `given` one, or the `expected` one."""
+    """Read a layer; its CRS is that of the file, or the `requested` one, or the `expected` one."""
     own, implicit = _own_crs(member, layer)
-    system, notes = settle_crs(own, implicit=implicit, expected=expected, given=given, where=where)
+    system, notes = choose_crs(
+        own, implicit=implicit, expected=expected, requested=requested, where=where
+    )
     rows = read_whole(member, fields, layer.rows)
     if rows is None:
         rows, more = _row_reader()(member, fields, layer.rows)
@@ -299,7 +303,7 @@ def _geojson(member: Member) -> dict[str, Any]:
 
 
 def _mark_invalid(rows: Rows, member: Member) -> None:
-    """Mark the rows of a GeoJSON file whose geometry is not null but could not be read."""
+    """Mark the rows of a GeoJSON file with a geometry that is not null but cannot be read."""
     null = [row for row, position in enumerate(rows.positions) if position is None]
     if not null:
         return
