@@ -1,4 +1,4 @@
-"""Pages as an HTML parser sees them."""
+"""Parsed HTML pages for tests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ON_A_NEW_LINE = {"p", "br", "tr", "table"}
 
 
 class HtmlPage(HTMLParser):
-    """The elements of a page or a part of it, which must nest, its text, and what it would load."""
+    """Tags, text and loaded addresses of a page or a part of it; its elements must be nested."""
 
     def __init__(self, page: str) -> None:
         super().__init__()

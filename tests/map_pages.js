@@ -1,4 +1,4 @@
-// What the tests ask a page about its one map.
+// Functions that tests call on a page with a map.
 
 const map = Object.values(window).find((value) => value instanceof L.Map);
 
@@ -11,18 +11,18 @@ const shown = (test) => {
 const circles = (colour) =>
   shown((layer) => layer instanceof L.CircleMarker && layer.options.fillColor === colour);
 
-// The queries that are drawn and became this, as signs.
+// The visible queries with an outcome, as signs.
 const queries = (outcome) => {
-  const { about, data, placeOf, selection } = semsig.held.queries;
+  const { about, data, placeOf, selection } = semsig.layerSets.queries;
   return selection()
-    .filter((one) => about.outcomes[data.outcome[one]].name === outcome)
-    .map((one) => ({
-      getLatLng: () => L.latLng(placeOf(one)),
-      fire: () => semsig.openers.query(map, String(one + 1)),
+    .filter((index) => about.outcomes[data.outcome[index]].name === outcome)
+    .map((index) => ({
+      getLatLng: () => L.latLng(placeOf(index)),
+      fire: () => semsig.openers.query(map, String(index + 1)),
     }));
 };
 
-// Signs by their colour, or queries by what became of them.
+// Signs by their colour, or queries by their outcome.
 const signs = (kind) => (kind.startsWith("#") ? circles(kind) : queries(kind));
 
 const lines = (test) => shown((layer) => layer.getLatLngs && test(layer));
@@ -34,20 +34,20 @@ const atRest = (then, frames = 3) => {
   else requestAnimationFrame(() => atRest(then, moves ? 3 : frames - 1));
 };
 
-// Kept once the arrays that the page has begun to unpack are there.
+// Resolves when the arrays that the page has begun to unpack are ready.
 const unpacked = () => Promise.all(window.unpacking);
 
-// What the panel says.
+// The text of the panel.
 const panel = () => document.querySelector(".semsig-panel").innerText;
 
-// What a circle says when it is clicked.
+// The text of the panel after a click on a circle.
 const content = (circle) => {
   circle.fire("click");
   return panel();
 };
 
-// The place that the panel tells of.
-const toldPlace = () => map.semsigPanel.told.place;
+// The place of the panel.
+const panelPlace = () => map.semsigPanel.selection.place;
 
 const height = (element) => element.getBoundingClientRect().height;
 
@@ -87,17 +87,17 @@ const field = (call) => {
 };
 
 // The colours of the field at places, each in the middle of the map.
-const fieldAt = (places, zoom, done, told = []) => {
-  if (told.length === places.length) return done(told);
-  map.setView(places[told.length], zoom, { animate: false });
+const fieldAt = (places, zoom, done, colours = []) => {
+  if (colours.length === places.length) return done(colours);
+  map.setView(places[colours.length], zoom, { animate: false });
   return field((pixels) => {
-    const { x, y } = map.latLngToContainerPoint(places[told.length]);
+    const { x, y } = map.latLngToContainerPoint(places[colours.length]);
     const [red, green, blue] = pixels(x, y, 1).data;
-    fieldAt(places, zoom, done, [...told, [red, green, blue]]);
+    fieldAt(places, zoom, done, [...colours, [red, green, blue]]);
   });
 };
 
-// Which share of a square in the middle of the map the field covers.
+// The share of a square in the middle of the map that the field covers.
 const fieldCover = (size, done) =>
   field((pixels) => {
     const { x, y } = map.getSize().divideBy(2);
@@ -105,9 +105,9 @@ const fieldCover = (size, done) =>
     done(data.filter((value, at) => at % 4 === 3 && value > 127).length / size ** 2);
   });
 
-// Which share of its box the sign of an outcome covers.
+// The share of its box that the sign of an outcome covers.
 const signArea = (outcome) => {
-  const { outline } = semsig.held.queries.about.outcomes.find(({ name }) => name === outcome);
+  const { outline } = semsig.layerSets.queries.about.outcomes.find(({ name }) => name === outcome);
   const size = outline.includes("A") ? 50 : 50 / 1.2;
   const { colour } = semsig.sprite(60, (ctx) => {
     ctx.scale(size, size);
@@ -116,17 +116,17 @@ const signArea = (outcome) => {
   return colour.length / 100 ** 2;
 };
 
-// Where the first objects are that are called by their numbers.
+// The places of the first objects, which the search finds by their numbers.
 const placesOfObjects = (count, done) => {
   const places = [];
   const look = () => {
-    for (let one = 0; one < count; one += 1) {
+    for (let number = 0; number < count; number += 1) {
       const name = semsig.finders
-        .flatMap((finder) => finder(String(one), 99))
-        .find((other) => other.name === String(one));
+        .flatMap((finder) => finder(String(number), 99))
+        .find((offer) => offer.name === String(number));
       if (!name) return setTimeout(look, 50);
       name.show(map);
-      const place = toldPlace();
+      const place = panelPlace();
       places.push([place.lat, place.lng]);
     }
     return done(places);
@@ -143,23 +143,23 @@ const clickAt = (marker, side) => {
   marker.fire("click");
 };
 
-// Where the objects of a wheel are drawn, from its middle.
+// The positions of the objects in a wheel, relative to its middle.
 const signPlaces = (wheel) =>
   [...wheel.querySelectorAll(".object > g")].map((sign) => {
     const { e, f } = sign.transform.baseVal.consolidate().matrix;
     return [e, f];
   });
 
-// The objects on the map that are lit, by place.
+// The places of the highlighted objects on the map.
 const litPlaces = () =>
   shown((layer) => layer.getElement?.()?.matches?.(".semsig-object.lit")).map((layer) => {
     const { lat, lng } = layer.getLatLng();
     return [lat, lng];
   });
 
-// How many offers of the search are covered by something else.
+// The number of search results that are covered by something else.
 const covered = () =>
-  [...document.querySelectorAll("[role=option]")].filter((one) => {
-    const box = one.getBoundingClientRect();
-    return !one.contains(document.elementFromPoint(box.left + 10, box.top + box.height / 2));
+  [...document.querySelectorAll("[role=option]")].filter((option) => {
+    const box = option.getBoundingClientRect();
+    return !option.contains(document.elementFromPoint(box.left + 10, box.top + box.height / 2));
   }).length;

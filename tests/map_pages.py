@@ -1,4 +1,4 @@
-"""Maps in a real browser, and data that tries to harm them."""
+"""Pages of maps in a browser, and hostile data for tests."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HOSTILE = (
 IMAGES = "img.leaflet-image-layer"
 LEGEND = ".semsig-legend"
 
-# Run before each page: what it unpacks is known.
+# Run before each page: collects the promises of arrays that the page unpacks.
 UNPACKING = """
 window.unpacking = [];
 for (const name of ["arrayBuffer", "json"]) {
@@ -46,7 +46,7 @@ for (const name of ["arrayBuffer", "json"]) {
 }
 """
 READY = "unpacked().then(() => requestAnimationFrame(() => arguments[0]()));"
-# What the script of a page can be asked about its one map.
+# JavaScript functions that tests call on a page with a map.
 ASK = Path(__file__).with_name("map_pages.js").read_text(encoding="utf-8")
 
 
@@ -69,14 +69,14 @@ class MapPage:
         self.ask_later(READY)
 
     def ask_later(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
-        """Return what a script hands to the last of its arguments."""
+        """Return what a script passes to its last argument, a callback."""
         return self.browser.execute_async_script(ASK + script, *arguments)
 
     def ask(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
         return self.browser.execute_script(ASK + script, *arguments)
 
     def circles(self, kind: str) -> int:
-        """Return the number of circles of a colour, or of queries that became something."""
+        """Return the number of circles of a colour, or of queries with an outcome."""
         return int(self.ask("return signs(arguments[0]).length", kind))
 
     def drawn(self, colour: str, canvas: str = ".leaflet-marker-pane canvas") -> int:
@@ -91,12 +91,12 @@ class MapPage:
         return self.browser.find_elements(By.CSS_SELECTOR, selector)
 
     def text(self, selector: str) -> str:
-        """Return the text of the first such element, shown or not."""
+        """Return the text of the first such element, even if it is hidden."""
         return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
 
     def texts(self, selector: str) -> list[str]:
-        """Return the texts of all such elements as they are shown, much faster than one by one."""
-        script = "return [...document.querySelectorAll(arguments[0])].map((one) => one.innerText)"
+        """Return the visible texts of all such elements, in a single fast request."""
+        script = "return [...document.querySelectorAll(arguments[0])].map((part) => part.innerText)"
         return [text.strip() for text in self.ask(script, selector)]
 
     def layers(self) -> list[str]:
@@ -105,25 +105,25 @@ class MapPage:
 
     def switch(self, name: str) -> None:
         """Click a layer in the layer control."""
-        at = next(at for at, one in enumerate(self.layers()) if one.startswith(name))
+        at = next(at for at, layer in enumerate(self.layers()) if layer.startswith(name))
         self.all(".leaflet-control-layers-overlays label")[at].click()
 
     def search(self, text: str, *keys: str) -> list[str]:
-        """Paste something into the search box, type its end, press keys; return what it offered.
+        """Search for a text and press keys; return the results once the map is at rest.
 
-        Returns once the map lies still.
+        Only the last two characters are typed, the others are pasted.
         """
         box = self.one(".semsig-search input")
         self.ask("arguments[0].value = arguments[1]", box, text[:-2])
         box.send_keys(text[-2:])
-        offered = self.texts(".semsig-search [role=option]")
+        results = self.texts(".semsig-search [role=option]")
         for key in keys:
             box.send_keys(key)
         self.rest()
-        return offered
+        return results
 
     def rest(self) -> None:
-        """Wait until arrays are unpacked, canvases are drawn, and the map lies still."""
+        """Wait until arrays are unpacked, canvases are drawn, and the map is at rest."""
         self.ask_later("unpacked().then(() => atRest(arguments[0]))")
 
     def until_gone(self, selector: str) -> None:
@@ -131,12 +131,12 @@ class MapPage:
         WebDriverWait(self.browser, PATIENCE_S).until(lambda _: self.all(selector) == [])
 
     def panel(self) -> str:
-        """Return what the panel says, nothing if it is closed."""
+        """Return the text of the panel, empty if it is closed."""
         self.rest()
         return str(self.ask("return panel()"))
 
-    def told(self) -> dict[str, str]:
-        """Return what the panel says by its labels, its ``title``, and all of it as ``text``."""
+    def facts(self) -> dict[str, str]:
+        """Return the values of the panel by label, its ``title``, and the whole ``text``."""
         text = self.panel()
         title, *lines = text.splitlines()
         pairs = (line.split("\t", 1) for line in lines if "\t" in line)
@@ -144,21 +144,21 @@ class MapPage:
         return {"text": text, "title": title.strip(), **labels}
 
     def click(self, database: SignatureDatabase, cell: int) -> dict[str, str]:
-        """Click the middle of a cell; return what the panel says."""
+        """Click the middle of a cell; return the facts in the panel."""
         to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
         self.click_at(to_degrees.transform(*database.xy[cell].tolist()))
-        return self.told()
+        return self.facts()
 
     def click_at(self, latlon: Sequence[float]) -> None:
         self.ask("map.fire('click', {latlng: L.latLng(...arguments)})", *latlon)
 
     def panel_of(self, kind: str) -> str:
-        """Click the first circle of a colour, or query; return what the panel says."""
+        """Click the first circle of a colour, or query of an outcome; return the panel text."""
         self.ask("signs(arguments[0])[0].fire('click')", kind)
         return self.panel()
 
     def point_at(self, circle: str, *arguments: object) -> None:
-        """Click a circle, which a script returns, with the mouse, from close to."""
+        """Zoom to the circle that a script returns and click it with the mouse."""
         script = f"""
         const place = ({circle}).getLatLng();
         map.setView(place, 20, {{animate: false}});
@@ -175,13 +175,13 @@ class MapPage:
         return [line.replace("\n", " ") for line in self.texts(".semsig-jumps")]
 
     def press(self, text: str) -> dict[str, str]:
-        """Press the first button of the panel with a text or hint; return what it says then."""
+        """Press the first button of the panel with a text or hint; return the new facts."""
         script = """
         const buttons = [...document.querySelectorAll(".semsig-jumps button")];
-        return buttons.find((one) => `${one.innerText} ${one.title}`.includes(arguments[0]));
+        return buttons.find(({innerText, title}) => `${innerText} ${title}`.includes(arguments[0]));
         """
         self.ask(script, text).click()
-        return self.told()
+        return self.facts()
 
     @contextmanager
     def screen(
@@ -194,9 +194,9 @@ class MapPage:
         media: str = "",
         moving: bool = False,
     ) -> Iterator[None]:
-        """Make the window as large as a screen, or as a sheet of a printer.
+        """Set the size of the window, or of a printed page.
 
-        Only where `moving` does the map glide, as for most people.
+        With `moving`, reduced motion is off and the map glides.
         """
         size = {"width": width, "height": height, "deviceScaleFactor": dots, "mobile": mobile}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
@@ -210,14 +210,14 @@ class MapPage:
             self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
     def assert_text_stays_text(self) -> None:
-        """Check that no text from data became an element of the page."""
+        """Check that no text from data is an element of the page."""
         for element in ("script", "img"):
             assert self.all(f"{LEGEND} {element}, .semsig-panel {element}") == []
 
 
 def assert_quiet(browser: Chrome) -> None:
-    """Check that the page reported no error and asked for nothing."""
-    # `drawn` reads canvases back, for which Chromium has an advice, not an error.
+    """Check that the page reported no error and requested nothing."""
+    # Chromium logs advice about canvases that `drawn` reads back, which is no error.
     messages = [entry["message"] for entry in browser.get_log("browser")]
     assert [message for message in messages if "willReadFrequently" not in message] == []
     assert browser.execute_script("return performance.getEntriesByType('resource').length") == 0
@@ -227,7 +227,7 @@ def assert_quiet(browser: Chrome) -> None:
 
 
 def requested(browser: Chrome) -> list[str]:
-    """Return the addresses that the browser asked for since its logs were read."""
+    """Return the addresses that the browser requested since its logs were read."""
     events = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     return [
         event["params"]["request"]["url"]
@@ -237,11 +237,11 @@ def requested(browser: Chrome) -> list[str]:
 
 
 def hostile_taxonomy(taxonomy: Taxonomy, harm: str = HOSTILE) -> Taxonomy:
-    classes = (replace(one, title=f"{one.symbol} {harm}") for one in taxonomy.classes)
+    classes = (replace(item, title=f"{item.symbol} {harm}") for item in taxonomy.classes)
     return Taxonomy(tuple(classes))
 
 
 def hostile_database(database: SignatureDatabase) -> SignatureDatabase:
-    """Return the database with a taxonomy and licences that try to do harm."""
+    """Return the database with hostile class titles and licences."""
     taxonomy = hostile_taxonomy(database.taxonomy)
     return replace(database, taxonomy=taxonomy, licenses=(f"{HOSTILE}: {HOSTILE}",))

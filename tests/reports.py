@@ -1,4 +1,4 @@
-"""Reports to write: an ordinary one, and one whose texts try to do harm."""
+"""Reports for tests: an ordinary one, and one with hostile texts."""
 
 from __future__ import annotations
 
@@ -30,62 +30,64 @@ LONG = f"{HARM} {'long ' * 2000}{'M' * 10_000}"
 def texts(svg: bytes) -> list[str]:
     """Return the texts of a drawing."""
     namespace = "{http://www.w3.org/2000/svg}"
-    return [found.text or "" for found in ET.fromstring(svg).iter(f"{namespace}text")]  # noqa: S314
+    return [element.text or "" for element in ET.fromstring(svg).iter(f"{namespace}text")]  # noqa: S314
 
 
 def plot(name: str = "errors", *, curves: int = 2, points: int = 30, **options: Any) -> Plot:  # noqa: ANN401
-    """Return a plot of curves that rise."""
-    made = []
+    """Return a plot of rising curves."""
+    lines = []
     for number in range(curves):
         rise = [(step / points) ** (1 + number) for step in range(points)]
         low, high = (tuple(y * share for y in rise) for share in (0.9, 1.1))
         x = tuple(map(float, range(points)))
-        made.append(Curve(label=f"curve {number}", x=x, y=tuple(rise), low=low, high=high))
-    given = {"title": "Errors", "x_label": "error (m)", "y_label": "share", **options}
-    return Plot(name=name, curves=tuple(made), **given)
+        lines.append(Curve(label=f"curve {number}", x=x, y=tuple(rise), low=low, high=high))
+    settings = {"title": "Errors", "x_label": "error (m)", "y_label": "share", **options}
+    return Plot(name=name, curves=tuple(lines), **settings)
 
 
 def scene(name: str = "place", *, objects: int = 3, **options: Any) -> Scene:  # noqa: ANN401
-    """Return a scene with objects of the paper's classes all around."""
-    seen = tuple(
+    """Return a scene with objects of the classes of the paper on all sides."""
+    visible = tuple(
         SceneObject(code=1 + number % 11, east=-20.0 + number % 40, north=number / 3)
         for number in range(objects)
     )
     others = (SceneObject(code=3, east=-30.0, north=20.0),)
-    types = paper_taxonomy().decode([item.code for item in seen])
-    given: dict[str, Any] = {"title": "A place", "error_m": 12.0, "types": types}
+    types = paper_taxonomy().decode([item.code for item in visible])
+    settings: dict[str, Any] = {"title": "A place", "error_m": 12.0, "types": types}
     place = {"lon": 2.3, "lat": 48.8, "radius": 30.0, "taxonomy": paper_taxonomy()}
-    return Scene(name=name, objects=seen, others=others, **{**given, **place, **options})
+    return Scene(name=name, objects=visible, others=others, **{**settings, **place, **options})
 
 
 def outcome_map(name: str = "where", *, places: int = 5, **options: Any) -> OutcomeMap:  # noqa: ANN401
-    """Return a map of places on a strip of cells, every other one of a successful query."""
-    given: dict[str, Any] = {
+    """Return a map of places of queries on a strip of cells, every second one successful."""
+    settings: dict[str, Any] = {
         "title": "Places",
         "step": 10.0,
         "ground": np.ones((2, 3), np.bool_),
         "places": np.linspace((1.0, 1.0), (29.0, 19.0), places),
         "successful": np.arange(places) % 2 == 0,
     }
-    return OutcomeMap(name=name, **{**given, **options})
+    return OutcomeMap(name=name, **{**settings, **options})
 
 
 def report(*sections: Section, **options: Any) -> Report:  # noqa: ANN401
-    given = {"title": "Report", "taxonomy": paper_taxonomy(), "sections": sections}
-    return Report(**{**given, **options})
+    settings = {"title": "Report", "taxonomy": paper_taxonomy(), "sections": sections}
+    return Report(**{**settings, **options})
 
 
 def ordinary_report() -> Report:
-    """Return a report with something of every kind."""
+    """Return a report with all kinds of content."""
     numbers = (
         Number("R = 20 m", "P", 0.21, low=0.2, high=0.22, paper=0.1793),
         Number("R = 20 m", "recall", 0.5, paper=0.511),
         Number("R = 30 m", "P", None, paper=0.3733),
         Number("R = 30 m", "median", float("inf"), unit="m", decimals=1),
     )
-    drawn = plot(points=3, paper=((2.0, 0.5, "Table 5"),))
+    errors_plot = plot(points=3, paper=((2.0, 0.5, "Table 5"),))
     return report(
-        Section(name="range", title="Range", text=("Words.",), numbers=numbers, plots=(drawn,)),
+        Section(
+            name="range", title="Range", text=("Words.",), numbers=numbers, plots=(errors_plot,)
+        ),
         Section(name="places", title="Places", scenes=(scene(), scene("other", answer=(9.0, 2.0)))),
         Section(
             name="lost",
@@ -102,10 +104,10 @@ def ordinary_report() -> Report:
 
 
 def hostile_report(harm: str = HARM) -> Report:
-    """Return a report in which every text that can come from data tries to do harm."""
+    """Return a report in which all texts that can come from data are hostile."""
     curve = Curve(label=harm, x=(0.0, 1.0), y=(0.5, float("nan")))
     taxonomy = hostile_taxonomy(paper_taxonomy(), harm)
-    shown = plot(title=harm, x_label=harm, y_label=harm)
+    hostile_plot = plot(title=harm, x_label=harm, y_label=harm)
     section = Section(
         name="all",
         title=harm,
@@ -115,7 +117,7 @@ def hostile_report(harm: str = HARM) -> Report:
             Number(harm, "b", 1.0, paper=2.0, unit="m"),
             Number("b", "b", 1.0, paper=2.0, unit=harm),
         ),
-        plots=(dataclasses.replace(shown, curves=(curve,), paper=((0.5, 0.5, harm),)),),
+        plots=(dataclasses.replace(hostile_plot, curves=(curve,), paper=((0.5, 0.5, harm),)),),
         maps=(outcome_map(title=harm),),
         scenes=(
             scene(title=harm, types=harm, objects=11, taxonomy=taxonomy, error_m=float("inf")),

@@ -1,4 +1,4 @@
-"""What a page of the workbench asks its server, over HTTP."""
+"""Requests to the server of the workbench, over HTTP."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TOKEN = "the-token-of-the-tests"  # noqa: S105 - of a server that lives for a te
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """A page, with its server."""
+    """The page of a workbench and its running server."""
 
     bench: Workbench
     port: int
@@ -39,7 +39,7 @@ class Page:
     def send(
         self, path: str, body: bytes | None = None, **headers: str
     ) -> tuple[int, dict[str, str], bytes]:
-        """Return the code, the headers and the body of the answer to a request."""
+        """Return status code, headers and body of the answer to a request."""
         own = {"X-Semsig-Token": self.token, **self.headers}
         own |= {name.replace("_", "-"): value for name, value in headers.items()}
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
@@ -49,18 +49,18 @@ class Page:
         connection.close()
         return answer.status, {key.lower(): value for key, value in answer.getheaders()}, content
 
-    def ask(self, path: str, told: object = None, **headers: str) -> Any:  # noqa: ANN401 - any JSON
+    def ask(self, path: str, body: object = None, **headers: str) -> Any:  # noqa: ANN401 - any JSON
         """Return the JSON of an answer that must succeed."""
-        body = None if told is None else json.dumps(told).encode()
-        code, _, content = self.send(path, body, **headers)
+        data = None if body is None else json.dumps(body).encode()
+        code, _, content = self.send(path, data, **headers)
         assert code == 200, content
         return json.loads(content)
 
-    def refused(self, path: str, told: object = None, **headers: str) -> tuple[int, str]:
-        """Return the code and the sentence with which a request is refused."""
-        body = told if told is None or isinstance(told, bytes) else json.dumps(told).encode()
-        code, kept, content = self.send(path, body, **headers)
-        assert kept["content-type"] == "application/json"
+    def refused(self, path: str, body: object = None, **headers: str) -> tuple[int, str]:
+        """Return the status code and the message of a refused request."""
+        data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+        code, answer_headers, content = self.send(path, data, **headers)
+        assert answer_headers["content-type"] == "application/json"
         text = json.loads(content)["error"]
         assert text.endswith(".")
         assert "\n" not in text
@@ -81,8 +81,8 @@ def serving(bench: Workbench) -> Iterator[Page]:
             thread.join()
 
 
-def bomb() -> bytes:
-    """Return a PNG that says to be 30,000 pixels wide and high."""
+def decompression_bomb() -> bytes:
+    """Return a small PNG with a header of 30,000 x 30,000 pixels."""
 
     def chunk(kind: bytes, body: bytes) -> bytes:
         check = struct.pack(">I", zlib.crc32(kind + body))

@@ -1,4 +1,4 @@
-"""The workbench in a real browser, used as people do: by clicks, keys and files."""
+"""The page of the workbench in a browser, used by clicks, keys and files."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ return Boolean(session) && !session.asking && !document.body.ariaBusy
   && Number(document.body.dataset.answered) === session.changedAt;
 """
 
-# The page itself looks whether it is so far, which is cheaper than to ask it again and again.
+# The page polls the condition itself, which is faster than repeated requests to the browser.
 UNTIL = """
-const [given, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
+const [values, done] = [[...arguments].slice(0, -1), arguments[arguments.length - 1]];
 const ask = function () { %s };
 const look = () => {
-  const value = ask.apply(null, given);
+  const value = ask.apply(null, values);
   if (value) done(value); else setTimeout(look, 20);
 };
 look();
@@ -56,7 +56,7 @@ class WorkbenchPage:
         self.settle()
 
     def settle(self) -> str:
-        """Wait until what changed is answered; return what the answer says."""
+        """Wait until all changes are answered; return the sentence of the answer."""
         self.until(QUIET)
         return self.text("#sentence")
 
@@ -70,12 +70,12 @@ class WorkbenchPage:
         return self.browser.find_elements(By.CSS_SELECTOR, selector)
 
     def text(self, selector: str) -> str:
-        """Return the text of the first such element, shown or not."""
+        """Return the text of the first such element, even if it is hidden."""
         return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
 
     def press(self, selector: str, text: str = "") -> str:
         """Click the first such element, or the first with a text."""
-        next(one for one in self.all(selector) if text in ("", one.text)).click()
+        next(element for element in self.all(selector) if text in ("", element.text)).click()
         return self.settle()
 
     def choose(self, selector: str, value: str) -> str:
@@ -87,7 +87,7 @@ class WorkbenchPage:
         return self.settle()
 
     def give(self, selector: str, *files: Path) -> str:
-        """Choose files in a chooser; return what the answer says, or the notice."""
+        """Choose files in a file input; return the sentence of the answer."""
         self.one(selector).send_keys("\n".join(map(str, files)))
         return self.settle()
 
@@ -101,12 +101,12 @@ class WorkbenchPage:
         return self.settle()
 
     def drag(self, selector: str, start: tuple[float, float], *moves: tuple[int, int]) -> str:
-        """Press at shares of an element's width and height, move by pixels, let go."""
+        """Drag from a place in an element, in shares of its size, by pixels; return the answer."""
         self.pull(selector, start, *moves)
         return self.settle()
 
     def pull(self, selector: str, start: tuple[float, float], *moves: tuple[int, int]) -> None:
-        """Do so, and wait for no answer."""
+        """Drag without waiting for an answer."""
         element = self.one(selector)
         self.ask("arguments[0].scrollIntoView({block: 'center'})", element)
         size = element.size
@@ -129,18 +129,18 @@ class WorkbenchPage:
         return self.type(photo.things[number][0])
 
     def until(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
-        """Wait until a script returns something, and return that."""
+        """Wait until a script returns a true value, and return it."""
         try:
             return self.browser.execute_async_script(UNTIL % script, *arguments)
         except TimeoutException:
             pytest.fail(f"{script}\n{self.text('#notice')}")
 
     def question(self) -> str:
-        """Return what is asked next, a moment after an answer."""
+        """Return the next question, which is shown shortly after an answer."""
         return str(self.until("return document.querySelector('#question b')?.textContent"))
 
     def saved(self, name: str) -> Path:
-        """Return a file that the browser saves."""
+        """Return a file that the browser has saved."""
         file = self.folder / name
         end = time.monotonic() + PATIENCE_S
         while not file.exists():
@@ -149,14 +149,14 @@ class WorkbenchPage:
         return file
 
     def assert_quiet(self) -> None:
-        """Check that the page reported no error, and asked its own server alone."""
+        """Check that the page reported no error, and requested only its own server."""
         own = self.url.partition("?")[0]
         errors = [
             entry["message"]
             for entry in self.browser.get_log("browser")
-            # A refused upload is told on the page; the browser tells of its code as well.
+            # The page shows a refused upload; the browser also logs its status code.
             if "the server responded with a status of 4" not in entry["message"]
         ]
         assert not errors, errors
-        asked = requested(self.browser)
-        assert [url for url in asked if not url.startswith((own, "data:", "blob:"))] == []
+        addresses = requested(self.browser)
+        assert [url for url in addresses if not url.startswith((own, "data:", "blob:"))] == []

@@ -523,8 +523,8 @@ def _changed_places(
     old: StreetObjects, new: StreetObjects, changes: ObjectChanges
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
     """Return where an object is gone or has come, shape (c, 2) in metres, and its class codes."""
-    places = np.concatenate([old.xy[changes.gone], new.xy[changes.come]])
-    return places, np.concatenate([old.codes[changes.gone], new.codes[changes.come]])
+    places = np.concatenate([old.xy[changes.obsolete_rows], new.xy[changes.new_rows]])
+    return places, np.concatenate([old.codes[changes.obsolete_rows], new.codes[changes.new_rows]])
 
 
 def _cells_in_range(

@@ -1,4 +1,4 @@
-"""Pages to look at."""
+"""Interactive maps as HTML pages."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Maps of an answer as a file of shapes holds it: regions to search, and candidates."""
+"""Map of an exported answer: the regions to search and the candidates of a vector file."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from semsig_gis.database import require_same_place
 from semsig_gis.maps.location import CANDIDATE
 from semsig_gis.maps.page_elements import (
     add_city,
+    add_layer,
     corners_of,
-    draw,
+    credits_part,
     exact_latlon,
-    finished_map,
-    prepared_map,
-    shades,
-    sources,
+    finish_map,
+    shades_part,
+    start_map,
     swatch,
 )
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
 
 RASTERS = frozenset({".tif", ".tiff"})
-"""Suffixes of the files that hold the chance of every cell instead (see `open_posterior`)."""
+"""Suffixes of files with the chance of every cell, which `open_posterior` reads instead."""
 
 POLYGONAL = 2
 FIELDS = ("Chance", "Cells", "Square kilometres", "Sees", "Cell")
@@ -46,14 +46,14 @@ def answer_map(
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show the regions to search, and the candidates that a file has beside them.
+    """Show the regions to search and the candidates of an exported answer.
 
-    `path` is a file that `export_answer` wrote, of any of its formats but a raster; `map_` and
-    `tiles` are as in `evaluation_map`. InputError if it holds no answer from this database.
+    `path` is a file of `export_answer` in any of its formats except a raster; `map_` and `tiles`
+    are as in `evaluation_map`. InputError if it contains no answer from this database.
     """
     shapes = _shapes(Path(path), database)
     polygons = shapely.get_dimensions(shapes.geometry.array) == POLYGONAL
-    page = prepared_map(map_, tiles, title="Where it was seen")
+    page = start_map(map_, tiles, title="Where it was seen")
     add_city(page, database)
     regions, candidates = shapes[polygons], shapes[~polygons]
     regions = regions.assign(cell_id=regions["best_cell_id"])
@@ -61,25 +61,29 @@ def answer_map(
     lines = [exact_latlon(shapely.get_coordinates(ring), database.crs) for ring in rings]
     middles = regions.geometry.representative_point()
     parts = [["lines", [[REGION, lines]]], _points("Region", regions, middles, CHANCES[0.9])]
-    draw(page, f"Regions to search ({len(regions):,})", "drawings", parts, group="answer")
+    add_layer(page, f"Regions to search ({len(regions):,})", "drawings", parts, group="answer")
     if len(candidates):
         points = _points("Candidate", candidates, candidates.geometry, CANDIDATE)
         name = f"Candidates ({len(candidates):,})"
-        draw(page, name, "drawings", [points], group="answer")
+        add_layer(page, name, "drawings", [points], group="answer")
     legend = (
         "<summary>Where it was seen</summary>"
         f"<p>{swatch(CHANCES[0.9])}Regions to search: {len(regions):,}"
         f"<br>{swatch(CANDIDATE)}Candidates by rank: {len(candidates):,}</p>"
-        f"{shades()}{sources(database.licenses)}"
+        f"{shades_part()}{credits_part(database.licenses)}"
     )
     view = corners_of(database) if map_ is None else None
-    return finished_map(page, database, legend=legend, view=view)
+    return finish_map(page, database, legend=legend, view=view)
 
 
 def _shapes(path: Path, database: SignatureDatabase) -> gpd.GeoDataFrame:
-    """Return what has a rank in a file, in the coordinate system of the database."""
+    """Return the rows of a file that have a rank, in the coordinate system of the database."""
     try:
-        tables = _tables(path)
+        if path.suffix.lower() == ".parquet":
+            tables = [gpd.read_parquet(path)]
+        else:
+            layers = [name for name, kind in pyogrio.list_layers(path) if kind is not None]
+            tables = [pyogrio.read_dataframe(path, layer=name) for name in layers]
     except (OSError, ValueError, pyogrio.errors.DataSourceError) as error:
         raise InputError(
             f"{path} cannot be read ({error}); give a file that semsig localize --out wrote."
@@ -89,27 +93,19 @@ def _shapes(path: Path, database: SignatureDatabase) -> gpd.GeoDataFrame:
         raise InputError(
             f"{path} contains no answer; give a file that semsig localize --out wrote."
         )
-    known = [
+    projected = [
         table.set_crs(database.crs) if table.crs is None else table.to_crs(database.crs)
         for table in ranked
     ]
-    shapes = pd.concat(known, ignore_index=True)
+    shapes = pd.concat(projected, ignore_index=True)
     shapes = shapes[shapes["rank"].notna()].sort_values("rank", kind="stable")
     places = shapely.get_coordinates(shapes.geometry.array)
     require_same_place(database, places, "corners and places of the answer")
     return shapes
 
 
-def _tables(path: Path) -> list[gpd.GeoDataFrame]:
-    """Return the layers of a file that have a place."""
-    if path.suffix.lower() == ".parquet":
-        return [gpd.read_parquet(path)]
-    layers = [name for name, kind in pyogrio.list_layers(path) if kind is not None]
-    return [pyogrio.read_dataframe(path, layer=name) for name in layers]
-
-
 def _points(name: str, rows: gpd.GeoDataFrame, places: gpd.GeoSeries, colour: str) -> list[Any]:
-    """Return numbered signs, the best last so that they lie on top."""
+    """Return the drawing of rows as numbered signs, the best last so that it lies on top."""
     latlon = exact_latlon(shapely.get_coordinates(places.array), rows.crs)
     records = []
     for place, row in zip(latlon, rows.to_dict("records"), strict=True):
@@ -119,11 +115,11 @@ def _points(name: str, rows: gpd.GeoDataFrame, places: gpd.GeoSeries, colour: st
     return ["points", FIELDS, {}, records[::-1]]
 
 
-def _text(column: str, value: Any) -> str | None:  # noqa: ANN401 - as the file has it
+def _text(column: str, value: Any) -> str | None:  # noqa: ANN401 - any type of a file column
     if pd.isna(value) or value == "":
         return None
     if column == "types":
         return str(value)
-    number = float(value)  # KML and CSV hold texts
-    shown = {"chance": f"{percent(number, 2)}", "km2": f"{number:.4g}"}
-    return shown.get(column, f"{number:.0f}")
+    number = float(value)  # KML and CSV contain texts
+    texts = {"chance": f"{percent(number, 2)}", "km2": f"{number:.4g}"}
+    return texts.get(column, f"{number:.0f}")

@@ -1,4 +1,4 @@
-"""Maps of cells: how many look the same, and where a query can be placed."""
+"""Maps of cells: which look the same, and where a query can be placed."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ from semsig_gis.maps.page_elements import (
     LIFTING,
     NAMED_CLASSES,
     PAGE_FILES,
-    Drawing,
+    ScriptLayer,
     cell_image,
     colour_cells,
     corners_of,
-    finished_map,
-    folded,
-    free_name,
-    isolated,
+    credits_part,
+    escaped_text,
+    finish_map,
+    folded_part,
+    layer_part,
     layers_of,
-    made_by,
+    method_text,
     panel_signs,
-    part_of,
-    prepared_map,
     ramp_bar,
-    sources,
+    start_map,
     swatch,
+    unique_layer_name,
 )
 
 if TYPE_CHECKING:
@@ -62,18 +62,18 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Identifiability
 
 
-BESIDE_M = 50.0  # from a cell, where a click tells of it
+CLICK_TOLERANCE_M = 50.0  # distance from a click to the nearest cell that is described
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellFacts:
-    """A part of what a click on a cell tells, with numbers and a JavaScript function of its own.
+    """Facts about cells that the panel shows after a click, with their data and script.
 
-    The file ``NAME.js`` defines the function ``semsig.cellFacts.NAME(city, cell)``. It returns what
-    there is of ``title``; ``rows``: label and value each; ``jumps``: a label and buttons, each with
-    a text, a cell and a hint; ``alike``: cells to compare with, the likeliest first, and why;
-    ``kind``: of that comparison; ``dots``: cells and colours. ``arrays`` are packed numbers of the
-    cells; ``settings`` are in ``city.grid``.
+    The file ``NAME.js`` defines the function ``semsig.cellFacts.NAME(city, cell)``. It returns any
+    of ``title``; ``rows``: pairs of label and value; ``jumps``: a label with buttons, each with a
+    text, a cell and a hint; ``lookalikes``: cells to compare with, the likeliest first, and the
+    reason; ``kind``: the kind of this comparison; ``dots``: cells and colours. ``arrays`` are
+    packed arrays of the cells; ``settings`` are added to ``city.grid``.
     """
 
     name: str
@@ -81,10 +81,10 @@ class CellFacts:
     settings: Mapping[str, Any]
 
 
-class Cells(Drawing):
-    """A layer without signs of its own that tells what is known of a cell when clicked.
+class Cells(ScriptLayer):
+    """An invisible layer that describes a cell when it is clicked.
 
-    Of several on one map, each has only those packed numbers that none before it has.
+    A packed array that several such layers of a map share is written only once.
     """
 
     _template = Template(
@@ -106,24 +106,25 @@ class Cells(Drawing):
         self.database, self.facts, self.arrays = database, facts, arrays
 
     def packed(self) -> str:
-        """Return the packed numbers for the script."""
-        known: dict[tuple[str, ...], str] = {}
+        """Return the packed arrays for the script."""
+        # References to the arrays of earlier layers of this map, by content.
+        references: dict[tuple[str, ...], str] = {}
         for layer in layers_of(cast("folium.Map", self._parent)).values():
             if layer is self:
                 break
             if isinstance(layer, Cells):
                 for name, array in layer.arrays.items():
                     place = f"{layer.get_name()}_arrays[{script_json(name)}]"
-                    known.setdefault(tuple(array), place)
+                    references.setdefault(tuple(array), place)
         entries = (
-            f"{script_json(name)}: {known.get(tuple(array)) or script_json(array)}"
+            f"{script_json(name)}: {references.get(tuple(array)) or script_json(array)}"
             for name, array in self.arrays.items()
         )
         return f"{{{', '.join(entries)}}}"
 
 
 def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[CellFacts]) -> None:
-    """Add a layer that tells of a cell when clicked; one that the map has of them tells more."""
+    """Add a layer that describes a clicked cell, or add the facts to that layer of the map."""
     name = "Describe a cell when clicked"
     children = layers_of(map_)
     for key, child in list(children.items()):
@@ -132,11 +133,11 @@ def add_cells(map_: folium.Map, database: SignatureDatabase, facts: Sequence[Cel
         if np.array_equal(child.database.cell_ids, database.cell_ids):
             del children[key]
             facts = list({part.name: part for part in (*child.facts, *facts)}.values())
-    Cells(free_name(map_, name), database, facts).add_to(map_)
+    Cells(unique_layer_name(map_, name), database, facts).add_to(map_)
 
 
 def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
-    """Return the latitudes and longitudes of the corners of all cells."""
+    """Return latitudes and longitudes of the corners of the box around all cells."""
     if len(database) == 0:
         raise InputError("the database has no cells to show; give one with at least one cell.")
     return corners_of(database)
@@ -145,11 +146,11 @@ def city_view(database: SignatureDatabase) -> NDArray[np.float64]:
 def packed_signatures(
     name: str, database: SignatureDatabase, ends: NDArray[np.int64]
 ) -> dict[str, list[str]]:
-    """Return signatures, with angle levels for bearings, and where those of each cell end.
+    """Return signatures (types and angle levels) and the end of each cell, packed for the script.
 
-    Beside them the objects that the cells see, by which the script tells where each one stands.
+    The visible objects are added, from which the script finds exact bearings and distances.
     """
-    places, codes = _objects_seen(database)
+    places, codes = _visible_objects(database)
     return {
         f"{name}.types": packed(database.taxonomy.symbol_bytes[database.codes]),
         f"{name}.ends": steps(ends.astype(np.int32)),
@@ -160,28 +161,29 @@ def packed_signatures(
     }
 
 
-def _objects_seen(database: SignatureDatabase) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
-    """Return places, in steps of `QUANTUM_M` from the origin, and class codes of objects seen.
+def _visible_objects(database: SignatureDatabase) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return places, in steps of `QUANTUM_M` from the origin, and class codes of visible objects.
 
-    They come from bearings and distances, so that a few objects are there twice, half a metre off.
+    They are computed from bearings and distances, so a few objects occur twice, half a metre apart.
     """
+    # Nearest first: the position of an object is most exact from the nearest cell.
     near = np.argsort(database.distance_units, kind="stable")
     angles = np.radians(database.bearings[near] + 0.5 * FULL_TURN / BEARING_UNITS)
     viewpoints = np.repeat(database.xy, database.lengths, axis=0)[near]
     away = database.distances[near, None] * np.stack([np.sin(angles), np.cos(angles)], axis=1)
     xy, codes = viewpoints + away - np.array(database.grid.origin), database.codes[near]
-    # Seen from near they are known best, and come first.
+    # Keep the first occurrence of each object: key of column, row (in metres) and class.
     low = xy.min(axis=0, initial=np.inf)
     columns, rows = (np.rint(part).astype(np.int64) for part in (xy - low).T)
     keys = (columns << 32 | rows) << 8 | codes
-    # Half as long as with a sort of all of them.
+    # Takes half the time of a sort of all keys.
     first = np.flatnonzero(~pd.Series(keys).duplicated())
     first = first[np.argsort(keys[first])]
     return np.rint(xy[first] / QUANTUM_M).astype(np.int32), codes[first]
 
 
 def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """Return where the cells are, and how to read it."""
+    """Return the packed places of the cells, and the settings to unpack them."""
     lattices, columns = place_lattices(database), database.columns - database.columns[0]
     arrays = {
         "rows": steps(database.rows),
@@ -192,7 +194,7 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str,
     grid = {
         "levels": database.spec.levels,
         "step": database.grid.step,
-        "beside": BESIDE_M,
+        "tolerance": CLICK_TOLERANCE_M,
         "sight": database.spec.radius,
         "reach": database.reach,
         "quantum": QUANTUM_M,
@@ -204,12 +206,12 @@ def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str,
     return arrays, grid
 
 
-DOTS = 200  # cells of a group that are drawn, from all over the city
-NEAR = 20  # of the nearest ones all are drawn
-CHANCES = 100  # steps of a chance in a byte
-LEAST = 0.01  # chance of a place that is named; the others are many, and make a page large
-BITS = 8  # steps of a bit
-HELPERS = 2  # classes that are named
+DOTS = 200  # largest number of cells of a group that are drawn
+NEAREST_DOTS = 20  # nearest cells of a group that are always drawn
+CHANCE_STEPS = 100  # steps of a chance in a byte
+LEAST_LOOKALIKE_CHANCE = 0.01  # smallest chance of a lookalike in the page, to keep the page small
+BIT_STEPS = 8  # steps of a bit in a byte
+HELPERS = 2  # classes per cell that are named as helpful
 
 
 def ambiguity_map(
@@ -219,14 +221,14 @@ def ambiguity_map(
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show how many cells have the same signature, and which.
+    """Show which cells have the same signature, and how many.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     identifiability : Identifiability, optional
-        What a click tells of queries from these cells, too.
+        Results for queries from these cells, which a click shows as well.
     map_, tiles : optional
         As in `evaluation_map`.
 
@@ -234,13 +236,14 @@ def ambiguity_map(
     -------
     folium.Map
         The map, with these layers: images of how many cells have the same types, and the same
-        types and angle levels (hidden at first), and a layer without signs of its own; while it
-        is on, a click tells of the cell, draws those that look the same, and jumps to them.
+        types and angle levels (hidden at first), and an invisible layer; while it is on, a click
+        on a cell describes it, draws the cells that look the same, and offers jumps to them.
 
     Raises
     ------
     InputError
-        If there is no cell, `identifiability` is of another database, or as in `evaluation_map`.
+        If there is no cell, `identifiability` belongs to another database, or as in
+        `evaluation_map`.
 
     Examples
     --------
@@ -250,7 +253,7 @@ def ambiguity_map(
     view = city_view(database)
     if identifiability is not None:
         identifiability.require_cells_of(database)
-    page = prepared_map(map_, tiles, title="Cells that look the same")
+    page = start_map(map_, tiles, title="Cells that look the same")
     types, angles = database.type_sequences, database.angle_sequences
     pairs = types.inverse * len(angles) + angles.inverse
     _, pair, counts = np.unique(pairs, return_inverse=True, return_counts=True)
@@ -264,13 +267,13 @@ def ambiguity_map(
     more = [] if identifiability is None else [_lookalike_facts(identifiability)]
     add_cells(page, database, [_group_facts(database), *more])
     legend = ambiguity_legend(sizes, licenses=database.licenses)
-    return finished_map(page, database, legend=legend, view=view if map_ is None else None)
+    return finish_map(page, database, legend=legend, view=view if map_ is None else None)
 
 
 def identifiability_map(
     identifiability: Identifiability, *, map_: folium.Map | None = None, tiles: str | None = None
 ) -> folium.Map:
-    """Show how well a query from each cell will be placed, and what it may be taken for.
+    """Show where a query can be localized, and which cells it may be confused with.
 
     Parameters
     ----------
@@ -282,9 +285,9 @@ def identifiability_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the chance to be found of all cells as an image, and a layer
-        without signs of its own; while it is on, a click tells of the cell, and draws the places
-        that it is most often taken for.
+        The map, with these layers: an image of the chance that a query from each cell is found,
+        and an invisible layer; while it is on, a click on a cell describes it and draws the cells
+        that it is most often confused with.
 
     Examples
     --------
@@ -296,41 +299,41 @@ def identifiability_map(
     """
     database = identifiability.database
     view = city_view(database)
-    page = prepared_map(map_, tiles, title="Where a query can be placed")
+    page = start_map(map_, tiles, title="Where a query can be placed")
     steps = len(FOUND_RAMP)
     levels = np.minimum(np.floor(identifiability.found * steps), steps - 1).astype(np.uint8)
     image = level_image(database, levels + np.uint8(1), FOUND_RAMP)
     colour_cells(page, "Chance to be found", cell_image(page, *image, dark="lift"))
     add_cells(page, database, [_group_facts(database), _lookalike_facts(identifiability)])
     legend = identifiability_legend(identifiability)
-    return finished_map(page, database, legend=legend, view=view if map_ is None else None)
+    return finish_map(page, database, legend=legend, view=view if map_ is None else None)
 
 
 def _group_facts(database: SignatureDatabase) -> CellFacts:
-    """Return the signatures of the cells, by which those that look the same are found."""
+    """Return the signatures of the cells, from which the script finds cells that look the same."""
     return CellFacts(
         name="groups",
         arrays=packed_signatures("now", database, database.offsets[1:]),
-        settings={"dots": DOTS, "near": NEAR, "colours": [SAME_TYPES, SAME_LEVELS]},
+        settings={"dots": DOTS, "near": NEAREST_DOTS, "colours": [SAME_TYPES, SAME_LEVELS]},
     )
 
 
 def _lookalike_facts(identifiability: Identifiability) -> CellFacts:
-    """Return what is known of a query from each cell, beside the signatures of the cells."""
-    # The classes that a cell gains most by, best first.
+    """Return the results for a query from each cell: chances, lookalikes and helpful classes."""
+    # The classes that raise the chance of a cell most, best first.
     gains, lookalikes = identifiability.gains, identifiability.lookalikes
     count = min(HELPERS, gains.shape[1])
     helpers = np.argsort(-gains, axis=1, kind="stable")[:, :count]
     titles = {item.code: item.title for item in identifiability.database.taxonomy.classes}
     chances = identifiability.lookalike_chances
-    likely = chances >= LEAST
+    likely = chances >= LEAST_LOOKALIKE_CHANCE
     return CellFacts(
         name="lookalikes",
         arrays={
             "found": _chance_bytes(identifiability.found),
             "near": _chance_bytes(identifiability.near),
             "itself": _chance_bytes(identifiability.itself),
-            "bits": packed(np.rint(identifiability.bits * BITS).clip(0, 255).astype(np.uint8)),
+            "bits": packed(np.rint(identifiability.bits * BIT_STEPS).clip(0, 255).astype(np.uint8)),
             "lookalikes": packed(np.where(likely, lookalikes, -1).astype(np.int32)),
             "lookalikeChances": _chance_bytes(np.where(likely, chances, 0.0)),
             "helpers": packed(helpers.astype(np.uint8)),
@@ -340,19 +343,19 @@ def _lookalike_facts(identifiability: Identifiability) -> CellFacts:
             "radius": identifiability.radius,
             "places": lookalikes.shape[1],
             "helpers": count,
-            "chances": CHANCES,
-            "bits": BITS,
+            "chances": CHANCE_STEPS,
+            "bits": BIT_STEPS,
             "classes": [titles[item.code] for item in identifiability.classes],
         },
     )
 
 
 def _chance_bytes(chances: NDArray[np.float64]) -> list[str]:
-    return packed(np.rint(chances * CHANCES).clip(0, CHANCES).astype(np.uint8))
+    return packed(np.rint(chances * CHANCE_STEPS).clip(0, CHANCE_STEPS).astype(np.uint8))
 
 
 def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of how many cells look the same, by what is compared, as HTML."""
+    """Return the legend of `ambiguity_map` as HTML; `sizes` holds group sizes by layer name."""
     starts = list(GROUP_COLOURS)
     shares = [
         np.bincount(np.digitize(size, starts), minlength=len(starts) + 1)[1:] / len(size)
@@ -371,27 +374,27 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
             f"<p><b>{percent(line[0])}</b> of {len(size):,} cells look like no other<br>"
             f"How many cells have the {escape(name.lower())}</p><table>{rows}</table>"
         )
-        scales.append(part_of(name, scale))
+        scales.append(layer_part(name, scale))
     return (
         f"<summary>Cells that look the same</summary>{''.join(scales)}"
-        f"<p>Click a cell for those like it: {swatch(SAME_TYPES)}same types "
-        f"{swatch(SAME_LEVELS)}and angle levels</p>"
-        f"{sources(licenses)}"
+        f"<p>Click a cell to show cells like it: {swatch(SAME_TYPES)}same types "
+        f"{swatch(SAME_LEVELS)}same types and angle levels</p>"
+        f"{credits_part(licenses)}"
     )
 
 
 def identifiability_legend(identifiability: Identifiability) -> str:
-    """Return the legend of a map of where a query can be placed, as HTML with data escaped."""
+    """Return the legend of `identifiability_map` as HTML with data escaped."""
     facts = identifiability.summary()
     within, view = f"within {facts['radius_m']:g} m", facts["view_degrees"]
-    asked = "query" if view == FULL_TURN else f"photo of {view:g} degrees"
+    query = "query" if view == FULL_TURN else f"photo of {view:g} degrees"
     bands = "<br>".join(
         f"{percent(band['from'], 0)} to {percent(band['to'], 0)}: "
         f"{percent(band['share'])} of the cells"
         for band in reversed(facts["bands"])
     )
     classes = "".join(
-        f"<tr><td class='title'>{isolated(item['title'])}</td>"
+        f"<tr><td class='title'>{escaped_text(item['title'])}</td>"
         f"<td>{100 * item['chance_near']:+.1f} %</td></tr>"
         for item in facts["classes"][:NAMED_CLASSES]
     )
@@ -403,10 +406,10 @@ def identifiability_legend(identifiability: Identifiability) -> str:
     )
     return (
         "<summary>Where a query can be placed</summary>"
-        f"<p><b>{percent(facts['chance_found'])}</b> chance to answer a {asked} {within}<br>"
+        f"<p><b>{percent(facts['chance_found'])}</b> chance to answer a {query} {within}<br>"
         f"Mean of {facts['cells']:,} cells, "
-        f"{made_by(isolated(facts['noise']) + ' noise')}<br>"
+        f"{method_text(escaped_text(facts['noise']) + ' noise')}<br>"
         "Click a cell to see what it is mistaken for</p>"
-        f"{part_of('Chance to be found', scale)}"
-        f"{folded('Figures', figures)}{sources(identifiability.database.licenses)}"
+        f"{layer_part('Chance to be found', scale)}"
+        f"{folded_part('Figures', figures)}{credits_part(identifiability.database.licenses)}"
     )

@@ -1,4 +1,4 @@
-"""All that is known of a city on one map."""
+"""Several results for a city on one map."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def city_map(
     objects: StreetObjects | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show what is known of a city on one map, as far as it is given.
+    """Show several results for a city on one map.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def city_map(
     evaluation : Evaluation, optional
         Queries, as `evaluation_map` shows them.
     smooth : float, optional
-        How far away a query counts in their field, in metres.
+        Radius in metres within which a query counts in the field of errors.
     identifiability : Identifiability, optional
-        Where a query can be placed, as `identifiability_map` shows it.
+        Where a query can be localized, as `identifiability_map` shows it.
     ambiguity : bool, default False
         Whether to show the cells that look the same, as `ambiguity_map` does.
     newer, objects_before, objects_after : optional
@@ -60,7 +60,7 @@ def city_map(
     posterior : Posterior, optional
         The chances of an answer, as `posterior_map` shows them.
     answer : str or Path, optional
-        File of an answer that has no chances of cells: regions to search and, in most formats,
+        File of an answer without the chances of cells: regions to search and, in most formats,
         candidates (see `export_answer`).
     objects : StreetObjects, optional
         The street objects, as `objects_map` shows them.
@@ -70,17 +70,17 @@ def city_map(
     Returns
     -------
     folium.Map
-        The map. Its layers are in groups: the cells are coloured by one thing at a time, at first
-        by the first of those above, whose legend is open, and a click tells of it.
+        The map. Its layers are in groups. One layer colours the cells at a time; the first result
+        in the order above is shown first, with its legend open, and a click describes it.
 
     Raises
     ------
     InputError
-        If there is nothing to show, or as in the functions above.
+        If no result is given, or as in the functions above.
 
     Notes
     -----
-    Each of the functions above draws on a map that another has made, too, where it is given as
+    Each of the functions above can also add its layers to the map of another one, given as
     ``map_``.
 
     Examples
@@ -111,15 +111,15 @@ def city_map(
         raise InputError(
             "there is nothing to show of the city; give an evaluation, or ambiguity=True."
         )
-    drawn = parts[0](tiles=tiles)
-    _keep_colour(drawn, parts[1:])
-    return drawn
+    map_ = parts[0](tiles=tiles)
+    _add_parts(map_, parts[1:])
+    return map_
 
 
-def _keep_colour(drawn: folium.Map, parts: Sequence[Callable[..., folium.Map]]) -> None:
-    """Draw more on a map, whose cells keep the colours that they have, if any."""
-    first = [colour for colour in cell_colours(drawn) if colour.show]
+def _add_parts(map_: folium.Map, parts: Sequence[Callable[..., folium.Map]]) -> None:
+    """Add more results to a map; its cells keep their colours, if they have any."""
+    first_colours = [layer for layer in cell_colours(map_) if layer.show]
     for part in parts:
-        part(map_=drawn)
-    for colour in cell_colours(drawn) if first else ():
-        colour.show = colour in first
+        part(map_=map_)
+    for layer in cell_colours(map_) if first_colours else ():
+        layer.show = layer in first_colours

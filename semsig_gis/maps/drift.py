@@ -1,4 +1,4 @@
-"""A map of what has changed in a city between two dates."""
+"""Map of the changes in a city between two dates."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from semsig_gis.maps.page_elements import (
     FLIPPING,
     LIFTING,
     NAMED_CLASSES,
+    add_layer,
     cell_image,
     colour_cells,
-    draw,
-    finished_map,
-    folded,
-    isolated,
-    part_of,
-    prepared_map,
-    sources,
+    credits_part,
+    escaped_text,
+    finish_map,
+    folded_part,
+    layer_part,
+    start_map,
     swatch,
     to_latlon,
 )
@@ -54,33 +54,33 @@ def drift_map(
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show what has changed in a city: the cells that see something else, and why.
+    """Show what has changed in a city: cells with another signature, and the changed objects.
 
     Parameters
     ----------
     before, after : SignatureDatabase
-        Databases of one city at two dates, made in the same way.
+        Databases of one city at two dates, built with the same settings.
     objects_before, objects_after : StreetObjects, optional
-        The street objects that they were built from, in the same CRS; give both or neither.
+        The street objects that they were built from, in the same CRS; both or neither.
     map_, tiles : optional
         As in `evaluation_map`.
 
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells that are the same, and those that have changed,
-        appeared or vanished, as images; a layer without signs of its own that tells of a cell by a
-        click; and, where the objects are given, those that were removed, added, moved, or are of
-        another class, told of by a click.
+        The map, with these layers: an image of the cells that are the same, and one of the cells
+        that have changed, appeared or vanished, where a click describes a cell; and, where the
+        objects are given, one layer each of the removed, added, moved and reclassified objects,
+        described by a click.
 
     Raises
     ------
     DatabaseError
-        If the databases were not made in the same way.
+        If the databases were built with different settings.
     CrsError
         If the objects are in another CRS than the databases.
     InputError
-        If they are of different places or use a class code for different classes, or as in
+        If they cover different places or use a class code for different classes, or as in
         `evaluation_map`.
 
     Examples
@@ -94,26 +94,27 @@ def drift_map(
     """
     cells = compare_cells(before, after)
     taxonomy = joined_taxonomy(before.taxonomy, after.taxonomy)
-    old, new = (replace(one, taxonomy=taxonomy) for one in (before, after))
-    # All cells of both dates.
+    old, new = (replace(database, taxonomy=taxonomy) for database in (before, after))
+    # All cells of both dates, with signatures of the newer date where there are two.
     city = join_databases([new, old.select(cells.vanished)])
     view = city_view(city)
     if len(old) and len(new):
         require_same_place(old, new.xy, "cells of the newer database")
     kinds = _kinds(city, old, new, cells)
-    page = prepared_map(map_, tiles, title="What has changed")
+    page = start_map(map_, tiles, title="What has changed")
     colours, same = list(DRIFT_COLOURS.values()), kinds == 1
-    looks: tuple[tuple[NDArray[np.bool_], Literal["flip", "lift"]], ...]
-    looks = (same, "flip"), (~same, "lift")
+    # Two images, because unchanged cells have a light colour and changed cells a dark one.
+    halves: tuple[tuple[NDArray[np.bool_], Literal["flip", "lift"]], ...]
+    halves = (same, "flip"), (~same, "lift")
     images = [
-        cell_image(page, *level_image(city.select(some), kinds[some], colours), dark=dark)
-        for some, dark in looks
-        if some.any()
+        cell_image(page, *level_image(city.select(rows), kinds[rows], colours), dark=dark)
+        for rows, dark in halves
+        if rows.any()
     ]
     differing = new.select(np.sort(np.concatenate([cells.changed[:, 1], cells.appeared])))
     arrays = {
         "kind": packed(kinds),
-        **_signatures("before", old, city),  # as a map of the cells before has them, too
+        **_signatures("before", old, city),  # shared with another map of the older database
         **_signatures("now", differing, city),
     }
     facts = CellFacts(name="change", arrays=arrays, settings={"kinds": list(DRIFT_COLOURS)})
@@ -122,23 +123,23 @@ def drift_map(
     colour_cells(page, "What has changed", *images, cells_now)
     objects = None
     if objects_before is not None and objects_after is not None:
-        for some in (objects_before, objects_after):
-            if some.crs != city.crs:
+        for objects_then in (objects_before, objects_after):
+            if objects_then.crs != city.crs:
                 raise CrsError(
-                    f"the objects are in {some.crs.to_string()} and the database is in "
+                    f"the objects are in {objects_then.crs.to_string()} and the database is in "
                     f"{city.crs.to_string()}; give the objects that it was built from."
                 )
         objects = compare_objects(objects_before, objects_after)
         for name, drawings in _object_drawings(objects_before, objects_after, objects):
-            draw(page, name, "drawings", drawings, group="objects")
+            add_layer(page, name, "drawings", drawings, group="objects")
     legend = drift_legend(cells, objects, taxonomy=taxonomy, licenses=city.licenses)
-    return finished_map(page, city, legend=legend, view=view if map_ is None else None)
+    return finish_map(page, city, legend=legend, view=view if map_ is None else None)
 
 
 def _kinds(
     city: SignatureDatabase, old: SignatureDatabase, new: SignatureDatabase, cells: CellChanges
 ) -> NDArray[np.uint8]:
-    """Return of each cell of the city the number of its colour, from 1."""
+    """Return the kind of change of each cell: its position in `DRIFT_COLOURS`, from 1."""
     ids = {
         "same": new.cell_ids[cells.same[:, 1]],
         "changed": new.cell_ids[cells.changed[:, 1]],
@@ -154,7 +155,7 @@ def _kinds(
 def _signatures(
     name: str, database: SignatureDatabase, city: SignatureDatabase
 ) -> dict[str, list[Any]]:
-    """Return the signatures of those cells of the city that the database has."""
+    """Return the signatures of the cells of the city, empty for cells not in the database."""
     lengths = np.zeros(len(city), np.int32)
     lengths[np.searchsorted(city.cell_ids, database.cell_ids)] = database.lengths
     return packed_signatures(name, database, np.cumsum(lengths))
@@ -163,7 +164,7 @@ def _signatures(
 def _object_drawings(
     old: StreetObjects, new: StreetObjects, changes: ObjectChanges
 ) -> Iterator[tuple[str, list[list[Any]]]]:
-    """Yield name and drawings of a layer of each kind of change that there is."""
+    """Yield the name and the drawings of a layer for each kind of change that occurs."""
     kinds = {
         "removed": (_facts(old, changes.removed), None),
         "added": (_facts(new, changes.added), None),
@@ -193,7 +194,7 @@ def _object_drawings(
 
 
 def _facts(objects: StreetObjects, rows: NDArray[np.int64]) -> pd.DataFrame:
-    """Return what there is to say of some objects."""
+    """Return source, class and place of some objects, with empty columns ``was`` and ``by``."""
     titles = {item.code: item.title for item in objects.taxonomy.classes}
     facts = pd.DataFrame(objects.table[[SOURCE, SOURCE_ID]]).iloc[rows].reset_index(drop=True)
     facts[["was", "by"]] = None
@@ -210,7 +211,7 @@ def drift_legend(
     taxonomy: Taxonomy,
     licenses: Sequence[str],
 ) -> str:
-    """Return the legend of a map of changes between two dates, as HTML with data escaped."""
+    """Return the legend of `drift_map` as HTML with data escaped."""
     kinds = {
         "same": (cells.same, "see what they saw"),
         "changed": (cells.changed, "see something else"),
@@ -228,14 +229,14 @@ def drift_legend(
         "<summary>What has changed</summary>"
         f"<p><b>{percent(changed)}</b> of {total:,} cells see something else<br>"
         "Click a cell to see what it saw before</p>"
-        f"{part_of('What has changed', f'<table>{lines}</table>')}"
+        f"{layer_part('What has changed', f'<table>{lines}</table>')}"
         f"{'' if objects is None else _object_changes(objects, taxonomy)}"
-        f"{sources(licenses)}"
+        f"{credits_part(licenses)}"
     )
 
 
 def _object_changes(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
-    """Return how many objects have changed, and of which classes most."""
+    """Return the number of changed objects by kind, and of the most changed classes, as HTML."""
     kinds = {
         "added": objects.added,
         "removed": objects.removed,
@@ -243,7 +244,7 @@ def _object_changes(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
         "of another class": objects.changed,
     }
     counts = "".join(
-        part_of(f"Objects {kind}", f"{swatch(OBJECT_COLOURS[kind])}{len(rows):,} {kind}")
+        layer_part(f"Objects {kind}", f"{swatch(OBJECT_COLOURS[kind])}{len(rows):,} {kind}")
         for kind, rows in kinds.items()
         if len(rows)
     )
@@ -251,12 +252,12 @@ def _object_changes(objects: ObjectChanges, taxonomy: Taxonomy) -> str:
         item: item.added + item.removed + item.moved + item.gained + item.lost
         for item in objects.classes
     }
-    most = sorted((item for item in changes if changes[item]), key=lambda one: -changes[one])
+    most = sorted((item for item in changes if changes[item]), key=lambda item: -changes[item])
     rows = "".join(
-        f"<tr><td class='title'>{isolated(taxonomy.by_name(item.class_name).title)}</td>"
+        f"<tr><td class='title'>{escaped_text(taxonomy.by_name(item.class_name).title)}</td>"
         f"<td>{item.added:,}</td><td>{item.removed:,}</td><td>{item.moved:,}</td></tr>"
         for item in most[:NAMED_CLASSES]
     )
     head = "".join(f"<td><small>{name}</small></td>" for name in ("added", "removed", "moved"))
     table = f"<table><tr><td></td>{head}</tr>{rows}</table>" if most else ""
-    return f"<p>Street objects</p>{counts}{folded('By class', table) if table else ''}"
+    return f"<p>Street objects</p>{counts}{folded_part('By class', table) if table else ''}"

@@ -1,4 +1,4 @@
-"""A map of an evaluation: where localization works, where it fails, and by how much."""
+"""Map of an evaluation: where localization works, where it fails, and by how much."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from semsig_gis.maps.page_elements import (
     OUTLINES,
     PAGE_FILES,
     Call,
-    Drawing,
+    ScriptLayer,
     add_city,
+    add_layer,
     cell_signature,
     class_bar,
     colour_cells,
     corners_of,
-    draw,
-    finished_map,
-    folded,
-    isolated,
+    credits_part,
+    escaped_text,
+    finish_map,
+    folded_part,
+    layer_part,
     layers_of,
-    made_by,
     mark_svg,
+    method_text,
     panel_signature,
     panel_signs,
-    part_of,
-    prepared_map,
     query_signature,
     ranks_text,
-    shades,
-    sources,
+    shades_part,
+    start_map,
     ties_text,
     to_latlon,
 )
@@ -51,7 +51,6 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import ErrorField
-    from semsig_gis.observation import View
 
 QUERY_FIELDS = (
     *(
@@ -65,8 +64,8 @@ QUERY_FIELDS = (
 )
 FIELD_NAME = "Share of queries that fail"
 KILOMETRE = 1000
-SHARES = 250  # steps of a share in a byte, of which 0 is none
-SPOKEN = 10  # steps of a query that speaks
+SHARE_STEPS = 250  # steps of a share in a byte, after 0 for no value
+WEIGHT_STEPS = 10  # steps of the weight of one query in a byte
 
 
 def evaluation_map(
@@ -86,7 +85,8 @@ def evaluation_map(
     database : SignatureDatabase
         The database that was evaluated.
     smooth : float, optional
-        How far away a query counts in the field, in metres (see `evaluation.field.error_field`).
+        Radius in metres within which a query counts in the field (see
+        `evaluation.error_field.error_field`).
     map_ : folium.Map, optional
         Map to add the layers to; a new one by default.
     tiles : str, optional
@@ -96,16 +96,16 @@ def evaluation_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells as an image (darker where more objects are seen), the
-        share of the queries around every place that failed (hatched where few speak of it), the
-        failed and the successful queries, of which a click tells, and lines from the true to the
+        The map, with these layers: an image of the cells (darker where more objects are seen), the
+        share of failed queries around every place (hatched where there are few queries), the
+        failed and the successful queries, described by a click, and lines from the true to the
         estimated places (hidden at first).
 
     Raises
     ------
     InputError
-        If the evaluation was made with another database, `smooth` is out of range, `tiles` is not
-        known or needs a key, or both `tiles` and `map_` are given.
+        If the evaluation was made with another database, `smooth` is out of range, `tiles` is
+        unknown or needs a key, or both `tiles` and `map_` are given.
 
     Notes
     -----
@@ -123,15 +123,15 @@ def evaluation_map(
     places = to_latlon(xy, database.crs)
     best_places = to_latlon(queries[["best_x", "best_y"]].to_numpy(np.float64), database.crs)
     field = error_field(evaluation, database, radius=smooth)
-    page = prepared_map(map_, tiles, title="Localization errors")
+    page = start_map(map_, tiles, title="Localization errors")
     city = add_city(page, database)
-    around = Drawing(None, "field", *_field(field, database), group="cells")
-    around.add_to(page)
-    colour_cells(page, FIELD_NAME, city, around)
+    field_layer = ScriptLayer(None, "field", *_packed_field(field, database), group="cells")
+    field_layer.add_to(page)
+    colour_cells(page, FIELD_NAME, city, field_layer)
     _add_queries(page, evaluation, database, places, best_places)
     legend = evaluation_legend(evaluation, radius=field.radius, licenses=database.licenses)
     view = corners_of(database) if map_ is None else None
-    return finished_map(page, database, legend=legend, view=view)
+    return finish_map(page, database, legend=legend, view=view)
 
 
 def _add_queries(
@@ -141,11 +141,11 @@ def _add_queries(
     places: NDArray[np.float64],
     best_places: NDArray[np.float64],
 ) -> None:
-    """Add layers of the queries by outcome and of the lines to their best places, and filters."""
+    """Add a layer of queries for each outcome, a layer of lines to the best places, and filters."""
     queries = evaluation.queries
     failed = ~evaluation.successful
-    stated = evaluation.method.noise is not None
-    chances = queries["chance" if stated else f"p{Evaluation.success_metres}"].fillna(0.0)
+    has_chances = evaluation.method.noise is not None
+    chances = queries["chance" if has_chances else f"p{Evaluation.success_metres}"].fillna(0.0)
     next_places, details = _query_details(evaluation, database, places)
     best = queries["best_cell_id"]
     arrays = {
@@ -179,7 +179,7 @@ def _add_queries(
         "fields": QUERY_FIELDS,
         "signs": panel_signs(database),
         "chance": {"column": "chance", "label": "Chance given"}
-        if stated
+        if has_chances
         else {"column": f"p{metres}", "label": f"P(error ≤ {metres} m)"},
     }
     others = sum(isinstance(child, _Queries) for child in layers_of(map_).values())
@@ -187,9 +187,9 @@ def _add_queries(
     _Queries("queries", map_, key, arrays, about).add_to(map_)
     for at, name in enumerate(OUTCOMES):
         title = f"{name.capitalize()} queries ({int((failed == at).sum()):,})"
-        draw(map_, title, "queryLayer", key, at, group="queries")
+        add_layer(map_, title, "queryLayer", key, at, group="queries")
     title = "Lines from true to estimated places"
-    draw(map_, title, "queryLayer", key, len(OUTCOMES), group="queries", show=False)
+    add_layer(map_, title, "queryLayer", key, len(OUTCOMES), group="queries", show=False)
 
 
 class _Queries(Call):
@@ -197,14 +197,14 @@ class _Queries(Call):
 
 
 def _microdegrees(places: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return millionths of degrees, as many as `to_latlon` has; 0 where there is no place."""
+    """Return millionths of degrees, the precision of `to_latlon`; 0 where there is no place."""
     return np.rint(1e6 * np.nan_to_num(places)).astype(np.int32)
 
 
 def _query_details(
     evaluation: Evaluation, database: SignatureDatabase, places: NDArray[np.float64]
 ) -> tuple[list[list[list[float]]], list[list[Any]]]:
-    """Return the places of the next best cells of each query, and the values of its fields."""
+    """Return the places of the next best cells of each query, and its values of `QUERY_FIELDS`."""
     rows = evaluation.rows_in(database).tolist()
     best_ids = evaluation.queries["best_cell_id"].fillna(0).to_numpy(np.int64)
     best_rows = np.searchsorted(database.cell_ids, best_ids).tolist()
@@ -215,9 +215,13 @@ def _query_details(
     details = []
     for number, query in enumerate(evaluation.queries.itertuples(index=False)):
         located = query.tied > 0
-        view = _view(query, database) if query.query_ranges or query.query_sectors else None
         look = {"place": places[number].tolist(), "turn": query.heading}
-        asked = (
+        view = None
+        if query.query_ranges or query.query_sectors:
+            names = ("types", "bearings", "ranges", "sectors")
+            row = {name: getattr(query, f"query_{name}") for name in names}
+            view = parse_view(row, taxonomy=database.taxonomy)
+        signature = (
             panel_signature(
                 query.query_types, bearings[number], kind="query", reach=radius_m, **look
             )
@@ -226,7 +230,7 @@ def _query_details(
         )
         true_row, best_row = rows[number], best_rows[number]
         values = [
-            asked if query.query_length else "nothing left of it",
+            signature if query.query_length else "nothing left of it",
             cell_signature(database, true_row, view, query.heading, place=cell_places[true_row])
             if true_row >= 0
             else "no such cell",
@@ -244,23 +248,16 @@ def _query_details(
     return next_places, details
 
 
-def _view(query: Any, database: SignatureDatabase) -> View:  # noqa: ANN401 - a named row
-    """Return what was asked and told of ranges and sectors."""
-    names = ("types", "bearings", "ranges", "sectors")
-    told = {name: getattr(query, f"query_{name}") for name in names}
-    return parse_view(told, taxonomy=database.taxonomy)
-
-
 def _next_cells(
     evaluation: Evaluation, database: SignatureDatabase
 ) -> tuple[list[list[list[float]]], list[list[float]]]:
-    """Return the places of the cells after the best of each query, and how far off they are."""
+    """Return the places of the cells ranked after the best of each query, and their errors."""
     queries, next_ids = evaluation.queries, evaluation.next_cell_ids
     counts = [len(ids) for ids in next_ids]
     ids = np.array(list(itertools.chain.from_iterable(next_ids)), np.int64)
     xy = database.xy[np.searchsorted(database.cell_ids, ids)]
-    true = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
-    errors = np.sqrt(((xy - np.repeat(true, counts, axis=0)) ** 2).sum(axis=1))
+    true_xy = np.stack([queries.geometry.x, queries.geometry.y], axis=1)
+    errors = np.sqrt(((xy - np.repeat(true_xy, counts, axis=0)) ** 2).sum(axis=1))
     ends = np.cumsum(counts)[:-1]
     return (
         [part.tolist() for part in np.split(to_latlon(xy, database.crs), ends)],
@@ -274,33 +271,33 @@ def _metres(error: float) -> str:
     return f"{error:,.0f} m" if error < KILOMETRE else f"{error / 1000:,.2f} km"
 
 
-def _field(
+def _packed_field(
     field: ErrorField, database: SignatureDatabase
 ) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """Return the field for the script: its shares as bytes, and who speaks, evenly in Mercator."""
+    """Return the field for the script: shares of failures and weights, on a Mercator grid."""
     height, width = field.failed.shape
     low = np.array(field.grid.origin)
     high = low + field.grid.step * np.array([width, height])
     places, box = mercator_places(database, low, high, (height, width))
-    failed, speaking = field.at(places)
-    values = np.where(np.isfinite(failed), 1.0 + SHARES * np.nan_to_num(failed), 0.0)
+    failed, weights = field.at(places)
+    values = np.where(np.isfinite(failed), 1.0 + SHARE_STEPS * np.nan_to_num(failed), 0.0)
     arrays = {
         "values": packed(np.rint(values).astype(np.uint8)),
-        "speaking": packed(np.ceil(SPOKEN * speaking).clip(0, 255).astype(np.uint8)),
+        "weights": packed(np.ceil(WEIGHT_STEPS * weights).clip(0, 255).astype(np.uint8)),
     }
     about = {
         "box": box,
         "width": width,
         "height": height,
-        "breaks": [1.0 + SHARES * least if least else 0.0 for least in FAILURES],
+        "breaks": [1.0 + SHARE_STEPS * least if least else 0.0 for least in FAILURES],
         "colours": list(FAILURES.values()),
-        "enough": SPOKEN * ENOUGH_QUERIES,
+        "enough": WEIGHT_STEPS * ENOUGH_QUERIES,
     }
     return arrays, about
 
 
 def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequence[str]) -> str:
-    """Return the legend of a map of errors, whose field is of a radius, as escaped HTML."""
+    """Return the legend of `evaluation_map` as escaped HTML; `radius` is that of the field."""
     count, distortions = len(evaluation.queries), chain_text(evaluation.asked.distortions)
     successes = int(evaluation.successful.sum())
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
@@ -323,10 +320,11 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     return (
         "<summary>Localization errors</summary>"
         f"<p><b>{percent(evaluation.cdf([Evaluation.success_metres])[0])}</b> of {count:,} queries "
-        f"{within}<br>{made_by(f'{escape(str(evaluation.method))}, {best}')}<br>"
-        f"Distortion: {isolated(distortions or 'none')}</p>"
-        f"{part_of('Successful queries', successful)}"
-        f"{part_of('Failed queries', failed)}"
-        f"{part_of(FIELD_NAME, field)}"
-        f"{shades()}{folded('Figures', f'<table>{shares}</table>')}{sources(licenses)}"
+        f"{within}<br>{method_text(f'{escape(str(evaluation.method))}, {best}')}<br>"
+        f"Distortion: {escaped_text(distortions or 'none')}</p>"
+        f"{layer_part('Successful queries', successful)}"
+        f"{layer_part('Failed queries', failed)}"
+        f"{layer_part(FIELD_NAME, field)}"
+        f"{shades_part()}{folded_part('Figures', f'<table>{shares}</table>')}"
+        f"{credits_part(licenses)}"
     )

@@ -1,4 +1,4 @@
-"""The cells of a database as a small picture that lies right on a web map."""
+"""Images of the cells of a database for a web map, and arrays packed for its script."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
 
 
-_BLOCKS = 2048
-_LATTICE = 64
+_BLOCKS = 2048  # most blocks of cells along a side of an image
+_LATTICE = 64  # intervals along a side of a lattice
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlaceLattices:
-    """The places of a city on a web map, and back, at the crossings of two lattices.
+    """Two lattices that convert places of a city to a web map and back.
 
-    To interpolate is exact to a centimetre in a city. ``metres`` (65, 65, 2; from south to north,
-    west to east) holds x and y over ``mercator_box`` (Web Mercator), ``degrees`` latitude and
-    longitude over ``metric_box``. Boxes are west, south, east, north.
+    Interpolation between their points is exact to a centimetre in a city. ``metres`` (65, 65, 2;
+    from south to north, west to east) holds x and y over ``mercator_box`` (Web Mercator),
+    ``degrees`` latitude and longitude over ``metric_box``. Boxes are west, south, east, north.
     """
 
     metres: NDArray[np.float64]
@@ -44,7 +44,7 @@ class PlaceLattices:
 
 
 def place_lattices(database: SignatureDatabase) -> PlaceLattices:
-    """Return lattices over all cells of a database, to find them on a web map."""
+    """Return lattices over all cells of a database."""
     step, origin = database.grid.step, np.array(database.grid.origin)
     low = origin + step * np.array([database.columns.min(), database.rows.min()])
     high = origin + step * np.array([database.columns.max() + 1.0, database.rows.max() + 1.0])
@@ -62,12 +62,12 @@ def place_lattices(database: SignatureDatabase) -> PlaceLattices:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellPixels:
-    """Where the cells of a database are in a picture that lies right on a web map.
+    """Pixels of the cells of a database in an image for a web map.
 
-    Rows and columns are even steps of Web Mercator. ``blocks`` (height, width) has the number of a
-    block for each pixel, or one more than the last where there is none; ``members`` (n,) the block
-    of every cell: itself alone, but in a city wider than 2048 cells. ``corners`` are south-west and
-    north-east, latitude and longitude.
+    Rows and columns are even steps of Web Mercator. ``blocks`` (height, width) holds the block
+    number of each pixel, or the number of blocks where there is none; ``members`` (n,) the block of
+    each cell. A block is one cell, or several in a city wider than 2048 cells. ``corners`` are
+    south-west and north-east, latitude and longitude.
     """
 
     blocks: NDArray[np.int32]
@@ -76,7 +76,7 @@ class CellPixels:
 
     @classmethod
     def of(cls, database: SignatureDatabase) -> CellPixels:
-        """Return where the cells of a database are."""
+        """Return the pixels of the cells of a database."""
         columns, rows = database.columns.astype(np.int64), database.rows.astype(np.int64)
         cells = max(int(np.ptp(columns)), int(np.ptp(rows))) + 1
         block = math.ceil(cells / _BLOCKS)
@@ -86,12 +86,13 @@ class CellPixels:
         origin = np.array(database.grid.origin)
         low = origin + side * np.array([columns.min(), rows.min()])
         high = origin + side * np.array([columns.max() + 1, rows.max() + 1])
-        # At least two pixels a block, because the grid is a little turned against the pixels.
+        # At least two pixels a block, because the grid is slightly rotated against the pixels.
         zoom = max(2, min(4, _BLOCKS // (cells // block)))
         width, height = (np.rint((high - low) / side).astype(int) * zoom).tolist()
         lattice, (west, south, east, north) = _mercator_lattice(database, low, high)
         across = lattice[:, ::-1] @ _between(width).T
         pixels = np.empty((height, width), np.int32)
+        # One row of pixels at a time: their places in the CRS, then the blocks around these places.
         for line, weights in enumerate(_between(height)):
             ids = cell_ids(*np.floor((weights @ across - origin[:, None]) / side).astype(np.int64))
             nearest = np.minimum(np.searchsorted(blocks, ids), len(blocks) - 1)
@@ -103,9 +104,9 @@ class CellPixels:
     def image(
         self, values: NDArray[np.uint8], colours: Sequence[str], *, effort: int = 9
     ) -> tuple[bytes, list[list[float]]]:
-        """Draw a value of each block, as a PNG with its corners; 0 is nothing, 1 the first colour.
+        """Return a PNG of a value of each block, and its corners; 0 is clear, 1 the first colour.
 
-        ``effort``, 1 to 9, is how hard to try to make it small.
+        ``effort`` is the compression level, 1 to 9.
         """
         return _png(np.append(values, np.uint8(0))[self.blocks], colours, effort), self.corners
 
@@ -119,11 +120,10 @@ class CellPixels:
 def city_image(
     database: SignatureDatabase, shades: Mapping[int, str]
 ) -> tuple[bytes, list[list[float]]]:
-    """Draw how many objects are seen from every cell, as a PNG with its corners.
+    """Return a PNG of the number of objects seen from each cell, and its corners.
 
-    ``shades`` gives a colour (``#rrggbb``) to each smallest number of objects, rising from 1. Rows
-    and columns are even steps of Web Mercator. The corners are south-west and north-east, latitude
-    and longitude. A city wider than 2048 cells is drawn in blocks of cells, each with its mean.
+    ``shades`` gives the colour (``#rrggbb``) of each smallest number of objects, rising from 1. A
+    block of several cells gets their mean (see `CellPixels`).
     """
     pixels = CellPixels.of(database)
     means = np.bincount(pixels.members, weights=database.lengths) / np.bincount(pixels.members)
@@ -133,9 +133,9 @@ def city_image(
 def level_image(
     database: SignatureDatabase, levels: NDArray[np.uint8], colours: Sequence[str]
 ) -> tuple[bytes, list[list[float]]]:
-    """Draw a level of every cell, as a PNG with its corners (see `city_image`).
+    """Return a PNG of a level of each cell, and its corners.
 
-    Levels count from 1 into ``colours``; 0 is nothing. A block has the highest of its cells.
+    Levels count from 1 into ``colours``; 0 is clear. A block gets the highest level of its cells.
     """
     pixels = CellPixels.of(database)
     return pixels.image(pixels.levels(levels), colours)
@@ -144,7 +144,7 @@ def level_image(
 def _mercator_lattice(
     database: SignatureDatabase, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], list[float]]:
-    """Return x and y on a lattice over an area in Web Mercator, and its box; the south first."""
+    """Return x and y on a lattice over an area in Web Mercator, from the south, and its box."""
     to_mercator = Transformer.from_crs(database.crs, "EPSG:3857", always_xy=True)
     sides = np.linspace(low, high, _LATTICE + 1)
     x, y = to_mercator.transform(*np.meshgrid(sides[:, 0], sides[:, 1]))
@@ -163,10 +163,10 @@ def mercator_places(
     high: NDArray[np.float64],
     shape: tuple[int, int],
 ) -> tuple[NDArray[np.float64], list[float]]:
-    """Return places in the CRS of a database, evenly spaced in Web Mercator, with their box there.
+    """Return places in the CRS of a database that are evenly spaced in Web Mercator, and their box.
 
-    They are the centres of so many rows and columns over an area, from north to south, shape
-    (rows, columns, 2).
+    They are the centres of `shape` rows and columns over an area, from north to south, as an array
+    of shape (rows, columns, 2).
     """
     lattice, box = _mercator_lattice(database, low, high)
     rows, columns = shape
@@ -175,7 +175,7 @@ def mercator_places(
 
 
 def _between(pixels: int) -> NDArray[np.float64]:
-    """Return the matrix that interpolates the values of a lattice at the centres of pixels."""
+    """Return the weights that interpolate a lattice at pixel centres, shape (pixels, 65)."""
     places = (np.arange(pixels) + 0.5) * (_LATTICE / pixels)
     weights: NDArray[np.float64] = 1.0 - np.abs(places[:, None] - np.arange(_LATTICE + 1))
     return np.maximum(weights, 0.0)
@@ -184,13 +184,14 @@ def _between(pixels: int) -> NDArray[np.float64]:
 def _png(pixels: NDArray[np.uint8], colours: Sequence[str], effort: int) -> bytes:
     """Return a PNG with a palette: 0 is transparent, 1 the first colour, and so on."""
     height, width = pixels.shape
-    # As few bits a pixel as the colours need: all the faster to pack and to unpack.
+    # As few bits a pixel as the colours need, which is faster to pack and to unpack.
     bits = next(bits for bits in (1, 2, 4, 8) if len(colours) < 1 << bits)
     each = 8 // bits
-    joined = np.zeros((height, 1 + -(-width // each)), np.uint8)  # a line begins with its filter
+    # A byte holds several pixels, the first in the highest bits; a row begins with its filter, 0.
+    joined = np.zeros((height, 1 + -(-width // each)), np.uint8)
     for part in range(each):
-        own = pixels[:, part::each]
-        joined[:, 1 : own.shape[1] + 1] |= own << np.uint8(8 - bits * (part + 1))
+        column = pixels[:, part::each]
+        joined[:, 1 : column.shape[1] + 1] |= column << np.uint8(8 - bits * (part + 1))
     chunks = (
         (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 3, 0, 0, 0)),
         (b"PLTE", bytes(3) + b"".join(bytes.fromhex(colour[1:]) for colour in colours)),
@@ -204,17 +205,17 @@ def _png(pixels: NDArray[np.uint8], colours: Sequence[str], effort: int) -> byte
     )
 
 
-QUANTUM_M = 0.25  # of Web Mercator
-MERCATOR_TURN = 2.0 * math.pi * 6_378_137.0  # its width
+QUANTUM_M = 0.25  # step of coordinates in the page, in metres of Web Mercator
+MERCATOR_TURN = 2.0 * math.pi * 6_378_137.0  # width of Web Mercator in metres
 
 
 def script_json(value: object) -> str:
     """Return a value as JSON for the script of a folium page; its numbers must be finite.
 
-    It is ASCII that no HTML parser takes for markup and no Jinja rendering changes.
+    The text is ASCII without HTML markup and without anything that Jinja would replace.
     """
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
-    # Only a brace of text can be followed by one of these: JSON's own is by a quote or a "}".
+    # A brace of JSON itself is followed by a quote or a "}", so these braces are inside texts.
     text = re.sub(r"\{(?=[{%#])", r"\\u007b", text)
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
@@ -222,22 +223,22 @@ def script_json(value: object) -> str:
 
 
 def packed(values: NDArray[Any] | Sequence[object]) -> list[str]:
-    """Return an array of u1, u2, i4 or f8, or a list for JSON, for `semsig.arrays`."""
+    """Return an array of u1, u2, i4 or f8, or a list as JSON, packed for `semsig.arrays`."""
     if not isinstance(values, np.ndarray):
-        return ["json", _text(json.dumps(values).encode())]
+        return ["json", _base64(json.dumps(values).encode())]
     kind = values.dtype.newbyteorder("<")
-    text = _text(np.ascontiguousarray(values, kind).tobytes())
+    text = _base64(np.ascontiguousarray(values, kind).tobytes())
     return [f"{kind.kind}{kind.itemsize}", text]
 
 
 def steps(values: NDArray[np.int32]) -> list[str]:
-    """Return numbers that change little from one to the next, for `semsig.arrays`."""
+    """Return integers as differences, packed by byte plane for `semsig.arrays`."""
     change = np.diff(values.astype("<i4"), prepend=np.int32(0))
-    return ["steps", _text(change.view(np.uint8).reshape(-1, 4).T.tobytes())]
+    return ["steps", _base64(change.view(np.uint8).reshape(-1, 4).T.tobytes())]
 
 
 def mercator(xy: NDArray[np.float64], crs: CRS) -> tuple[NDArray[np.int32], dict[str, Any]]:
-    """Return places as whole numbers, shape (n, 2), and how the script gets them back."""
+    """Return places in steps of `QUANTUM_M`, shape (n, 2), and settings to convert them back."""
     to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
     x, y = to_mercator.transform(xy[:, 0], xy[:, 1])
     metres = np.stack([across_180(x, crs, turn=MERCATOR_TURN), y], axis=1)
@@ -246,5 +247,5 @@ def mercator(xy: NDArray[np.float64], crs: CRS) -> tuple[NDArray[np.int32], dict
     return places, {"origin": origin.tolist(), "quantum": QUANTUM_M}
 
 
-def _text(content: bytes) -> str:
+def _base64(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content)).decode("ascii")

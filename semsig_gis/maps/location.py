@@ -1,4 +1,4 @@
-"""Maps of one answer: by distance, and by likelihood."""
+"""Maps of one answer: by likelihood, by chances only, and by distance."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from semsig_gis.maps.page_elements import (
     FLIPPING,
     OUTLINES,
     add_city,
+    add_layer,
     cell_image,
     cell_signature,
     colour_cells,
     corners_of,
-    draw,
+    credits_part,
+    escaped_text,
     exact_latlon,
-    finished_map,
-    folded,
-    isolated,
-    made_by,
+    finish_map,
+    folded_part,
+    layer_part,
     mark_svg,
+    method_text,
     panel_signs,
-    part_of,
-    prepared_map,
     query_signature,
     query_text,
     ramp_bar,
     ranks_text,
-    shades,
-    sources,
+    shades_part,
+    start_map,
     swatch,
     ties_text,
     to_latlon,
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 
 Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes of its corners
-PLACE_FIELDS = ("Chance", "Place", "Give or take", "North of the query", "Cell")
+PLACE_FIELDS = ("Chance", "Place", "Standard deviation", "North of the query", "Cell")
 BEST_FIELDS = ("Chance", "Cell sees", "Cell", "Place")
 CANDIDATE_FIELDS = (
     *("Query", "Cell sees", "Chance", "Log-likelihood"),
@@ -61,7 +61,8 @@ OBJECT_FIELDS = (
     *("Chance", "Seen as", "Seen at", "Street object", "It is at", "Off by"),
     *("Source", "Identifier"),
 )
-# What became of an object, and the look of the line to it, by default in its own colour.
+# Meaning of each verdict on an object, and the style of its ray; the default colour is that of
+# `VERDICTS`.
 RAYS: dict[str, tuple[str, dict[str, object]]] = {
     "matched": ("a street object", {"weight": 2, "opacity": 0.9, "dashArray": None}),
     "misnamed": ("one of another class", {"weight": 2, "opacity": 0.9, "dashArray": "9 4"}),
@@ -79,15 +80,15 @@ CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
 BEST_PLACE = "The best place has the most chance around it; ranks are of single cells."
 REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
-SURROUNDINGS_M = 45.0  # to see around the answer
+SURROUNDINGS_M = 45.0  # smallest distance that is shown around the answer
 CLOSEST_ZOOM = 20
-ARC_STEPS = 72
+ARC_POINTS = 72  # of the outline of a sector
 
 
 def location_map(
     location: Location, *, map_: folium.Map | None = None, tiles: str | None = None
 ) -> folium.Map:
-    """Show where a query may have been seen, and why there.
+    """Show where a query may have been seen, and what supports each place.
 
     Parameters
     ----------
@@ -99,11 +100,11 @@ def location_map(
     Returns
     -------
     folium.Map
-        The map, with these layers: the cells; their chances, those of the places around them, and
-        the fewest cells that hold 50, 90 and 99 % of the chance, as images of which the most
-        telling is shown at first; the candidates with their ranks, the best place with its
-        ellipse of 90 %, and for each candidate that was explained the rays of the query and the
-        street objects; a click tells of each in the panel.
+        The map, with these layers: images of the cells, of their chances, of the chances within
+        a radius, and of the fewest cells that contain 50, 90 and 99 % of the chance (the most
+        informative one is shown first); the candidates with their ranks, the best place with its
+        ellipse of 90 %, and for each explained candidate the rays of the query and the street
+        objects. A click shows the facts of each in the panel.
 
     Examples
     --------
@@ -113,23 +114,21 @@ def location_map(
     20
     """
     database = location.posterior.database
-    drawings = _Drawings(location)
-    page = prepared_map(map_, tiles, title="Where it was seen")
+    layers = _LocationLayers(location)
+    page = start_map(map_, tiles, title="Where it was seen")
     near = location.answer.given
     _colour_chances(page, location.posterior, radius=location.rule.radius, near=near)
     for number, explanation in enumerate(location.explanations, start=1):
-        parts = drawings.explanation(explanation)
-        draw(
-            page, f"Objects from rank {number}", "drawings", parts, group="answer", show=number == 1
-        )
-    candidates = drawings.candidates()
+        name, parts = f"Objects from rank {number}", layers.explanation(explanation)
+        add_layer(page, name, "drawings", parts, group="answer", show=number == 1)
+    candidates = layers.candidates()
     name = f"Candidates ({len(candidates):,})"
     # The best last, so that they lie on top.
-    titles = panel_signs(database)
-    draw(page, name, "points", CANDIDATE_FIELDS, titles, candidates[::-1], group="answer")
-    draw(page, "Best place", "drawings", drawings.place(), group="answer")
-    legend, view = location_legend(location), drawings.view() if map_ is None else None
-    return finished_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
+    signs = panel_signs(database)
+    add_layer(page, name, "points", CANDIDATE_FIELDS, signs, candidates[::-1], group="answer")
+    add_layer(page, "Best place", "drawings", layers.place(), group="answer")
+    legend, view = location_legend(location), layers.view() if map_ is None else None
+    return finish_map(page, database, legend=legend, view=view, zoom=CLOSEST_ZOOM)
 
 
 def posterior_map(
@@ -139,22 +138,22 @@ def posterior_map(
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show the chance of every cell, as what is left of an answer that was written to a raster.
+    """Show the chance of every cell, for an answer that was exported to a raster.
 
     Parameters
     ----------
     posterior : Posterior
         What to show (see `open_posterior`).
     radius : float, default 50
-        Metres around a cell in which the chance is summed up, too.
+        Radius in metres around a cell in which chances are summed for a second image.
     map_, tiles : optional
         As in `evaluation_map`.
 
     Returns
     -------
     folium.Map
-        The map: the cells coloured as in `location_map`, and the cell around which most of the
-        chance is.
+        The map: the cells coloured as in `location_map`, and the cell with the largest chance
+        within the radius.
 
     Examples
     --------
@@ -165,48 +164,49 @@ def posterior_map(
     20
     """
     database = posterior.database
-    page = prepared_map(map_, tiles, title="Where it was seen")
+    page = start_map(map_, tiles, title="Where it was seen")
     _colour_chances(page, posterior, radius=radius, near=False)
     cell, mass = posterior.best_place(radius)
     (place,) = exact_latlon(database.xy[cell], database.crs)
-    told = f"{percent(mass)} within {radius:g} m"
-    seen = cell_signature(database, cell, place=place)
-    details = [told, seen, str(database.cell_ids[cell]), _position(place)]
+    chance_text = f"{percent(mass)} within {radius:g} m"
+    signature = cell_signature(database, cell, place=place)
+    details = [chance_text, signature, str(database.cell_ids[cell]), _position(place)]
     record = [place, CANDIDATE, 8, "Best place", details, "1"]
     signs = panel_signs(database)
-    draw(page, "Best place", "points", BEST_FIELDS, signs, [record], group="answer")
+    add_layer(page, "Best place", "points", BEST_FIELDS, signs, [record], group="answer")
     legend = (
         "<summary>Where it was seen</summary>"
-        f"<p>{len(database):,} cells; most of the chance is around one: {told}</p>"
-        f"{_chances_legend(posterior)}{shades()}{sources(database.licenses)}"
+        f"<p>{len(database):,} cells; the largest chance around one: {chance_text}</p>"
+        f"{_chances_legend(posterior)}{shades_part()}{credits_part(database.licenses)}"
     )
     view = corners_of(database) if map_ is None else None
-    return finished_map(page, database, legend=legend, view=view)
+    return finish_map(page, database, legend=legend, view=view)
 
 
 def _colour_chances(map_: folium.Map, posterior: Posterior, *, radius: float, near: bool) -> None:
-    """Colour cells by their chances: from near those of the cells, from afar those around them."""
+    """Add images of chances and regions; show chances of cells if `near`, else within a radius."""
     city = add_city(map_, posterior.database)
     around, cell = posterior.mass_within(radius), posterior.chances
+    regions = _image(posterior, region_levels(posterior), REGION_COLOURS)
     for name, picture, show in (
         (f"Chance within {radius:g} m", _chances(posterior, around), not near),
         ("Chance of a cell", _chances(posterior, cell), near),
-        ("Regions of 50, 90 and 99 %", _regions(posterior), False),
+        ("Regions of 50, 90 and 99 %", regions, False),
     ):
         image = cell_image(map_, *picture, dark="flip", opacity=0.85)
         colour_cells(map_, name, city, image, show=show)
 
 
 def _chances(posterior: Posterior, chances: NDArray[np.float64]) -> Image:
-    """Return an image of a chance of each cell."""
+    """Return an image of one chance per cell."""
     levels = np.digitize(chances, list(CELL_CHANCES))
     return _image(posterior, levels, list(CELL_CHANCES.values()))
 
 
 def region_levels(posterior: Posterior) -> NDArray[np.uint8]:
-    """Return which of `CHANCES`, from the largest share on and counted from 1, each cell is in.
+    """Return the level of the smallest region that contains each cell, or 0.
 
-    It is in the fewest cells that hold the share; 0 stands for none.
+    Level 1 is the region of the largest share of `CHANCES`: the fewest cells that contain it.
     """
     levels = np.zeros(len(posterior.database), np.uint8)
     for level, share in enumerate(sorted(CHANCES, reverse=True), start=1):
@@ -214,19 +214,14 @@ def region_levels(posterior: Posterior) -> NDArray[np.uint8]:
     return levels
 
 
-def _regions(posterior: Posterior) -> Image:
-    """Return an image of the fewest cells that hold each share of the chance."""
-    return _image(posterior, region_levels(posterior), REGION_COLOURS)
-
-
 def _image(posterior: Posterior, levels: NDArray[np.integer], colours: list[str]) -> Image:
-    """Return an image of the cells that have a level above 0, and of the likeliest."""
+    """Return an image of the cells with a level above 0 and of the likeliest cell."""
     cells = np.union1d(np.flatnonzero(levels), [int(posterior.chances.argmax())])
     return level_image(posterior.database.select(cells), levels[cells].astype(np.uint8), colours)
 
 
-class _Drawings:
-    """What the script of the page draws of a location."""
+class _LocationLayers:
+    """Layers of a location, as records for the script of the page."""
 
     def __init__(self, location: Location) -> None:
         self.location = location
@@ -237,7 +232,7 @@ class _Drawings:
         return exact_latlon(xy, self.database.crs)
 
     def view(self) -> NDArray[np.float64]:
-        """Return the corners of what is shown first."""
+        """Return the corners of the first view."""
         place = self.location.estimate
         middle = np.array([[place.x, place.y]])
         if self.location.answer.given:
@@ -303,15 +298,14 @@ class _Drawings:
         ends = explanation.ends(self.database.reach)
         for row, shape, end in zip(explanation.to_dict()["rows"], shapes, ends, strict=True):
             verdict = row["verdict"]
-            seen_at, object_at = row["query_bearing"], row["object_bearing"]
             rays[verdict].append(self.latlon(np.stack([here, end])))
             place = end if shape is None else np.array([shape.x, shape.y])
             details = [
                 f"{row['chance']:.2f}",
                 self._title(row["query_class"]),
-                _degrees(seen_at, row["query_range"]),
+                _degrees(row["query_bearing"], row["query_range"]),
                 self._title(row["object_class"]),
-                _degrees(object_at, row["distance"]),
+                _degrees(row["object_bearing"], row["distance"]),
                 None if row["bearing_error"] is None else f"{row['bearing_error']:+.1f}°",
                 row["source"],
                 row["source_id"],
@@ -327,12 +321,12 @@ class _Drawings:
         return [["lines", lines], ["points", OBJECT_FIELDS, {}, records]]
 
     def _sectors(self, explanation: Explanation) -> list[list[list[float]]]:
-        """Return the outlines of what was looked at from a place, as far as is seen."""
+        """Return the outlines of the photo sectors at a place, out to the visibility range."""
         photos = View.of(self.location.grid_query).photos
         outlines = []
         for photo, turn in zip(photos, explanation.headings, strict=True):
             for low, high in photo.turned(turn).sectors:
-                bearings = np.radians(np.linspace(low, high, ARC_STEPS))
+                bearings = np.radians(np.linspace(low, high, ARC_POINTS))
                 arc = np.stack([np.sin(bearings), np.cos(bearings)], axis=1)
                 corners = np.concatenate([[[0.0, 0.0]], arc, [[0.0, 0.0]]])
                 away = self.database.spec.radius * corners
@@ -340,7 +334,7 @@ class _Drawings:
         return outlines
 
     def _title(self, name: str | None) -> str | None:
-        """Return the title of a class; "unknown" and nothing stay what they are."""
+        """Return the title of a class; "unknown" and None are returned unchanged."""
         return self.titles.get(name, name) if name is not None else None
 
 
@@ -361,7 +355,7 @@ def _north(heading: float | None, sigma: float | None = None) -> str | None:
 
 
 def _notes(answer: Answer) -> str:
-    """Return what there is to say of the query and its answer, as HTML."""
+    """Return the notes of an answer as HTML, and the north of the query unless it is grid north."""
     notes = [f"Note: {note}" for note in answer.notes]
     if answer.north != GRID_NORTH:
         notes.insert(0, f"Bearings of the query are measured from {answer.north}.")
@@ -369,36 +363,38 @@ def _notes(answer: Answer) -> str:
 
 
 def location_legend(location: Location) -> str:
-    """Return the legend of a map of chances, as HTML with data escaped."""
+    """Return the legend of `location_map` as HTML with data escaped."""
     posterior, answer, estimate = location.posterior, location.answer, location.estimate
     mark, verdict, note = (
         (ANSWERS["given"], "The answer", "")
         if answer.given
         else (ANSWERS["withheld"], "Cannot tell; the best place", f"<p>{BEST_PLACE}</p>")
     )
-    told = {row["verdict"] for one in location.explanations for row in one.rows} | set(COUNTED)
+    # The counted verdicts always, others only where they occur.
+    verdicts = {row["verdict"] for item in location.explanations for row in item.rows}
     kinds = "".join(
-        f"<br>{swatch(VERDICTS[verdict])}{verdict}: {text}"
-        for verdict, (text, _) in RAYS.items()
-        if verdict in told
+        f"<br>{swatch(VERDICTS[kind])}{kind}: {text}"
+        for kind, (text, _) in RAYS.items()
+        if kind in verdicts or kind in COUNTED
     )
     rays = f"<p>Objects of the query, as rays where they were seen{kinds}</p>"
-    method = f"Likelihood, {isolated(location.noise)} noise, {len(posterior.database):,} cells"
-    asked = f"<p>{query_text(location.query, posterior.database.taxonomy)}</p>"
+    credit = credits_part(posterior.database.licenses)
+    method = f"Likelihood, {escaped_text(location.noise)} noise, {len(posterior.database):,} cells"
+    query = f"<p>{query_text(location.query, posterior.database.taxonomy)}</p>"
     return (
         "<summary>Where it was seen</summary>"
         f"<p>{mark_svg(mark)} <b>{verdict}</b>: {percent(answer.mass)} within "
         f"{location.rule.radius:g} m<br>If there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
-        f"(ellipse: 90 %)<br>{made_by(method)}</p>{note}{_notes(location)}"
+        f"(ellipse: 90 %)<br>{method_text(method)}</p>{note}{_notes(location)}"
         f"{_chances_legend(posterior)}"
-        f"{part_of('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
-        f"{part_of('Objects from rank ', rays) if location.explanations else ''}"
-        f"{shades()}{folded('The query', asked)}{sources(posterior.database.licenses)}"
+        f"{layer_part('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
+        f"{layer_part('Objects from rank ', rays) if location.explanations else ''}"
+        f"{shades_part()}{folded_part('The query', query)}{credit}"
     )
 
 
 def _chances_legend(posterior: Posterior) -> str:
-    """Return what the colours of chances mean."""
+    """Return the legend of the images of chances and of regions, as HTML."""
     counts = {share: len(posterior.credible_cells(share)) for share in CHANCES}
     regions = "<br>".join(
         f"{swatch(CHANCES[share], FLIPPING)}{percent(share, 0)} in {count:,} "
@@ -409,7 +405,7 @@ def _chances_legend(posterior: Posterior) -> str:
         f"<span style='white-space:nowrap'>{swatch(shade, FLIPPING)}{100.0 * least:g}+</span>"
         for least, shade in sorted(CELL_CHANCES.items(), reverse=True)
     )
-    return part_of("Chance ", f"<p>Chance in percent<br>{chances}</p>") + part_of(
+    return layer_part("Chance ", f"<p>Chance in percent<br>{chances}</p>") + layer_part(
         "Regions ", f"<p>Regions, the fewest cells that contain<br>{regions}</p>"
     )
 
@@ -424,7 +420,7 @@ def localization_map(
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show the places where a query may have been taken, the best ones first.
+    """Show the candidate cells of a query, the best ones first.
 
     Parameters
     ----------
@@ -439,12 +435,12 @@ def localization_map(
     -------
     folium.Map
         The map: the cells as an image, and the candidates, coloured by their distance to the
-        query, told of by a click. The best candidates are larger.
+        query and described by a click. The best candidates are larger.
 
     Raises
     ------
     InputError
-        If another database was searched, or as in `evaluation_map`.
+        If the localization is from another database, or as in `evaluation_map`.
 
     Examples
     --------
@@ -456,20 +452,20 @@ def localization_map(
     xy = localization.candidates[["x", "y"]].to_numpy(np.float64)
     places = to_latlon(xy, database.crs)
     records = _candidate_records(localization, database, places)
-    page = prepared_map(map_, tiles, title="Candidate places")
+    page = start_map(map_, tiles, title="Candidate places")
     add_city(page, database)
     name = f"Candidates ({len(records):,})"
     # The best last, so that they lie on top.
-    titles = panel_signs(database)
-    draw(page, name, "points", RANK_FIELDS, titles, records[::-1], group="answer")
+    signs = panel_signs(database)
+    add_layer(page, name, "points", RANK_FIELDS, signs, records[::-1], group="answer")
     legend = localization_legend(localization)
-    return finished_map(page, database, legend=legend, view=places if map_ is None else None)
+    return finish_map(page, database, legend=legend, view=places if map_ is None else None)
 
 
 def _candidate_records(
     localization: Localization, database: SignatureDatabase, places: NDArray[np.float64]
 ) -> list[list[Any]]:
-    """Return what the script draws of each candidate, best first."""
+    """Return a record for the script of each candidate, best first."""
     candidates = localization.candidates
     rows = rows_of_result(database, candidates["cell_id"], candidates["types"], what="localization")
     distances = candidates["distance"].to_numpy(np.float64)
@@ -495,19 +491,19 @@ def _candidate_records(
 
 
 def localization_legend(localization: Localization) -> str:
-    """Return the legend of a map of candidates, as HTML with data escaped."""
+    """Return the legend of `localization_map` as HTML with data escaped."""
     candidates = localization.candidates
     more = localization.tied_beyond
     cells = "1 more cell is" if more == 1 else f"{more:,} more cells are"
     beyond = f"<br>{cells} as good as the last one" if more else ""
     distances = candidates["distance"]
     method = f"{escape(str(localization.method))}, by {escape(localization.used)}"
-    asked = f"<p>{query_text(localization.query, localization.taxonomy)}</p>"
+    query = f"<p>{query_text(localization.query, localization.taxonomy)}</p>"
     ramp = ramp_bar(CANDIDATE_RAMP, f"{distances.min():.3f}", f"{distances.max():.3f}")
     return (
         "<summary>Candidate places</summary>"
         f"<p>The best <b>{len(candidates):,}</b> of {localization.cells:,} cells{beyond}<br>"
-        f"{made_by(method)}</p>{_notes(localization)}"
-        f"{part_of('Candidates', f'<p>Distance to the query (large sign: rank 1){ramp}</p>')}"
-        f"{shades()}{folded('The query', asked)}{sources(localization.licenses)}"
+        f"{method_text(method)}</p>{_notes(localization)}"
+        f"{layer_part('Candidates', f'<p>Distance to the query (large sign: rank 1){ramp}</p>')}"
+        f"{shades_part()}{folded_part('The query', query)}{credits_part(localization.licenses)}"
     )

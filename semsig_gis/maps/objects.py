@@ -1,4 +1,4 @@
-"""Maps of the street objects, and of streets and buildings below them."""
+"""Maps of street objects, and of the streets and buildings below them."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from semsig_gis.maps.image import mercator, packed, steps
 from semsig_gis.maps.page_elements import (
     Call,
     add_city,
+    add_layer,
     corners_of,
-    draw,
-    finished_map,
-    isolated,
+    credits_part,
+    escaped_text,
+    finish_map,
     layers_of,
-    prepared_map,
     sign_look,
     sign_svg,
-    sources,
+    start_map,
     to_latlon,
 )
 from semsig_gis.objects import licenses_of
@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
 
 
-STREET_M = 6.0
-DETAIL_M = 0.6  # what is smaller is not drawn
+STREET_WIDTH_M = 6.0
+DETAIL_M = 0.6  # smaller details are not drawn
 POLYGONAL = 2
-FIELDS = ("Class", "Source", "Identifier", "Stands for", "Also", "Place")
+FIELDS = ("Class", "Source", "Identifier", "Represents", "Also", "Place")
 
 
 def ground_map(
@@ -61,7 +61,7 @@ def ground_map(
     box: tuple[float, float, float, float] | None = None,
     map_: folium.Map | None = None,
 ) -> folium.Map:
-    """Show plain streets and buildings, for other things to be seen among.
+    """Show plain streets and buildings as a background of other layers.
 
     Parameters
     ----------
@@ -70,9 +70,11 @@ def ground_map(
     streets : GeoDataFrame, optional
         Centre lines in the same CRS; those with a ``name`` can be searched.
     box : tuple of float, optional
-        ``xmin, ymin, xmax, ymax`` in that CRS: only what meets it. Everything by default.
+        ``xmin, ymin, xmax, ymax`` in that CRS; only shapes that intersect it are drawn. All shapes
+        by default.
     map_ : folium.Map, optional
-        Map to add the layer to, on the images of cells and below all else; a new one by default.
+        Map to add the layer to, above the images of cells and below all other layers; a new one by
+        default.
 
     Returns
     -------
@@ -84,7 +86,7 @@ def ground_map(
     CrsError
         If a table has no CRS, or the two differ.
     EmptyResultError
-        If there is nothing to show.
+        If there is no shape to show.
 
     Notes
     -----
@@ -98,29 +100,29 @@ def ground_map(
     >>> ground_map(buildings=house).options["maxZoom"]
     20
     """
-    both = {"buildings": buildings, "streets": streets}
-    tables = {kind: table for kind, table in both.items() if table is not None}
+    arguments = {"buildings": buildings, "streets": streets}
+    tables = {kind: table for kind, table in arguments.items() if table is not None}
     systems = [table.crs for table in tables.values()]
     if None in systems or len(set(systems)) > 1:
         names = " and ".join("no CRS" if crs is None else crs.name for crs in systems)
         raise CrsError(f"the streets and buildings have {names}; give both in one CRS.")
     arrays, about, bounds = packed_ground(tables, box)
-    page = prepared_map(map_, None, title="Streets and buildings")
-    draw(page, "Streets and buildings", "ground", arrays, about, group="ground")
+    page = start_map(map_, None, title="Streets and buildings")
+    add_layer(page, "Streets and buildings", "ground", arrays, about, group="ground")
     legend, view = "", None
     if map_ is None:
         legend = "<summary>Streets and buildings</summary>"
         view = to_latlon(bounds, systems[0])
     licenses = licenses_of(buildings, streets)
-    return finished_map(page, None, legend=legend, view=view, licenses=licenses)
+    return finish_map(page, None, legend=legend, view=view, licenses=licenses)
 
 
 def packed_ground(
     tables: Mapping[str, gpd.GeoDataFrame], box: tuple[float, float, float, float] | None = None
 ) -> tuple[dict[str, dict[str, list[str]]], dict[str, Any], NDArray[np.float64]]:
-    """Return ``streets`` and ``buildings`` of one CRS for the script, and the bounds of them.
+    """Return streets and buildings of one CRS for the script: arrays, settings and bounds.
 
-    EmptyResultError if nothing of them meets the box.
+    EmptyResultError if no shape intersects the box.
     """
     simple = {kind: _simple(table, box) for kind, table in tables.items()}
     shapes = {kind: parts for kind, (parts, _) in simple.items() if len(parts)}
@@ -130,7 +132,11 @@ def packed_ground(
         )
     arrays, about = _ground(shapes, next(iter(tables.values())).crs)
     if "streets" in shapes and NAME in tables["streets"]:
-        arrays["streets"] |= _named(tables["streets"][NAME].iloc[simple["streets"][1]])
+        # Each name once, and for each line the number of its name or -1.
+        names = tables["streets"][NAME].iloc[simple["streets"][1]]
+        numbers, titles = pd.factorize(names.where(names.notna() & (names != "")), sort=True)
+        arrays["streets"]["names"] = packed(titles.astype(str).tolist())
+        arrays["streets"]["called"] = steps(numbers.astype(np.int32))
     bounds = shapely.total_bounds(np.concatenate(list(shapes.values()))).reshape(2, 2)
     return arrays, about, bounds
 
@@ -138,37 +144,28 @@ def packed_ground(
 def _simple(
     table: gpd.GeoDataFrame, box: tuple[float, float, float, float] | None
 ) -> tuple[NDArray[np.object_], NDArray[np.int64]]:
-    """Return the lines or polygons of a table without small details, neighbours together.
-
-    The second array holds the row of each.
-    """
+    """Return simplified lines or polygons of a table along a Hilbert curve, and their rows."""
     shapes = table.geometry.to_numpy()
-    kept = ~(shapely.is_missing(shapes) | shapely.is_empty(shapes))
+    selected = ~(shapely.is_missing(shapes) | shapely.is_empty(shapes))
     if box is not None:
-        kept &= shapely.intersects(shapes, shapely.box(*box))
-    rows = np.flatnonzero(kept)
+        selected &= shapely.intersects(shapes, shapely.box(*box))
+    rows = np.flatnonzero(selected)
     parts, owner = shapely.get_parts(shapes[rows], return_index=True)
     parts = shapely.simplify(parts, DETAIL_M, preserve_topology=False)
-    whole = ~shapely.is_empty(parts)
-    rows = rows[owner][whole]
-    parts, owner = shapely.get_parts(parts[whole], return_index=True)
-    # Outlines one way round and courtyards the other, as a canvas wants them.
+    # Simplifying may empty a part or split it.
+    solid = ~shapely.is_empty(parts)
+    rows = rows[owner][solid]
+    parts, owner = shapely.get_parts(parts[solid], return_index=True)
+    # Outlines and courtyards in opposite directions, which the fill rule of a canvas needs.
     rows, parts = rows[owner], shapely.normalize(parts)
     order = hilbert_order(parts) if len(parts) else slice(None)
     return parts[order], rows[order]
 
 
-def _named(names: pd.Series) -> dict[str, list[str]]:
-    """Return the names of streets for the script: each once, and the number of that of a line."""
-    known = names.where(names.notna() & (names != ""))
-    numbers, titles = pd.factorize(known, sort=True)
-    return {"names": packed(titles.astype(str).tolist()), "called": steps(numbers.astype(np.int32))}
-
-
 def _ground(
     shapes: dict[str, NDArray[np.object_]], crs: CRS
 ) -> tuple[dict[str, dict[str, list[str]]], dict[str, Any]]:
-    """Return the shapes for the script: points, where rings end, and where shapes do."""
+    """Return the shapes for the script: points, ends of rings by point, ends of shapes by ring."""
     rings = {
         kind: shapely.get_rings(parts, return_index=True)
         if shapely.get_dimensions(parts[0]) == POLYGONAL
@@ -189,9 +186,10 @@ def _ground(
             "rings": np.cumsum(np.bincount(owner, minlength=len(shapes[kind]))),
         }
         arrays[kind] = {name: steps(values.astype(np.int32)) for name, values in numbers.items()}
+    # Web Mercator stretches lengths by 1 / cos(latitude).
     middle = np.concatenate(list(points.values())).mean(axis=0, keepdims=True)
     latitude = float(to_latlon(middle, crs)[0, 0])
-    return arrays, about | {"width": STREET_M / float(np.cos(np.radians(latitude)))}
+    return arrays, about | {"width": STREET_WIDTH_M / float(np.cos(np.radians(latitude)))}
 
 
 def objects_map(
@@ -201,24 +199,24 @@ def objects_map(
     map_: folium.Map | None = None,
     tiles: str | None = None,
 ) -> folium.Map:
-    """Show where the street objects are, and what is known of each.
+    """Show the street objects and their attributes.
 
     Parameters
     ----------
     objects : StreetObjects
         What to show.
     database : SignatureDatabase, optional
-        The cells from which they are seen: a layer that is hidden at first, and to be found by
-        number.
+        The cells from which they are seen: a layer that is hidden at first. The search finds cells
+        by number.
     map_, tiles : optional
         As in `evaluation_map`; on a map of your own the layers are hidden at first.
 
     Returns
     -------
     folium.Map
-        The map, with a layer for each class, named with its sign and number; a click on an object
-        tells its class, source, identifier and place. All are drawn on one canvas, so that
-        hundreds of thousands stay smooth.
+        The map, with a layer for each class, named with its sign and number of objects; a click
+        shows class, source, identifier and place of an object. One canvas draws them all, so that
+        hundreds of thousands of objects stay smooth.
 
     Raises
     ------
@@ -234,18 +232,18 @@ def objects_map(
     """
     if len(objects) == 0:
         raise EmptyResultError("there is no street object to show; look at what was loaded.")
-    page = prepared_map(map_, tiles, title="Street objects")
+    page = start_map(map_, tiles, title="Street objects")
     if database is not None:
         add_city(page, database, show=False)
     key = f"objects{len(layers_of(page))}"
     Call("streetObjects", key, *_packed_objects(objects)).add_to(page)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     for number, (code, count) in enumerate(counts.items()):
-        title = isolated(signs[code].title)
-        # The layer control reads it as HTML; a brace could begin what folium renders once more.
+        title = escaped_text(signs[code].title)
+        # The layer control shows the name as HTML; folium would render a brace as a template.
         name = f"{sign_svg(signs[code])} {title} ({count:,})".replace("{", "&#123;")
-        draw(page, name, "classLayer", key, number, group="objects", show=map_ is None)
-    return finished_map(
+        add_layer(page, name, "classLayer", key, number, group="objects", show=map_ is None)
+    return finish_map(
         page,
         objects if database is None else database,
         legend=objects_legend(objects),
@@ -255,7 +253,7 @@ def objects_map(
 
 
 def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """Return the objects for the script: class by class, neighbours together; and what they are."""
+    """Return the objects for the script, by class and along a Hilbert curve, and settings."""
     near = hilbert_order(objects.table.geometry.array)
     order = near[np.argsort(objects.codes[near], kind="stable")]
     table = objects.table.iloc[order]
@@ -282,7 +280,7 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
         "classes": classes,
         "sources": sources.tolist(),
         "fields": FIELDS,
-        # The rare ones last, so that they lie on top.
+        # Rare classes last, so that they lie on top.
         "order": np.argsort([-count for count in counts.values()], kind="stable").tolist(),
     }
     columns = {name: packed(values) for name, values in arrays.items()}
@@ -291,11 +289,11 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
 
 
 def objects_legend(objects: StreetObjects) -> str:
-    """Return the legend of a map of street objects, as HTML with data escaped."""
+    """Return the legend of `objects_map` as HTML with data escaped."""
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     rows = "".join(
         f"<tr><td>{sign_svg(signs[code])}</td>"
-        f"<td class='title'>{isolated(signs[code].title)}</td>"
+        f"<td class='title'>{escaped_text(signs[code].title)}</td>"
         f'<td class="count">{count:,}</td></tr>'
         for code, count in counts.items()
     )
@@ -303,5 +301,5 @@ def objects_legend(objects: StreetObjects) -> str:
         "<summary>Street objects</summary>"
         f"<p><b>{len(objects):,}</b> objects of {len(counts)} classes<br>"
         f"Click one for details</p><table>{rows}</table>"
-        f"{sources(map(str, objects.licenses))}"
+        f"{credits_part(map(str, objects.licenses))}"
     )

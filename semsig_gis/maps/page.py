@@ -1,8 +1,8 @@
-"""Leaflet and its companions, put into a page so that a map opens without any request.
+"""Pages of maps, with Leaflet and other browser files included so that no request is needed.
 
-They are brought into the folder ``assets`` when the package is built (``hatch_build.py``, which
-needs ``npm`` and puts their licences and a bill of materials into the metadata). Where they were
-not, `available` is false and a map keeps its links.
+The build of the package copies these files into the folder ``assets`` (``hatch_build.py``, which
+needs ``npm`` and adds their licences and a bill of materials to the metadata). If they are missing,
+`available` is false and a map links to the web instead.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from branca.element import Figure
 
-# Files that every folium page links and that our maps do without: they only serve
-# `folium.Icon`, Font Awesome and Bootstrap widgets.
+# Files that every folium page links but that our maps do not use: only `folium.Icon`, Font Awesome
+# and Bootstrap widgets need them.
 UNUSED = {
     *("bootstrap.bundle.min.js", "bootstrap.min.css", "bootstrap-glyphicons.css", "all.min.css"),
     *("leaflet.awesome-markers.js", "leaflet.awesome-markers.css"),
@@ -48,24 +48,24 @@ _REFERENCE = re.compile(
 )
 _CSS_IMAGE = re.compile(r"url\(images/(?P<name>[\w-]+\.png)\)")
 _SOURCE_MAP = re.compile(r"\n?//# sourceMappingURL=\S*\s*$")
-# folium forbids to enlarge a page with two fingers, which is how small text is read on a phone.
-_RIGID = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
+# folium disables zooming of a page with two fingers, which is needed to read small text on a phone.
+_NO_PAGE_ZOOM = re.compile(r",\s*maximum-scale=1\.0,\s*user-scalable=no")
 
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """One third-party file that the package carries, instead of those at the ends of addresses."""
+    """A third-party file of the package, and the names of the linked files that it replaces."""
 
     name: str
     package: str
     version: str
     sha256: str
-    stands_for: tuple[str, ...]
+    replaces: tuple[str, ...]
 
 
 @functools.cache
 def assets() -> Mapping[str, Asset]:
-    """Return the files of the manifest by name, in its order, whether brought or not."""
+    """Return the files of the manifest by name, in its order, including missing ones."""
     manifest = tomllib.loads(_folder().joinpath("manifest.toml").read_text(encoding="utf-8"))
     return {
         file["target"]: Asset(
@@ -73,7 +73,7 @@ def assets() -> Mapping[str, Asset]:
             package=package["name"],
             version=package["version"],
             sha256=file["sha256"],
-            stands_for=tuple(file.get("stands_for", ())),
+            replaces=tuple(file.get("stands_for", ())),
         )
         for package in manifest["package"]
         for file in package["file"]
@@ -81,16 +81,16 @@ def assets() -> Mapping[str, Asset]:
 
 
 def available() -> bool:
-    """Tell whether every file is there, unchanged, so that a map can be self-contained."""
+    """Whether all files exist unchanged, so that a map can be self-contained."""
     return all(_content(asset) is not None for asset in assets().values())
 
 
 def asset_text(name: str) -> str:
-    """Return a script or style sheet as it may stand inside its element of a page.
+    """Return a script or style sheet, escaped for its element of a page.
 
-    Images of a style sheet become data URIs. Raises `InputError` if the package has not the file.
+    Images of a style sheet become data URIs. InputError if the package does not contain the file.
     """
-    files = {asset.name: asset for asset in assets().values() if asset.stands_for}
+    files = {asset.name: asset for asset in assets().values() if asset.replaces}
     if name not in files:
         raise UnknownNameError(f"{name!r} is not a map file{nearest_name(name, files)}.")
     text = _required(files[name]).decode("utf-8")
@@ -111,13 +111,13 @@ def external_files(page: str) -> tuple[str, ...]:
 
 
 def inline_assets(page: str) -> str:
-    """Return a page of folium's with the script and style sheets that our maps use put into it.
+    """Return a page of folium with its linked scripts and style sheets included.
 
-    Raises `InputError` if the package was built without the files, or the page needs others (for a
-    plugin, `folium.Icon`, a colour map drawn by branca).
+    InputError if the package was built without the files, or the page needs others (for a plugin,
+    `folium.Icon`, a colour map drawn by branca).
     """
     replacements = {
-        file: asset.name for asset in assets().values() for file in asset.stands_for
+        file: asset.name for asset in assets().values() for file in asset.replaces
     } | dict.fromkeys(UNUSED)
     if "L.AwesomeMarkers." in page:
         raise InputError(
@@ -147,7 +147,7 @@ def _folder() -> Traversable:
 
 
 def _content(asset: Asset) -> bytes | None:
-    """Return the file if it is there and is the one that the manifest names."""
+    """Return the content of a file, or None if it is missing or its checksum is wrong."""
     path = _folder() / asset.name
     content = path.read_bytes() if path.is_file() else b""
     return content if hashlib.sha256(content).hexdigest() == asset.sha256 else None
@@ -168,7 +168,7 @@ def _data_uri(name: str) -> str:
 
 
 def _default_icon() -> str:
-    """Return JavaScript that gives Leaflet its default marker, which it looks for beside itself."""
+    """Return JavaScript that includes the images of Leaflet's default marker as data URIs."""
     images = {
         "iconUrl": _data_uri("marker-icon.png"),
         "iconRetinaUrl": _data_uri("marker-icon-2x.png"),
@@ -179,13 +179,13 @@ def _default_icon() -> str:
 
 @dataclass(frozen=True, slots=True)
 class MapFrame:
-    """A map as a notebook and the site show it: its page, in a frame ``height`` pixels high."""
+    """The page of a map in a frame of ``height`` pixels, for notebooks and the documentation."""
 
     page: str = field(repr=False)
     height: int
 
     def _repr_html_(self) -> str:
-        """Show the page in a frame of its own, where its scripts harm nothing else."""
+        """Return the page in a frame, which isolates its scripts from the notebook."""
         return (
             f'<iframe srcdoc="{html.escape(self.page)}" title="map" allowfullscreen '
             f'style="width: 100%; height: {self.height}px; border: none"></iframe>'
@@ -199,7 +199,7 @@ def page_of_map(
     if title is not None:
         cast("Figure", map_.get_root()).title = html.escape(title)
     page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
-    page = _RIGID.sub("", page, count=1)
+    page = _NO_PAGE_ZOOM.sub("", page, count=1)
     if self_contained or (self_contained is None and available()):
         try:
             return inline_assets(page)
@@ -210,16 +210,16 @@ def page_of_map(
 
 
 def show_map(map_: folium.Map, *, height: int = 520) -> MapFrame:
-    """Show a map in a notebook, as the last thing of a cell.
+    """Show a map in a notebook, as the last expression of a cell.
 
-    What folium shows by itself loads Leaflet from the web, and stays blank without it.
+    The display of folium itself loads Leaflet from the web, and stays blank without it.
 
     Parameters
     ----------
     map_ : folium.Map
         The map.
     height : int, default 520
-        How high it is shown, in pixels.
+        Height of the frame in pixels.
 
     Returns
     -------
@@ -251,21 +251,20 @@ def save_map(
     path : str or Path
         File to write; it appears whole, by rename.
     title : str, optional
-        What stands on the map, such as the city and the date of its data; by default, what the map
-        shows.
+        Title on the map, such as the city and the date of its data; by default, the kind of map.
     self_contained : bool, optional
-        True to put Leaflet and all else into the page, False to link them; by default they are
-        put into it where the package carries them and the map needs no others.
+        True to include Leaflet and all other files in the page, False to link them; by default
+        they are included if the package contains all files that the map needs.
 
     Returns
     -------
     bool
-        Whether the page makes no request at all, not even for tiles.
+        Whether the page opens without any request, even for tiles.
 
     Raises
     ------
     InputError
-        If the file cannot be written, or a self-contained page is not to be had.
+        If the file cannot be written, or a self-contained page was requested and is not possible.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What all maps are made of: the script of the page, the cells as an image, drawings, a legend."""
+"""Elements that all maps share: scripts, layers, the image of the cells, and parts of legends."""
 
 from __future__ import annotations
 
@@ -46,29 +46,29 @@ if TYPE_CHECKING:
 
 
 MAX_ZOOM = 20
-CLOSE_ZOOM = 17  # the closest that a new map shows by itself
-# Files of the folder ``js`` that every page has, in this order.
+FIRST_VIEW_ZOOM = 17  # highest zoom of the first view of a new map
+# Files of the folder ``js`` that every page contains, in this order.
 PAGE_FILES = (
     *("page.css", "panel.css", "layers.js", "state.js", "panel.js", "wheels.js", "search.js"),
     *("controls.js", "picture.js", "arrays.js", "board.js", "field.js", "objects.js", "ground.js"),
 )
-WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
-POWERS = 4  # of x and y, which tell a place within millimetres in a city
-LATTICE = 9
+TILES_WITHOUT_KEY = "a provider such as 'OpenStreetMap.Mapnik' or 'CyclOSM'"
+AREA_DEGREE = 4  # of the polynomial from x, y to degrees; exact to millimetres in a city
+AREA_LATTICE = 9  # points a side from which the polynomial is fitted
 
 
 @functools.cache
 def page_element(file: str) -> str:
-    """Return a file of the folder ``js`` as an element of a page."""
+    """Return a file of the folder ``js`` as a style or script element."""
     text = resources.files("semsig_gis.maps").joinpath("js", file).read_text(encoding="utf-8")
     if file.endswith(".css"):
         return f"<style>{text}</style>"
-    # The name by which the tools of a browser show the script.
+    # The developer tools of a browser show the script under this name.
     return f"<script>{text}//# sourceURL=semsig/{file}\n</script>"
 
 
 class PageFile(Element):
-    """A file of the folder ``js`` in a page, as it is: to read it as a template would take long."""
+    """A file of the folder ``js``, inserted unchanged because parsing it as a template is slow."""
 
     def __init__(self, file: str) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class PageFile(Element):
 
 
 class Call(MacroElement):
-    """A call of a function of the page's script, with elements of the map or plain values."""
+    """A call of a function of the page's script with map elements or plain values."""
 
     files: tuple[str, ...] = PAGE_FILES
     _template = Template(
@@ -93,11 +93,12 @@ class Call(MacroElement):
         self._name = "Semsig"
         self.function = function
         self.arguments = ", ".join(
-            one.get_name() if isinstance(one, Element) else script_json(one) for one in arguments
+            argument.get_name() if isinstance(argument, Element) else script_json(argument)
+            for argument in arguments
         )
 
     def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
-        """Put the style and the script into the page, then the call."""
+        """Add the styles and scripts to the page, then the call."""
         header = cast("Figure", self.get_root()).header
         for file in self.files:
             header.add_child(PageFile(file), name=file)
@@ -111,13 +112,13 @@ GROUPS = {
     "objects": "Street objects",
     "ground": "Ground",
 }
-"""What the layers of a map are about; of the cells, one layer is on at a time."""
+"""Titles of the groups in the layer control; only one layer of the group ``cells`` is on."""
 
 
-class Drawing(Call, Layer):
-    """A layer that a function of the page's script makes, in one of the `GROUPS` of layers.
+class ScriptLayer(Call, Layer):
+    """A map layer that a JavaScript function returns, in one of the `GROUPS`.
 
-    One without a name is a part of another.
+    A layer without a name is a part of another layer and is not listed in the layer control.
     """
 
     _template = Template(
@@ -133,26 +134,26 @@ class Drawing(Call, Layer):
         group: str,
         show: bool = True,
     ) -> None:
-        whole = name is not None
-        look = {"name": name, "overlay": True, "control": whole, "show": whole and show}
-        super().__init__(function, *arguments, **look)
+        listed = name is not None
+        options = {"name": name, "overlay": True, "control": listed, "show": listed and show}
+        super().__init__(function, *arguments, **options)
         self.group = group
 
 
 class LayerGroups(Call):
-    """The groups of the layers in the layer control of a map."""
+    """The layer control of a map, with its layers in groups."""
 
     def __init__(self, map_: folium.Map, layers: folium.LayerControl) -> None:
         groups = {
             child.layer_name: child.group
             for child in layers_of(map_).values()
-            if isinstance(child, Drawing) and child.control
+            if isinstance(child, ScriptLayer) and child.control
         }
         super().__init__("layerGroups", map_, layers, GROUPS, groups)
 
 
-class Surroundings(Call):
-    """What stands around a map, added last: search, light and dark, whom to name for the data."""
+class PageControls(Call):
+    """Controls around a map, added last: search, light or dark colours, credits of the data."""
 
     def __init__(
         self,
@@ -161,12 +162,12 @@ class Surroundings(Call):
         area: dict[str, Any] | None,
         names: tuple[str, ...],
     ) -> None:
-        super().__init__("furnish", map_, layers, area, names)
+        super().__init__("addControls", map_, layers, area, names)
         self.area, self.names = area, names
 
 
-def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
-    """Return the map to draw on."""
+def start_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> folium.Map:
+    """Return the map to draw on: `map_`, or a new one with online `tiles` if they are given."""
     if map_ is not None:
         if tiles is not None:
             raise InputError(
@@ -174,31 +175,33 @@ def prepared_map(map_: folium.Map | None, tiles: str | None, *, title: str) -> f
             )
         return map_
     provider = None if tiles is None else _tile_provider(tiles)
-    made = folium.Map(tiles=provider, prefer_canvas=True, control_scale=True)
+    new_map = folium.Map(tiles=provider, prefer_canvas=True, control_scale=True)
     if provider is None:
-        # Only tiles tell Leaflet where to stop, and only they look bad between whole zooms.
-        made.options |= {"maxZoom": MAX_ZOOM, "zoomSnap": 0.25}
-    cast("Figure", made.get_root()).title = title
-    return made
+        # Without tiles Leaflet has no maximum zoom; fractional zooms only blur tiles.
+        new_map.options |= {"maxZoom": MAX_ZOOM, "zoomSnap": 0.25}
+    cast("Figure", new_map.get_root()).title = title
+    return new_map
 
 
 def _tile_provider(name: str) -> xyzservices.TileProvider:
-    """Return the provider of online tiles that xyzservices knows by a name."""
-    known = xyzservices.providers
+    """Return the xyzservices provider of online tiles with this name."""
+    providers = xyzservices.providers
     plain = name.lower() == "openstreetmap"
     try:
-        provider = known.query_name("OpenStreetMap.Mapnik" if plain else name)
+        provider = providers.query_name("OpenStreetMap.Mapnik" if plain else name)
     except ValueError as error:
         raise InputError(
-            f"Tiles {name!r} are not known to xyzservices{nearest_name(name, known.flatten())}; "
-            f"give {WITHOUT_KEY}."
+            f"Tiles {name!r} are not known to xyzservices"
+            f"{nearest_name(name, providers.flatten())}; give {TILES_WITHOUT_KEY}."
         ) from error
     if provider.requires_token():
-        raise InputError(f"Tiles {name!r} need a key from their provider; give {WITHOUT_KEY}.")
+        raise InputError(
+            f"Tiles {name!r} need a key from their provider; give {TILES_WITHOUT_KEY}."
+        )
     return provider
 
 
-def draw(
+def add_layer(
     map_: folium.Map,
     name: str,
     function: str,
@@ -206,22 +209,30 @@ def draw(
     group: str,
     show: bool = True,
 ) -> None:
-    """Add a layer that a function of the page's script makes."""
-    Drawing(free_name(map_, name), function, *arguments, group=group, show=show).add_to(map_)
+    """Add a layer that a function of the page's script returns.
+
+    A new kind of layer needs three things: a JavaScript function ``semsig.FUNCTION`` in the folder
+    ``js`` (with its file in `PAGE_FILES`), a call of this function with its name and data, and a
+    part of the legend (`layer_part`).
+    """
+    ScriptLayer(unique_layer_name(map_, name), function, *arguments, group=group, show=show).add_to(
+        map_
+    )
 
 
-def finished_map(
+def finish_map(
     map_: folium.Map,
     source: SignatureDatabase | StreetObjects | None,
     *,
     legend: str = "",
     view: NDArray[np.float64] | None = None,
-    zoom: int = CLOSE_ZOOM,
+    zoom: int = FIRST_VIEW_ZOOM,
     licenses: tuple[str, ...] = (),
 ) -> folium.Map:
-    """Add what every map has, last, where the layer control knows all layers.
+    """Add the legend, the layer control and the other controls, after all layers.
 
-    ``view`` holds places to show at first, at most as close as ``zoom``; ``source`` is searched.
+    ``view`` holds places that the first view shows, at a zoom of at most ``zoom``; the search box
+    finds the cells and places of ``source``.
     """
     if legend:
         corners = None if view is None else [view.min(axis=0).tolist(), view.max(axis=0).tolist()]
@@ -229,24 +240,25 @@ def finished_map(
     children = layers_of(map_)
     area = None if source is None else search_area(source)
     names = (*(() if source is None else map(str, source.licenses)), *licenses)
+    # A map that was finished before has these controls already: replace them.
     for name, child in list(children.items()):
-        if isinstance(child, Surroundings):
+        if isinstance(child, PageControls):
             names = child.names + names
             if area is None or area["grid"] is None:
                 area = child.area or area
-        if isinstance(child, folium.LayerControl | LayerGroups | Surroundings):
+        if isinstance(child, folium.LayerControl | LayerGroups | PageControls):
             del children[name]
     collapsed = cast("bool", JsCode("semsig.small.matches"))
-    # Each layer has its parts in their order, and may share some with others.
+    # No automatic z-index: parts of a layer keep their order, and layers may share parts.
     layers = folium.LayerControl(collapsed=collapsed, autoZIndex=False)
     layers.add_to(map_)
     LayerGroups(map_, layers).add_to(map_)
-    Surroundings(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)
+    PageControls(map_, layers, area, tuple(dict.fromkeys(names))).add_to(map_)
     return map_
 
 
 def search_area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
-    """Return where the places of a source are, for the search of the page."""
+    """Return area and grid of a source, and a polynomial from x, y to degrees, for the search."""
     low, high = source.xy.min(axis=0), source.xy.max(axis=0)
     grid, edge = None, 0.0
     if isinstance(source, SignatureDatabase):
@@ -259,10 +271,11 @@ def search_area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
         }
     authority = source.crs.to_authority()
     middle, half = (low + high) / 2.0, max(float((high - low).max()) / 2.0, 1.0)
-    # A polynomial is as good as the projection itself in an area of some hundred kilometres.
-    u, v = (part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, LATTICE)]))
+    # Fit the polynomial that replaces the projection in the browser; it is accurate enough in an
+    # area of some hundred kilometres. u and v are x and y scaled to -1..1.
+    u, v = (part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, AREA_LATTICE)]))
     degrees = to_latlon(middle + half * np.stack([u, v], axis=1), source.crs, digits=9)
-    powers = [(i, j) for i in range(POWERS + 1) for j in range(POWERS + 1 - i)]
+    powers = [(i, j) for i in range(AREA_DEGREE + 1) for j in range(AREA_DEGREE + 1 - i)]
     terms = np.stack([u**i * v**j for i, j in powers], axis=1)
     weights = np.linalg.lstsq(terms, degrees, rcond=None)[0].tolist()
     return {
@@ -276,8 +289,8 @@ def search_area(source: SignatureDatabase | StreetObjects) -> dict[str, Any]:
 
 
 def layers_of(map_: folium.Map) -> dict[str, Element]:
-    """Return what was added to a map, by name."""
-    return map_._children  # noqa: SLF001 - branca has no public way to look at them
+    """Return the elements of a map by name."""
+    return map_._children  # noqa: SLF001 - branca has no public access
 
 
 def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[np.float64]:
@@ -288,25 +301,25 @@ def to_latlon(xy: NDArray[np.float64], crs: CRS, *, digits: int = 6) -> NDArray[
 
 
 def to_metres(place: tuple[float, float], crs: CRS) -> NDArray[np.float64]:
-    """Return where a latitude and longitude is in a coordinate system, shape (1, 2)."""
+    """Return x and y of a latitude and longitude in a coordinate system, shape (1, 2)."""
     lat, lon = place
     return np.array([to_degrees(crs).transform(lon, lat, direction="INVERSE")])
 
 
 def exact_latlon(xy: ArrayLike, crs: CRS) -> list[list[float]]:
-    """Return latitudes and longitudes of one place or many, to about a centimetre."""
+    """Return latitudes and longitudes of one or more places, to about a centimetre."""
     places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
     degrees: list[list[float]] = to_latlon(places, crs, digits=7).tolist()
     return degrees
 
 
 def corners_of(source: SignatureDatabase | StreetObjects) -> NDArray[np.float64]:
-    """Return latitudes and longitudes of the corners of all places."""
+    """Return latitudes and longitudes of two corners of the box around all places."""
     return to_latlon(np.stack([source.xy.min(axis=0), source.xy.max(axis=0)]), source.crs)
 
 
 def panel_signs(database: SignatureDatabase) -> dict[str, Any]:
-    """Return the looks of the classes by symbol, and of what became of objects, for the script."""
+    """Return the signs of classes by symbol, and of verdicts, for the script."""
     classes = class_signs(database.taxonomy).values()
     return {
         "classes": {sign.symbol: sign_look(sign) for sign in classes},
@@ -318,7 +331,7 @@ def panel_signs(database: SignatureDatabase) -> dict[str, Any]:
 
 
 def sign_look(sign: ClassSign) -> dict[str, Any]:
-    """Return the look of a class, for the script."""
+    """Return the sign of a class for the script."""
     return {
         "title": sign.title,
         "colour": sign.colour,
@@ -329,7 +342,7 @@ def sign_look(sign: ClassSign) -> dict[str, Any]:
 
 
 def panel_signature(types: str | None, bearings: ArrayLike | None, **look: Any) -> list[Any]:  # noqa: ANN401
-    """Return a signature for the panel: symbols, whole degrees and, if anything, its look."""
+    """Return a signature for the panel: symbols, whole degrees and options of its look."""
     if bearings is None:
         return [types, None]
     degrees = np.rint(np.asarray(bearings, np.float64)).astype(int) % 360
@@ -345,7 +358,7 @@ def query_signature(
 ) -> list[Any]:
     """Return a query for the panel; `radius` is the visibility range in metres.
 
-    ``place`` is where it is drawn, turned by ``turn`` degrees.
+    `look` may contain the ``place`` where it is drawn and the ``turn`` in degrees.
     """
     types = None if query.codes is None else taxonomy.decode(query.codes)
     look |= {"kind": "query", "reach": radius}
@@ -365,29 +378,30 @@ def cell_signature(
     *,
     place: Sequence[float] | None = None,
 ) -> list[Any]:
-    """Return what a cell sees for the panel, in the look of a query that is turned by degrees.
+    """Return the signature of a cell for the panel.
 
-    ``place`` is the latitude and longitude of the cell.
+    ``query``, turned by ``turn`` degrees, gives the sectors to draw; ``place`` is the latitude and
+    longitude of the cell.
     """
-    seen = database.select(slice(cell, cell + 1))
-    bearings = seen.bearings
+    row = database.select(slice(cell, cell + 1))
+    bearings = row.bearings
     look: dict[str, Any] = {
         "reach": database.spec.radius,
-        "metres": _whole_metres(seen.distances),
+        "metres": _whole_metres(row.distances),
         **({} if place is None else {"place": list(place)}),
     }
     if isinstance(query, View):
         photos = [photo.turned(turn) for photo in query.photos]
-        # Photos that are turned each by itself have no look in common.
-        together = len(photos) == 1 or not any(photo.north_sigma for photo in photos)
-        if together and all(photo.sectors for photo in photos):
+        # Photos with separate north errors have no common turn, so their sectors are not drawn.
+        one_turn = len(photos) == 1 or not any(photo.north_sigma for photo in photos)
+        if one_turn and all(photo.sectors for photo in photos):
             sees = np.any([photo.sees(bearings) for photo in photos], axis=0)
             look |= {"sectors": _sectors(photos), "outside": np.flatnonzero(~sees).tolist()}
     return panel_signature(database.types(cell), bearings, **look)
 
 
 def _whole_metres(ranges: NDArray[np.float64]) -> list[int | None]:
-    return [None if np.isnan(one) else round(one) for one in ranges.tolist()]
+    return [None if np.isnan(metres) else round(metres) for metres in ranges.tolist()]
 
 
 def _sectors(photos: Iterable[Photo]) -> list[Sector]:
@@ -395,33 +409,33 @@ def _sectors(photos: Iterable[Photo]) -> list[Sector]:
 
 
 def ranks_text(low: int, high: int) -> str:
-    """Return the ranks that ties allow."""
+    """Return a rank, or the range of ranks of tied cells."""
     return f"{low:,}" if low == high else f"{low:,} to {high:,}"
 
 
 def ties_text(tied: int) -> str:
-    """Return how many are as good, to follow a rank or a distance."""
+    """Return the number of tied cells, as a suffix of a rank or a distance."""
     return f", {tied:,} tied" if tied > 1 else ""
 
 
-def free_name(map_: folium.Map, name: str) -> str:
-    """Return the name for a layer, with a number where the map has one of that name."""
-    taken = {child.layer_name for child in layers_of(map_).values() if isinstance(child, Layer)}
+def unique_layer_name(map_: folium.Map, name: str) -> str:
+    """Return the name of a layer, with a number if the map has a layer of that name."""
+    names = {child.layer_name for child in layers_of(map_).values() if isinstance(child, Layer)}
     numbered = (f"{name}, {number}" for number in itertools.count(2))
-    return next(one for one in itertools.chain([name], numbered) if one not in taken)
+    return next(text for text in itertools.chain([name], numbered) if text not in names)
 
 
 def add_city(map_: folium.Map, database: SignatureDatabase, *, show: bool = True) -> ImageOverlay:
-    """Add how many objects cells see, unless the map has it already; return the image.
+    """Add the image of the number of objects seen from each cell, if missing; return the image.
 
-    It is shown where the cells have no other colours.
+    It is shown unless the cells are coloured by another layer.
     """
     picture = city_image(database, SHADES)
     for child in layers_of(map_).values():
         if isinstance(child, ImageOverlay) and child.url == data_url(picture[0]):
             return child
     image = cell_image(map_, *picture, dark="flip")
-    show = show and not any(one.show for one in cell_colours(map_))
+    show = show and not any(layer.show for layer in cell_colours(map_))
     colour_cells(map_, "Objects seen from a cell", image, show=show)
     return image
 
@@ -434,9 +448,10 @@ def cell_image(
     dark: Literal["flip", "lift"],
     opacity: float = 1.0,
 ) -> ImageOverlay:
-    """Return a PNG that a layer of `colour_cells` shows below everything that is drawn.
+    """Return a PNG as an overlay below all drawn layers, for `colour_cells`.
 
-    In the dark, shades that begin near the colour of paper flip, and the dark end of ramps lifts.
+    With dark colours, ``flip`` inverts shades that start near white, and ``lift`` brightens ramps
+    with a dark end.
     """
     overlay = ImageOverlay(
         data_url(image),
@@ -451,28 +466,28 @@ def cell_image(
     return overlay
 
 
-def cell_colours(map_: folium.Map) -> list[Drawing]:
-    """Return the choices of how cells are coloured."""
-    layers = (child for child in layers_of(map_).values() if isinstance(child, Drawing))
+def cell_colours(map_: folium.Map) -> list[ScriptLayer]:
+    """Return the layers of the group ``cells``."""
+    layers = (child for child in layers_of(map_).values() if isinstance(child, ScriptLayer))
     return [layer for layer in layers if layer.control and layer.group == "cells"]
 
 
 def colour_cells(map_: folium.Map, name: str, *layers: Layer, show: bool = True) -> None:
-    """Add layers together as one choice of how cells are coloured; the last shown is shown."""
+    """Add layers as one entry of the group ``cells``; with `show`, hide the entries before it."""
     for other in cell_colours(map_) if show else ():
         other.show = False
-    draw(map_, name, "together", *layers, group="cells", show=show)
+    add_layer(map_, name, "together", *layers, group="cells", show=show)
 
 
 def data_url(image: bytes) -> str:
-    """Return the address of a PNG that holds it."""
+    """Return a PNG as a data URL."""
     return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
 
 
-# Signs that change in the dark as what they explain does.
+# Shapes of legend signs that flip or lift with dark colours like the image that they explain.
 FLIPPING, LIFTING = "square semsig-flip", "square semsig-lift"
 NAMED_CLASSES = 6  # in a legend
-# Path of an SVG for each shape, around (0, 0), of about the area of a circle of radius 1.
+# SVG path of each shape, around (0, 0), with about the area of a circle of radius 1.
 OUTLINES = {
     "circle": "M-1,0A1,1 0 1 1 1,0A1,1 0 1 1 -1,0Z",
     "square": "M-.9,-.9H.9V.9H-.9Z",
@@ -482,9 +497,7 @@ OUTLINES = {
     "triangle_down": "M0,1.2L1.2,-1.2H-1.2Z",
     "cross": "M-.6,-1.1H.6V-.6H1.1V.6H.6V1.1H-.6V.6H-1.1V-.6H-.6Z",
 }
-
-
-# What stands around the sign of an object, by what became of it.
+# Frame around the sign of an object, by the verdict on the object.
 VERDICT_SHAPES = {
     "matched": "circle",
     "misnamed": "diamond",
@@ -494,7 +507,7 @@ VERDICT_SHAPES = {
 
 
 def sign_svg(sign: ClassSign) -> str:
-    """Return a sign as an element of a page."""
+    """Return the sign of a class as SVG."""
     return (
         '<svg class="semsig-sign" viewBox="-1.3 -1.3 2.6 2.6" aria-hidden="true">'
         f'<path d="{OUTLINES[sign.shape]}" fill="{sign.colour}"/>'
@@ -505,20 +518,20 @@ def sign_svg(sign: ClassSign) -> str:
 
 
 def mark_svg(mark: Mark) -> str:
-    """Return a mark as an element of a page."""
+    """Return a mark as SVG."""
     return (
         '<svg class="semsig-sign mark" viewBox="-1.5 -1.5 3 3" aria-hidden="true">'
         f'<path d="{OUTLINES[mark.shape]}" fill="{mark.colour}"/></svg>'
     )
 
 
-def isolated(text: str) -> str:
-    """Return text from data, in which signs of direction turn no other text."""
+def escaped_text(text: str) -> str:
+    """Return text from data as HTML; its text direction does not change the text around it."""
     return f"<bdi>{escape(text)}</bdi>"
 
 
 def query_text(query: Signature, taxonomy: Taxonomy) -> str:
-    """Return what was asked, a line each."""
+    """Return types, bearings, ranges and sectors of a query as HTML, one line each."""
     lines = []
     if query.codes is not None:
         lines.append(f"Types: {escape(taxonomy.decode(query.codes))}<br>")
@@ -527,8 +540,8 @@ def query_text(query: Signature, taxonomy: Taxonomy) -> str:
         lines.append(f"Bearings: {' '.join(f'{value}°' for value in degrees)}<br>")
     if isinstance(query, View):
         if query.ranges is not None:
-            metres = ("?" if one is None else f"{one} m" for one in _whole_metres(query.ranges))
-            lines.append(f"Ranges: {', '.join(metres)}<br>")
+            ranges = ("?" if m is None else f"{m} m" for m in _whole_metres(query.ranges))
+            lines.append(f"Ranges: {', '.join(ranges)}<br>")
         if all(photo.sectors for photo in query.photos):
             edges = (f"{low:.0f}-{high % FULL_TURN:.0f}°" for low, high in _sectors(query.photos))
             lines.append(f"Looked at: {', '.join(edges)}<br>")
@@ -536,12 +549,12 @@ def query_text(query: Signature, taxonomy: Taxonomy) -> str:
 
 
 def swatch(colour: str, shape: str = "round") -> str:
-    """Return a small sign of a colour."""
+    """Return a small sign of a colour, as HTML."""
     return f'<i class="{shape}" style="background:{colour}"></i>'
 
 
 def ramp_bar(colours: Iterable[str], low: str, high: str, *, sign: str = "ramp") -> str:
-    """Return a bar of colours with what its ends mean."""
+    """Return a colour ramp with labels at both ends, as HTML."""
     gradient = f"linear-gradient(to right,{','.join(colours)})"
     return (
         f'<i class="{sign}" style="background:{gradient}"></i>'
@@ -550,7 +563,7 @@ def ramp_bar(colours: Iterable[str], low: str, high: str, *, sign: str = "ramp")
 
 
 def class_bar(colours: Sequence[str], breaks: Sequence[str]) -> str:
-    """Return a bar of colours with what parts each from the next."""
+    """Return a bar of classed colours with the breaks between them, as HTML."""
     share = 100.0 / len(colours)
     parts = ",".join(
         f"{colour} {number * share:.1f}% {(number + 1) * share:.1f}%"
@@ -563,8 +576,8 @@ def class_bar(colours: Sequence[str], breaks: Sequence[str]) -> str:
     )
 
 
-def shades() -> str:
-    """Return what the shades of the cells mean."""
+def shades_part() -> str:
+    """Return the legend of the image that `add_city` adds."""
     labels = [f"{low}-{high - 1}" for low, high in itertools.pairwise(SHADES)]
     labels.append(f"{max(SHADES)}+")
     signs = " &ensp;".join(
@@ -572,29 +585,29 @@ def shades() -> str:
         for colour, label in zip(SHADES.values(), labels, strict=True)
     )
     name = "Objects seen from a cell"
-    return part_of(name, f"<p>{name}<br>{signs}</p>")
+    return layer_part(name, f"<p>{name}<br>{signs}</p>")
 
 
-def part_of(layer: str, text: str) -> str:
+def layer_part(layer: str, text: str) -> str:
     """Return a part of a legend that is shown while a layer of that name is on.
 
-    A name that ends with a space is the beginning of one.
+    A name that ends with a space is a prefix of layer names.
     """
     return f'<div data-layer="{escape(layer)}">{text}</div>'
 
 
-def made_by(method: str) -> str:
-    """Return the method of a result, which the title of the map tells as well."""
+def method_text(method: str) -> str:
+    """Return the method of a result as HTML; the title of the map repeats it."""
     return f'<span class="semsig-method">{method}</span>'
 
 
-def folded(title: str, text: str) -> str:
-    """Return a part of a legend that opens when it is clicked."""
+def folded_part(title: str, text: str) -> str:
+    """Return a part of a legend that is folded until it is clicked."""
     return f"<details><summary>{title}</summary>{text}</details>"
 
 
-def sources(licenses: Iterable[str]) -> str:
-    """Return who is to be named for the data, and under which licence, folded."""
-    lines = [f"{isolated(line)}<br>" for line in licenses]
-    made = f"Made with semsig_gis {escape(__version__)}"
-    return folded("About the data", f"<p><small>{''.join(lines)}{made}</small></p>")
+def credits_part(licenses: Iterable[str]) -> str:
+    """Return the credits and licences of the data, folded."""
+    lines = [f"{escaped_text(line)}<br>" for line in licenses]
+    lines.append(f"Made with semsig_gis {escape(__version__)}")
+    return folded_part("About the data", f"<p><small>{''.join(lines)}</small></p>")

@@ -1,4 +1,4 @@
-"""The workbench: a page on this machine to ask a city with, and what answers it."""
+"""The workbench: a local page to ask where a photo was taken, and its server."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""An answer as the page of the workbench draws it: plain values, places in degrees."""
+"""An answer as plain values for the page of the workbench, with places in degrees."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from semsig_gis.maps import CellPixels
     from semsig_gis.serve.question import MarkNumber, Question
 
-LEAST_SHARE = 1e-6
-LEAST_BITS = 0.05  # of what is told
-LEAST_CHANCE = 0.05  # of a verdict, that it speaks for or against a place
+LEAST_SHARE = 1e-6  # lower bound of shares and odds before the logarithm
+LEAST_REASON_BITS = 0.05  # smallest weight of a reason in the list
+LEAST_VERDICT_CHANCE = 0.05  # smallest chance of a verdict that counts as a reason
 
 
 def class_shares(database: SignatureDatabase) -> NDArray[np.float64]:
-    """Return the share of the cells that see each class code, shape (256,)."""
+    """Return the share of cells that see each class code, shape (256,)."""
     types = database.type_sequences
     cells = np.bincount(types.inverse, minlength=len(types))
     shares = np.zeros(256)
-    seen = cells @ (types.histogram > 0)
-    shares[: len(seen)] = seen / len(database)
+    counts = cells @ (types.histogram > 0)
+    shares[: len(counts)] = counts / len(database)
     return shares
 
 
@@ -42,15 +42,15 @@ def answer_drawing(
     shares: NDArray[np.float64],
     pixels: CellPixels,
 ) -> dict[str, Any]:
-    """Return what the page draws of an answer, the regions in an image of the city.
+    """Return an answer for the page, with the regions as an image of the city.
 
-    `table` is the noise model that was searched with, `shares` are those of `class_shares`.
+    `table` is the noise model of the search, `shares` come from `class_shares`.
     """
     database, estimate = location.posterior.database, location.estimate
     levels = region_levels(location.posterior)
     image, bounds = pixels.image(pixels.levels(levels), REGION_COLOURS, effort=1)
     entropy = location.posterior.entropy
-    drawer = _Drawer(location, question, table, shares)
+    parts = _AnswerParts(location, question, table, shares)
     return {
         "given": location.answer.given,
         "mass": location.answer.mass,
@@ -66,22 +66,22 @@ def answer_drawing(
             },
             "colours": {f"{share:g}": colour for share, colour in CHANCES.items()},
         },
-        "candidates": drawer.candidates(),
+        "candidates": parts.candidates(),
         "estimate": {
-            "place": drawer.latlon([[estimate.x, estimate.y]])[0],
+            "place": parts.latlon([[estimate.x, estimate.y]])[0],
             "sigma": estimate.sigma,
             "heading": estimate.heading,
             "heading_sigma": None if estimate.heading is None else estimate.heading_sigma,
-            "ellipse": drawer.latlon(estimate.outline()),
+            "ellipse": parts.latlon(estimate.outline()),
         },
-        "truth": None if question.truth is None else drawer.truth(question.truth),
+        "truth": None if question.truth is None else parts.truth(question.truth),
         "notes": list(location.notes),
         "cells": len(database),
     }
 
 
-class _Drawer:
-    """What an answer is drawn by."""
+class _AnswerParts:
+    """Parts of an answer as values for JSON."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class _Drawer:
     ) -> None:
         self.location, self.table, self.shares = location, table, shares
         self.database = location.posterior.database
-        self.marks: tuple[MarkNumber, ...] = question.marks[question.shown]
+        self.marks: tuple[MarkNumber, ...] = question.marks[question.place_number]
         self.titles = {item.name: item.title for item in self.database.taxonomy.classes}
         self.codes = {item.name: item.code for item in self.database.taxonomy.classes}
 
@@ -101,7 +101,7 @@ class _Drawer:
         return exact_latlon(xy, self.database.crs)
 
     def truth(self, place: tuple[float, float]) -> dict[str, Any]:
-        """Return how far the answer is from the true place."""
+        """Return the distance from the true place, and the rank and chance of its cell."""
         xy = to_metres(place, self.database.crs)
         (x, y), estimate = xy[0].tolist(), self.location.estimate
         metres = math.hypot(x - estimate.x, y - estimate.y)
@@ -122,10 +122,10 @@ class _Drawer:
         columns = location.columns
         places = self.latlon(np.stack([columns["x"], columns["y"]], axis=1))
         rows = zip(*(columns[name].tolist() for name in ("cell", "cell_id", "chance")), strict=True)
-        found = []
+        candidates: list[dict[str, Any]] = []
         for number, ((cell, cell_id, chance), place) in enumerate(zip(rows, places, strict=True)):
             heading = float(columns["heading"][number]) if "heading" in columns else None
-            found.append(
+            candidates.append(
                 {
                     "rank": number + 1,
                     "cell": cell_id,
@@ -137,11 +137,11 @@ class _Drawer:
                     "for_against": [],
                 }
             )
-        for candidate, explanation in zip(found, location.explanations, strict=False):
+        for candidate, explanation in zip(candidates, location.explanations, strict=False):
             candidate["headings"] = list(explanation.headings)
             candidate["rays"] = self._rays(explanation)
             candidate["for_against"] = self._reasons(explanation)
-        return found
+        return candidates
 
     def _rays(self, explanation: Explanation) -> list[dict[str, Any]]:
         here = self.latlon([explanation.xy])[0]
@@ -166,9 +166,9 @@ class _Drawer:
         ]
 
     def _reasons(self, explanation: Explanation) -> list[dict[str, Any]]:
-        """Return what speaks for a place and against it, in bits, the weightiest first.
+        """Return the reasons for and against a place with weights in bits, largest first.
 
-        For it: how few cells see such a class. Against it: how seldom a detector fails so.
+        For the place: how rare the class is among the cells. Against: how rare the error is.
         """
         length = min(int(explanation.counts["matched"]), len(self.table.missed) - 1)
         reasons = []
@@ -177,27 +177,29 @@ class _Drawer:
             kind = row["object_class"] or row["query_class"]
             class_row = int(self.table.row_of[self.codes.get(kind, 0)])
             title = self._title(kind) or ""
-            known = 0 <= class_row < len(self.table.codes)
-            if chance < LEAST_CHANCE or verdict == "outside":
+            in_table = 0 <= class_row < len(self.table.codes)
+            if chance < LEAST_VERDICT_CHANCE or verdict == "outside":
                 continue
             if verdict == "matched":
                 share = max(float(self.shares[self.codes[kind]]), LEAST_SHARE)
                 weight = -chance * math.log2(share)
-                text = f"{title}: it is where one stands, and {percent(share)} of the cells see one"
+                text = f"{title}: the map has one there; {percent(share)} of the cells see one"
             elif verdict == "misnamed":
                 odds = float(self.table.misnamed[length, class_row])
                 weight = chance * math.log2(max(odds, LEAST_SHARE))
-                text = f"{self._title(row['query_class'])}: a {title.lower()} stands there"
+                text = f"{self._title(row['query_class'])}: the map has a {title.lower()} there"
             elif verdict == "missed":
                 odds = float(self.table.missed[length, class_row])
                 weight = chance * math.log2(max(odds, LEAST_SHARE))
-                text = f"{title}: one stands there, {row['distance']:.0f} m away, but is not marked"
+                text = (
+                    f"{title}: the map has one {row['distance']:.0f} m away, but it is not marked"
+                )
             else:
                 clutter = self.table.clutter
-                odds = float(clutter[class_row] if known else clutter.sum())
+                odds = float(clutter[class_row] if in_table else clutter.sum())
                 weight = chance * math.log2(min(max(odds, LEAST_SHARE), 1.0))
-                text = f"{title}: none stands there"
-            if abs(weight) >= LEAST_BITS:
+                text = f"{title}: the map has none there"
+            if abs(weight) >= LEAST_REASON_BITS:
                 reasons.append({"text": text, "weight": round(weight, 3), "verdict": verdict})
         return sorted(reasons, key=lambda reason: -abs(reason["weight"]))
 

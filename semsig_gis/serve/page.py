@@ -1,4 +1,4 @@
-"""The page of the workbench: its files put into one, each allowed by the nonce of the page."""
+"""The page of the workbench: all files in one, with a nonce that allows them to run."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from semsig_gis.maps import asset_text
 
 _SCRIPT = re.compile(r'<script src="(?P<name>[^"]+)"></script>')
 _STYLE = re.compile(r'<link rel="stylesheet" href="(?P<name>[^"]+)">')
-ASSETS = frozenset({"leaflet.js", "leaflet.css"})
+LEAFLET_FILES = frozenset({"leaflet.js", "leaflet.css"})
 
 
 def workbench_page(nonce: str) -> str:
-    """Return the page, which asks no other server for anything.
+    """Return the page, which needs no other server.
 
-    Scripts and style sheets that ``index.html`` names stand in it: ``leaflet.js`` and
-    ``leaflet.css``, those of maps as ``maps/FILE``, and the workbench's own. InputError if the
+    The scripts and style sheets that ``index.html`` links are included: ``leaflet.js`` and
+    ``leaflet.css``, ``maps/FILE`` of the maps, and the files of the workbench. InputError if the
     package was built without Leaflet.
     """
-    allowed = f'nonce="{html.escape(nonce)}"'
+    attribute = f'nonce="{html.escape(nonce)}"'
 
     def script(match: re.Match[str]) -> str:
         name = match["name"]
         source = f"semsig/{name.removeprefix('maps/') if '/' in name else f'serve/{name}'}"
-        return f"<script {allowed}>{_text(name)}\n//# sourceURL={source}\n</script>"
+        return f"<script {attribute}>{_text(name)}\n//# sourceURL={source}\n</script>"
 
     page = _text("index.html")
-    page = _STYLE.sub(lambda match: f"<style {allowed}>{_text(match['name'])}</style>", page)
+    page = _STYLE.sub(lambda match: f"<style {attribute}>{_text(match['name'])}</style>", page)
     return _SCRIPT.sub(script, page)
 
 
-def policy(nonce: str) -> str:
-    """Return what the page may do: run its own scripts, and ask its own server."""
+def security_policy(nonce: str) -> str:
+    """Return the Content-Security-Policy: only its own scripts and requests to its server."""
     return "; ".join(
         (
             "default-src 'none'",
@@ -49,7 +49,7 @@ def policy(nonce: str) -> str:
 
 
 def _text(name: str) -> str:
-    if name in ASSETS:
+    if name in LEAFLET_FILES:
         return asset_text(name)
     folder, _, file = name.rpartition("/")
     package = "semsig_gis.maps" if folder == "maps" else "semsig_gis.serve"

@@ -1,4 +1,4 @@
-"""What the page of the workbench asks: photos with marks, and views composed by hand."""
+"""Questions of the workbench page: photos with marks, and views composed on a compass."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from semsig_gis.core import InputError, UnknownNameError, nearest_name, wrap_degrees
+from semsig_gis.core import FULL_TURN, InputError, UnknownNameError, nearest_name, wrap_degrees
 from semsig_gis.evaluation import SeenFrom
 from semsig_gis.observation import (
     DEGREE_DIGITS,
@@ -32,28 +32,29 @@ if TYPE_CHECKING:
     from semsig_gis.core import Taxonomy
 
 MarkNumber = tuple[int, int, int]
-"""The numbers of a view of the page, of a photo in it, and of a mark in that."""
+"""Indices of a view of the page, of a photo in this view, and of a mark in this photo."""
 
 STEP_ERROR = 0.2
-"""Standard deviation of a step that nobody measured, by its length."""
+"""Relative standard deviation of the length of a step without a stated error."""
 MOST_TOP, MOST_PHOTOS, MOST_MARKS = 100, 20, 200
-POINT, BOX = 2, 4
+DEFAULT_TOP = 10  # of `semsig localize`
+POINT_LENGTH, BOX_LENGTH = 2, 4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Question:
-    """Views of one or several places, and how they are to be answered.
+    """Views from one or several places, and the options of their answer.
 
-    `views` has one view for each place, `marks` which mark each of its objects is, and `legs` the
-    ways between the places. `shown` is the place that is asked for. Of the classes that are
-    `absent`, by code, none was seen from the first place beside what is marked; that place is
-    `near` another, as `semsig localize` takes it. A `quick` answer is by cells alone.
+    `views` holds one view per place, `marks` the mark of each of its objects, and `legs` the ways
+    between the places; `place_number` is the place to localize. No more objects of the classes with
+    the codes `absent` are visible from the first place; it is `near` a known place, given in the
+    words of `semsig localize`. A `quick` answer uses only the cells.
     """
 
     views: tuple[View, ...]
     marks: tuple[tuple[MarkNumber, ...], ...]
     legs: tuple[Leg, ...]
-    shown: int
+    place_number: int
     top: int
     seen_from: SeenFrom
     noise: object
@@ -63,27 +64,28 @@ class Question:
     quick: bool = False
 
     @classmethod
-    def parse(cls, told: object, *, taxonomy: Taxonomy, radius: float) -> Question:
-        """Read the JSON of a page; InputError or UnknownNameError if it cannot be answered."""
-        body = _mapping(told, "the question")
+    def parse(cls, value: object, *, taxonomy: Taxonomy, radius: float) -> Question:
+        """Parse the JSON of a page; InputError or UnknownNameError if it is not a question."""
+        body = _mapping(value, "the question")
         rows = mappings(body.get("views"), "views", most=MOST_PHOTOS)
         places: list[list[tuple[View, list[MarkNumber]]]] = []
-        ways: list[Leg] = []
-        own: list[int] = []
-        for number, row in enumerate(rows):
+        steps: list[Leg] = []
+        place_of_view: list[int] = []
+        for index, row in enumerate(rows):
+            # A view with a step is from a new place, others join the place before.
             step = row.get("step")
-            if number and step is not None:
-                ways.append(_leg(_mapping(step, "a step")))
-            if not number or step is not None:
+            if index and step is not None:
+                steps.append(_leg(_mapping(step, "a step")))
+            if not index or step is not None:
                 places.append([])
-            places[-1] += _photos(row, number, taxonomy, radius)
-            own.append(len(places) - 1)
+            places[-1] += _photos(row, index, taxonomy, radius)
+            place_of_view.append(len(places) - 1)
         if not any(places):
             raise InputError("nothing is marked yet; mark an object that you see.")
-        views, marks = zip(*(_joined(photos) for photos in places if photos), strict=True)
-        legs, kept = _kept(places, ways)
+        views, marks = zip(*(_merged_view(photos) for photos in places if photos), strict=True)
+        legs, place_numbers = _legs(places, steps)
         last = len(rows) - 1
-        shown = _whole(body.get("view", last), "view", most=last)
+        view = _whole(body.get("view", last), "view", most=last)
         seen_from = body.get("seen_from", "anywhere")
         if seen_from not in get_args(SeenFrom):
             raise UnknownNameError(f"seen_from was given as {seen_from!r}; give cells or anywhere.")
@@ -92,67 +94,72 @@ class Question:
             views=views,
             marks=marks,
             legs=legs,
-            shown=kept[own[shown]],
-            top=_whole(body.get("top", 10), "top", least=1, most=MOST_TOP),
+            place_number=place_numbers[place_of_view[view]],
+            top=_whole(body.get("top", DEFAULT_TOP), "top", least=1, most=MOST_TOP),
             seen_from=seen_from,
             noise=body.get("noise"),
-            truth=None if truth is None else degrees(truth),
-            absent=_codes(body.get("absent") or [], taxonomy),
-            near=_near(body.get("near")),
+            truth=None if truth is None else latlon(truth),
+            absent=_absent_codes(body.get("absent") or [], taxonomy),
+            near=_near_text(body.get("near")),
             quick=body.get("quick") is True,
         )
 
     def rows(self, taxonomy: Taxonomy) -> list[dict[str, Any]]:
-        """Return the views as JSON lines that `semsig localize --queries` reads."""
+        """Return the views as rows of JSON lines for `semsig localize --queries`."""
         rows = [view.to_dict(taxonomy) for view in self.views]
         for row, leg in zip(rows[1:], self.legs, strict=True):
             row |= {"dx": leg.dx, "dy": leg.dy, "sigma": leg.sigma}
         return rows
 
     def command(self, taxonomy: Taxonomy, *, options: Sequence[str]) -> str:
-        """Return the command line that gives the same answer, with options of the database."""
+        """Return the command line with the same answer; `options` name the database."""
         rows = self.rows(taxonomy)
         words = ["semsig", "localize" if len(rows) == 1 else "route", *options]
         words += ["--on-grid"] if self.seen_from == "cells" else []
         words += [] if self.near is None else ["--near", self.near]
-        words += ["--top", str(self.top)] if self.top != 10 else []  # noqa: PLR2004 - its default
+        words += ["--top", str(self.top)] if self.top != DEFAULT_TOP else []
         absent = ", ".join(f"no {taxonomy.by_code(code).title.lower()}" for code in self.absent)
-        plain = _options(rows[0]) if len(rows) == 1 else None
-        if plain is not None:
-            return shlex.join([*words, *([absent] if absent else []), *plain])
+        view_options = _command_options(rows[0]) if len(rows) == 1 else None
+        if view_options is not None:
+            return shlex.join([*words, *([absent] if absent else []), *view_options])
+        # Other views have no options of their own: pipe them as JSON lines.
         lines = shlex.join(["printf", "%s\\n", *map(json.dumps, rows)])
         words += ["--queries", "-"] if len(rows) == 1 else ["-", "--json"]
         return f"{lines} | {shlex.join(words)}" + (f"  # without: {absent}" if absent else "")
 
 
-def degrees(told: object) -> tuple[float, float]:
-    """Return a latitude and a longitude."""
-    if not (isinstance(told, list) and len(told) == POINT):
-        raise InputError(f"a place was given as {told!r}; give latitude and longitude.")
-    return number(told[0], "a latitude", most=90.0), number(told[1], "a longitude", most=360.0)
+def latlon(value: object) -> tuple[float, float]:
+    """Return a checked latitude and longitude."""
+    if not (isinstance(value, list) and len(value) == POINT_LENGTH):
+        raise InputError(f"a place was given as {value!r}; give latitude and longitude.")
+    return number(value[0], "a latitude", most=90.0), number(value[1], "a longitude", most=360.0)
 
 
-def _near(told: object) -> str | None:
-    """Return a known place, given as latitude, longitude and metres, in words."""
-    if told is None:
+def _near_text(value: object) -> str | None:
+    """Return a known place of latitude, longitude and metres as ``--near`` takes it."""
+    if value is None:
         return None
-    if not (isinstance(told, list) and len(told) == POINT + 1):
-        raise InputError(f"near was given as {told!r}; give latitude, longitude and metres.")
-    lat, lon = degrees(told[:POINT])
-    metres = number(told[POINT], "the deviation of a place")
+    if not (isinstance(value, list) and len(value) == POINT_LENGTH + 1):
+        raise InputError(f"near was given as {value!r}; give latitude, longitude and metres.")
+    lat, lon = latlon(value[:POINT_LENGTH])
+    metres = number(value[POINT_LENGTH], "the deviation of a place")
     return (
         f"{abs(lat):.10g}{'S' if lat < 0 else 'N'},{abs(lon):.10g}{'W' if lon < 0 else 'E'},"
         f"{metres:g}"
     )
 
 
-def number(told: object, what: str, *, most: float = math.inf) -> float:
-    """Return a number that is finite and at most so far from 0; InputError if it is none."""
-    plain = isinstance(told, int | float) and not isinstance(told, bool)
-    if not plain or not math.isfinite(value := float(told)) or abs(value) > most:  # type: ignore[arg-type]
+def number(value: object, what: str, *, most: float = math.inf) -> float:
+    """Return a finite number from -most to most; InputError for any other value."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not math.isfinite(value)
+        or abs(value) > most
+    ):
         limit = "" if math.isinf(most) else f" from {-most:g} to {most:g}"
-        raise InputError(f"{what} was given as {told!r}; give a number{limit}.")
-    return value
+        raise InputError(f"{what} was given as {value!r}; give a number{limit}.")
+    return float(value)
 
 
 def camera_of(photo: Mapping[str, Any]) -> Camera:
@@ -172,10 +179,10 @@ def camera_of(photo: Mapping[str, Any]) -> Camera:
 def _photos(
     row: Mapping[str, Any], view: int, taxonomy: Taxonomy, radius: float
 ) -> list[tuple[View, list[MarkNumber]]]:
-    """Return the photos of a view that have marks, and the numbers of these by object."""
-    told = [row] if "compass" in row else mappings(row.get("photos"), "photos", most=MOST_PHOTOS)
+    """Return each photo of a view that has marks, and the numbers of the marks by object."""
+    items = [row] if "compass" in row else mappings(row.get("photos"), "photos", most=MOST_PHOTOS)
     photos = []
-    for number_, photo in enumerate(told):
+    for index, photo in enumerate(items):
         name = "compass" if "compass" in photo else "marks"
         marks = mappings(photo.get(name), name, most=MOST_MARKS)
         if not marks:
@@ -191,45 +198,48 @@ def _photos(
             detections = _detections(camera, marks, taxonomy)
             for detection in detections:
                 turned = float(wrap_degrees(middle + detection.pop("offset")))
-                detection["bearing"] = round(turned, DEGREE_DIGITS) % 360.0
+                detection["bearing"] = round(turned, DEGREE_DIGITS) % FULL_TURN
             edges = [(low + middle, high + middle) for low, high in camera.sectors()]
-            whole = sum(high - low for low, high in edges) >= 360.0  # noqa: PLR2004 - full turn
-            look = {"sectors": [] if whole else [[low, high] for low, high in edges]}
+            full_turn = sum(high - low for low, high in edges) >= FULL_TURN
+            look = {"sectors": [] if full_turn else [[low, high] for low, high in edges]}
             bearings = [detection["bearing"] for detection in detections]
         error = photo.get("heading_error")
         if name == "marks" and photo.get("heading") is None:
             error = "unknown"
         if error is not None:
             look["heading_error"] = error
-        seen = parse_view({"detections": detections, **look}, taxonomy=taxonomy, radius=radius)
-        # As views sort their objects.
+        view_of_photo = parse_view(
+            {"detections": detections, **look}, taxonomy=taxonomy, radius=radius
+        )
+        # The order in which the view sorts its objects.
         order = np.argsort(wrap_degrees(np.array(bearings)), kind="stable").tolist()
-        photos.append((seen, [(view, number_, mark) for mark in order]))
+        photos.append((view_of_photo, [(view, index, mark) for mark in order]))
     return photos
 
 
 def _detections(
     camera: Camera, marks: Sequence[Mapping[str, Any]], taxonomy: Taxonomy
 ) -> list[dict[str, Any]]:
-    """Return marks in a photo, with their offset from its middle and rough range."""
+    """Return the class, the offset from the middle in degrees and the range of marks in a photo."""
     corners, heights = [], []
     for mark in marks:
         box = mark.get("box")
         if box is None:
             box = [mark.get("x"), mark.get("y")] * 2
-        if not (isinstance(box, list) and len(box) == BOX):
+        if not (isinstance(box, list) and len(box) == BOX_LENGTH):
             raise InputError(
                 f"a box was given as {box!r}; give left, top, right and bottom in pixels."
             )
         corners.append([number(side, "a mark", most=1e6) for side in box])
         heights.append(_height(mark, taxonomy))
-    edges = np.array(corners).reshape(-1, BOX)
+    # A box may be drawn from any corner, and beyond the edge of the photo.
+    edges = np.array(corners).reshape(-1, BOX_LENGTH)
     edges = np.concatenate(
         [np.minimum(edges[:, :2], edges[:, 2:]), np.maximum(edges[:, :2], edges[:, 2:])], axis=1
     )
     edges = np.clip(edges, 0.0, [camera.width, camera.height] * 2)
-    tall = np.array(heights).reshape(-1, 2)
-    offsets, ranges, errors = placed(camera, edges, heights=tall, whole=~np.isnan(tall[:, 0]))
+    sizes = np.array(heights).reshape(-1, 2)
+    offsets, ranges, errors = placed(camera, edges, heights=sizes, whole=~np.isnan(sizes[:, 0]))
     return [
         {
             "class": mark.get("class", "?"),
@@ -243,17 +253,17 @@ def _detections(
 
 
 def _height(mark: Mapping[str, Any], taxonomy: Taxonomy) -> tuple[float, float]:
-    """Return the height of what a box holds and its deviation, NaN where it is no help."""
+    """Return height and deviation of the class of a box, NaN if its range needs none."""
     if mark.get("box") is None or mark.get("range") is not None:
         return math.nan, math.nan
-    item = next((one for one in taxonomy.classes if one.name == mark.get("class")), None)
+    item = next((item for item in taxonomy.classes if item.name == mark.get("class")), None)
     if item is None or item.height_m is None or item.height_sigma is None:
         return math.nan, math.nan
     return item.height_m, item.height_sigma
 
 
 def _range(mark: Mapping[str, Any], metres: float, error: float) -> dict[str, Any]:
-    """Return the range that a mark tells, or that its box does."""
+    """Return the range of a mark as given, or as computed from its box."""
     if mark.get("range") is not None:
         return {"range": mark["range"], "range_error": mark.get("range_error")}
     if math.isnan(metres):
@@ -261,31 +271,33 @@ def _range(mark: Mapping[str, Any], metres: float, error: float) -> dict[str, An
     return {"range": round(metres, METRE_DIGITS), "range_error": round(error, ERROR_DIGITS)}
 
 
-def _kept(
-    places: Sequence[Sequence[object]], ways: Sequence[Leg]
+def _legs(
+    places: Sequence[Sequence[object]], steps: Sequence[Leg]
 ) -> tuple[tuple[Leg, ...], list[int]]:
-    """Return the legs between the places that have marks, and of each place which of these it is.
+    """Return the legs between the places with marks, and for each place the number of its view.
 
-    One without marks is passed on the way, and stands for the one before.
+    Steps over a place without marks are added up, and the place gets the number of the one before.
     """
-    legs, kept = list[Leg](), list[int]()
-    found, dx, dy, variance = 0, 0.0, 0.0, 0.0
-    for photos, way in zip(places, (Leg(dx=0.0, dy=0.0), *ways), strict=True):
-        dx, dy, variance = dx + way.dx, dy + way.dy, variance + way.sigma**2
+    legs, numbers = list[Leg](), list[int]()
+    count, dx, dy, variance = 0, 0.0, 0.0, 0.0
+    for photos, step in zip(places, (Leg(dx=0.0, dy=0.0), *steps), strict=True):
+        dx, dy, variance = dx + step.dx, dy + step.dy, variance + step.sigma**2
         if photos:
-            if found:
+            if count:
                 legs.append(Leg(dx=dx, dy=dy, sigma=math.sqrt(variance)))
-            found, dx, dy, variance = found + 1, 0.0, 0.0, 0.0
-        kept.append(max(found - 1, 0))
-    return tuple(legs), kept
+            count, dx, dy, variance = count + 1, 0.0, 0.0, 0.0
+        numbers.append(max(count - 1, 0))
+    return tuple(legs), numbers
 
 
-def _joined(photos: Sequence[tuple[View, list[MarkNumber]]]) -> tuple[View, tuple[MarkNumber, ...]]:
+def _merged_view(
+    photos: Sequence[tuple[View, list[MarkNumber]]],
+) -> tuple[View, tuple[MarkNumber, ...]]:
     """Return the photos of one place as one view, and the marks by object."""
     if len(photos) == 1:
         return photos[0][0], tuple(photos[0][1])
-    view = View.joined([seen for seen, _ in photos])
-    marks = [mark for _, own in photos for mark in own]
+    view = View.joined([view for view, _ in photos])
+    marks = [mark for _, photo_marks in photos for mark in photo_marks]
     order: NDArray[np.int64] = np.argsort(wrap_degrees(np.asarray(view.bearings)), kind="stable")
     return view.turned(0.0), tuple(marks[row] for row in order.tolist())
 
@@ -300,14 +312,15 @@ def _leg(step: Mapping[str, Any]) -> Leg:
     )
 
 
-def _options(row: Mapping[str, Any]) -> list[str] | None:
-    """Return a view as options of `semsig localize`, None where these cannot say it."""
+def _command_options(row: Mapping[str, Any]) -> list[str] | None:
+    """Return a view as options of `semsig localize`, None if no options exist for it."""
     if {"range_errors", "scores", "photos"} & row.keys():
         return None
-    words = ["--types", row["types"], "--bearings", ",".join(f"{one:g}" for one in row["bearings"])]
+    bearings = ",".join(f"{bearing:g}" for bearing in row["bearings"])
+    words = ["--types", row["types"], "--bearings", bearings]
     if "ranges" in row:
-        told = ("?" if one is None else f"{one:g}" for one in row["ranges"])
-        words += ["--ranges", ",".join(told)]
+        ranges = ("?" if metres is None else f"{metres:g}" for metres in row["ranges"])
+        words += ["--ranges", ",".join(ranges)]
     if "sectors" in row:
         words += ["--sectors", ",".join(f"{low:.10g}-{high:.10g}" for low, high in row["sectors"])]
     if "heading_error" in row:
@@ -315,32 +328,32 @@ def _options(row: Mapping[str, Any]) -> list[str] | None:
     return words
 
 
-def _codes(told: object, taxonomy: Taxonomy) -> tuple[int, ...]:
-    """Return the codes of some classes, by name."""
+def _absent_codes(names: object, taxonomy: Taxonomy) -> tuple[int, ...]:
+    """Return the class codes of a list of class names."""
     codes = {item.name: item.code for item in taxonomy.classes}
-    if not isinstance(told, list) or not all(isinstance(name, str) for name in told):
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise InputError(
-            f"absent was given as {str(told)[:60]!r}; give a list of names of classes."
+            f"absent was given as {str(names)[:60]!r}; give a list of names of classes."
         )
-    for name in told:
+    for name in names:
         if name not in codes:
             raise UnknownNameError(
                 f"{name!r} is not a class of this city{nearest_name(name, codes)}."
             )
-    return tuple(dict.fromkeys(codes[name] for name in told))
+    return tuple(dict.fromkeys(codes[name] for name in names))
 
 
-def _mapping(told: object, what: str) -> Mapping[str, Any]:
-    if not isinstance(told, dict):
+def _mapping(value: object, what: str) -> Mapping[str, Any]:
+    if not isinstance(value, dict):
         raise InputError(
-            f"{what} was given as {str(told)[:60]!r}; give a mapping of names to values."
+            f"{what} was given as {str(value)[:60]!r}; give a mapping of names to values."
         )
-    return told
+    return value
 
 
-def _whole(told: object, what: str, *, least: int = 0, most: int) -> int:
-    if not isinstance(told, int) or isinstance(told, bool) or not least <= told <= most:
+def _whole(value: object, what: str, *, least: int = 0, most: int) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
         raise InputError(
-            f"{what} was given as {told!r}; give a whole number from {least} to {most:,}."
+            f"{what} was given as {value!r}; give a whole number from {least} to {most:,}."
         )
-    return told
+    return value

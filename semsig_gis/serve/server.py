@@ -1,8 +1,8 @@
-"""The server of the workbench: one page and what it asks, on this machine alone.
+"""The server of the workbench: its page and the requests of this page, only on this machine.
 
-A page of another site may send requests to this machine, and may give its own name the address of
-this machine (DNS rebinding). So a request must name this server as its host, come from its own page
-if it says from where, and carry the token that the address of that page holds.
+A page of another site may send requests to this machine, and its host name may point to this
+machine (DNS rebinding). So a request must name this server as its host, have no other origin than
+its own page, and contain the token from the address of that page.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from semsig_gis.core import InputError, SemsigError, WorkCancelledError, cancellable
-from semsig_gis.serve.page import policy, workbench_page
-from semsig_gis.serve.streets import city_ground
+from semsig_gis.serve.page import security_policy, workbench_page
+from semsig_gis.serve.streets import city_streets
 from semsig_gis.serve.workbench import FORMATS, MOST_UPLOAD
 from semsig_gis.storage import parse_json
 
@@ -43,11 +43,11 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-PATIENCE_S = 2  # for answers that are under way when the server ends
+SHUTDOWN_S = 2  # time for running answers when the server stops
 
 
 class _Guard:
-    """Lets through what comes from the page of this server."""
+    """Middleware that refuses requests from anywhere but the page of this server."""
 
     def __init__(self, app: ASGIApp, *, port: int, token: str) -> None:
         self.app, self.token = app, token.encode()
@@ -66,7 +66,7 @@ class _Guard:
         await self.app(scope, receive, send)
 
     def fault(self, scope: Scope) -> tuple[int, str] | None:
-        """Return the code and the sentence with which a request is refused."""
+        """Return status code and message of a refusal, or None if the request is allowed."""
         headers: dict[bytes, bytes] = dict(scope["headers"])
         if headers.get(b"host") not in self.hosts:
             return 421, "this server answers only at its own address; open the one it printed."
@@ -74,86 +74,90 @@ class _Guard:
         own = origin is None or origin in self.origins
         if not own or site not in {b"none", b"same-origin"}:
             return 403, "the request comes from the page of another site, which may not ask."
-        given = headers.get(TOKEN_HEADER.encode(), b"")
+        token = headers.get(TOKEN_HEADER.encode(), b"")
         if scope["path"] == "/":
-            given = _query_token(scope["query_string"])
-        if not hmac.compare_digest(given, self.token):
+            # A browser opens the page without headers of ours, so the token is in the address.
+            pairs = (pair.partition(b"=") for pair in scope["query_string"].split(b"&"))
+            token = next((value for name, _, value in pairs if name == b"token"), b"")
+        if not hmac.compare_digest(token, self.token):
             return 403, "the token is missing or wrong; open the address that semsig serve printed."
         return None
 
 
-def _query_token(query: bytes) -> bytes:
-    pairs = (pair.partition(b"=") for pair in query.split(b"&"))
-    return next((value for name, _, value in pairs if name == b"token"), b"")
-
-
 class _Api:
-    """What the page asks, one thing after the other in a thread of its own."""
+    """Requests of the page, answered one at a time in a worker thread."""
 
     def __init__(self, bench: Workbench) -> None:
         self.bench = bench
-        self.alone = anyio.CapacityLimiter(1)
-        self.asked = Counter[str]()  # by page
+        self.limiter = anyio.CapacityLimiter(1)
+        self.requests = Counter[str]()  # number of answers requested, by page
 
     async def page(self, request: Request) -> Response:  # noqa: ARG002 - as routes are called
         nonce = secrets.token_urlsafe(16)
-        headers = HEADERS | {"Content-Security-Policy": policy(nonce)}
+        headers = HEADERS | {"Content-Security-Policy": security_policy(nonce)}
         return HTMLResponse(workbench_page(nonce), headers=headers)
 
     async def city(self, request: Request) -> Response:  # noqa: ARG002
-        return await self._told(self.bench.about)
+        return await self._json_response(lambda: self.bench.about)
 
     async def ground(self, request: Request) -> Response:  # noqa: ARG002
         bench = self.bench
-        return await self._told(functools.partial(city_ground, bench.database, bench.store))
+        return await self._json_response(
+            functools.partial(city_streets, bench.database, bench.store)
+        )
 
     async def photo(self, request: Request) -> Response:
         name = request.query_params.get("name", "the picture")[:200]
         content = await _body(request)
-        return await self._told(functools.partial(self.bench.photo, content, name))
+        return await self._json_response(functools.partial(self.bench.photo, content, name))
 
     async def boxes(self, request: Request) -> Response:
-        return await self._told(functools.partial(self.bench.boxes, await _json(request)))
+        return await self._json_response(functools.partial(self.bench.boxes, await _json(request)))
 
     async def answer(self, request: Request) -> Response:
-        told = await _json(request)
-        page = str(told.get("page"))
-        number = self.asked[page] = self.asked[page] + 1
+        body = await _json(request)
+        page = str(body.get("page"))
+        number = self.requests[page] = self.requests[page] + 1
 
         def answer() -> dict[str, Any]:
-            with cancellable(lambda: number == self.asked[page]):
-                return self.bench.answer(told)
+            # Stops as soon as the same page requests a newer answer.
+            with cancellable(lambda: number == self.requests[page]):
+                return self.bench.answer(body)
 
-        return await self._told(answer)
+        return await self._json_response(answer)
 
     async def suggest(self, request: Request) -> Response:
-        return await self._told(functools.partial(self.bench.suggest, await _json(request)))
+        return await self._json_response(
+            functools.partial(self.bench.suggest, await _json(request))
+        )
 
     async def cell(self, request: Request) -> Response:
-        return await self._told(functools.partial(self.bench.cell, await _json(request)))
+        return await self._json_response(functools.partial(self.bench.cell, await _json(request)))
 
     async def simulate(self, request: Request) -> Response:
-        return await self._told(functools.partial(self.bench.simulate, await _json(request)))
+        return await self._json_response(
+            functools.partial(self.bench.simulate, await _json(request))
+        )
 
     async def export(self, request: Request) -> Response:
         suffix = request.query_params.get("format", "")
-        told = await _json(request)
-        make = functools.partial(self.bench.export, told, suffix)
-        content = await anyio.to_thread.run_sync(make, limiter=self.alone)
+        export = functools.partial(self.bench.export, await _json(request), suffix)
+        content = await anyio.to_thread.run_sync(export, limiter=self.limiter)
         headers = HEADERS | {"Content-Disposition": f'attachment; filename="answer.{suffix}"'}
         return Response(content, media_type=FORMATS[suffix], headers=headers)
 
-    async def _told(self, work: Callable[[], Any]) -> Response:
-        """Return what a function tells, as JSON."""
-        value = await anyio.to_thread.run_sync(work, limiter=self.alone)
+    async def _json_response(self, work: Callable[[], Any]) -> Response:
+        """Return the result of a function as JSON."""
+        value = await anyio.to_thread.run_sync(work, limiter=self.limiter)
         return JSONResponse(value, headers=HEADERS)
 
 
 async def _body(request: Request) -> bytes:
-    """Return the body of a request, refused as soon as it is too long."""
-    told = request.headers.get("content-length", "0")
-    parts, size = [], int(told) if told.isdecimal() else 0
+    """Return the body of a request; HTTPException as soon as it is too long."""
+    length = request.headers.get("content-length", "0")
+    parts, size = [], int(length) if length.isdecimal() else 0
     if size <= MOST_UPLOAD:
+        # The header may be missing or wrong, so the parts are counted too.
         size = 0
         async for part in request.stream():
             size += len(part)
@@ -169,27 +173,24 @@ async def _body(request: Request) -> bytes:
 async def _json(request: Request) -> Mapping[str, Any]:
     """Return the JSON of a request."""
     try:
-        told = parse_json(await _body(request), finite=True)
+        body = parse_json(await _body(request), finite=True)
     except ValueError as error:
         raise InputError(
             f"the request is not JSON ({error}); send a mapping of names to values."
         ) from error
-    if not isinstance(told, dict):
+    if not isinstance(body, dict):
         raise InputError("the request is not a mapping of names to values; send one as JSON.")
-    return told
+    return body
 
 
-async def _refused(request: Request, error: Exception) -> Response:  # noqa: ARG001
-    return JSONResponse({"error": str(error)}, 422, headers=HEADERS)
-
-
-async def _outrun(request: Request, error: Exception) -> Response:  # noqa: ARG001
-    return JSONResponse({"error": "a newer question was asked meanwhile."}, 409, headers=HEADERS)
-
-
-async def _failed(request: Request, error: Exception) -> Response:
+async def _error_response(request: Request, error: Exception) -> Response:
+    """Return the status code and the message of an error as JSON."""
     code, text = 500, "the answer failed because of a fault in semsig, not in your input."
-    if isinstance(error, HTTPException):
+    if isinstance(error, SemsigError):
+        code, text = 422, str(error)
+    elif isinstance(error, WorkCancelledError):
+        code, text = 409, "a newer question was asked meanwhile."
+    elif isinstance(error, HTTPException):
         code, text = error.status_code, error.detail
         if code in {404, 405}:
             text = f"there is nothing at {request.method} {request.url.path}."
@@ -199,29 +200,26 @@ async def _failed(request: Request, error: Exception) -> Response:
 def workbench_app(bench: Workbench, *, port: int, token: str) -> ASGIApp:
     """Return the application that serves the page of a workbench."""
     api = _Api(bench)
-    asked = (api.photo, api.boxes, api.answer, api.suggest, api.cell, api.simulate, api.export)
+    posts = (api.photo, api.boxes, api.answer, api.suggest, api.cell, api.simulate, api.export)
     routes = [
         Route("/", api.page),
         Route("/api/city", api.city),
         Route("/api/ground", api.ground),
-        *(Route(f"/api/{one.__name__}", one, methods=["POST"]) for one in asked),
+        *(Route(f"/api/{post.__name__}", post, methods=["POST"]) for post in posts),
     ]
     app = Starlette(
         routes=routes,
-        exception_handlers={
-            SemsigError: _refused,
-            WorkCancelledError: _outrun,
-            HTTPException: _failed,
-            Exception: _failed,
-        },
+        exception_handlers=dict.fromkeys(
+            (SemsigError, WorkCancelledError, HTTPException, Exception), _error_response
+        ),
     )
     return _Guard(app, port=port, token=token)
 
 
 def open_listener(port: int) -> socket.socket:
-    """Return a socket that listens on a port of this machine, any free one for 0.
+    """Return a socket that listens on a port of this machine, or on any free port for 0.
 
-    InputError if another program has it, or the number is none of a port.
+    InputError if another program uses the port, or the number is not a port.
     """
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -246,7 +244,7 @@ def make_server(bench: Workbench, listener: socket.socket, *, token: str) -> uvi
         access_log=False,
         server_header=False,
         lifespan="off",
-        timeout_graceful_shutdown=PATIENCE_S,
+        timeout_graceful_shutdown=SHUTDOWN_S,
     )
     return uvicorn.Server(settings)
 

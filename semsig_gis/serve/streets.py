@@ -1,4 +1,4 @@
-"""The ground of the city for the page of the workbench: its streets, and what its search needs."""
+"""Streets of a city for the page of the workbench, and the area for its search."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from semsig_gis.maps import packed_ground, search_area
 if TYPE_CHECKING:
     from semsig_gis.database import ObjectStore, SignatureDatabase
 
-BESIDE_M = 100.0  # from the outermost cells, how far streets are drawn
+MARGIN_M = 100.0  # width of the zone around the cells in which streets are drawn
 
 
-def city_ground(database: SignatureDatabase, store: ObjectStore | None) -> dict[str, Any]:
-    """Return what the search needs, and the streets around the cells where they are known."""
+def city_streets(database: SignatureDatabase, store: ObjectStore | None) -> dict[str, Any]:
+    """Return the area for the search, and the packed streets or None if there are none."""
     area = search_area(database)
     if store is None or store.streets is None:
         return {"area": area, "ground": None}
     west, south, east, north = area["box"]
-    box = west - BESIDE_M, south - BESIDE_M, east + BESIDE_M, north + BESIDE_M
+    box = west - MARGIN_M, south - MARGIN_M, east + MARGIN_M, north + MARGIN_M
     try:
         arrays, about, _ = packed_ground({"streets": store.streets}, box)
     except EmptyResultError:

@@ -1,4 +1,4 @@
-"""What the page of the workbench asks of a city, answered in plain values for JSON."""
+"""Answers to the requests of the workbench page about a city, as plain values for JSON."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ from semsig_gis.observation import (
     with_heights,
 )
 from semsig_gis.serve.drawing import answer_drawing, class_shares
-from semsig_gis.serve.question import Question, camera_of, degrees, number
+from semsig_gis.serve.question import Question, camera_of, latlon, number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -82,39 +82,41 @@ if TYPE_CHECKING:
     )
 
 MOST_UPLOAD = 25 * 2**20
-"""Bytes of a picture, or of a question."""
-USUAL, PLAIN = "by-hand", "generic"
-"""The noise models of the page and of `semsig localize` where none is chosen."""
+"""Most bytes of a request: a picture or a question."""
+PAGE_NOISE, COMMAND_NOISE = "by-hand", "generic"
+"""Default noise models of the page and of `semsig localize`."""
 FORMATS = {
     "gpkg": "application/geopackage+sqlite3",
     "geojson": "application/geo+json",
     "kml": "application/vnd.google-earth.kml+xml",
 }
 MARKS_TO_PREPARE = 5
-QUICKLY_EXPLAINED = 3
-PANORAMA = 2  # times as wide as high
+QUICKLY_EXPLAINED = 3  # candidates of a quick answer
+PANORAMA_RATIO = 2  # width / height of a full panorama
 
 
 @dataclass(eq=False, kw_only=True)
 class Workbench:
-    """A city, and what answers the questions of a page about it.
+    """A city, and the answers to the requests of a page about it.
 
     Parameters
     ----------
     city : City
         The city.
     store : ObjectStore or None
-        Its street objects, if they are known.
-    noises : mapping of str to Noise, default those that have a name, that of marks by hand first
-        What the page may choose from, as ``--noise`` of `semsig localize` takes it; the first is
-        taken where it chooses none.
+        Its street objects, if there are any.
+    noises : mapping of str to Noise, default all named models, ``by-hand`` first
+        Noise models that the page offers, by their ``--noise`` value for `semsig localize`; the
+        first is the default.
     options : sequence of str, default the file of the city
-        The database and other options, as `semsig localize` takes them.
+        Database and other options for the command line of `semsig localize`.
     """
 
     city: City
     store: ObjectStore | None
-    noises: Mapping[str, Noise] = field(default_factory=lambda: {USUAL: NOISES[USUAL], **NOISES})
+    noises: Mapping[str, Noise] = field(
+        default_factory=lambda: {PAGE_NOISE: NOISES[PAGE_NOISE], **NOISES}
+    )
     options: Sequence[str] = ()
     _indexes: dict[tuple[str, str], LikelihoodIndex] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
@@ -140,26 +142,23 @@ class Workbench:
         return class_shares(self.database)
 
     def prepare(self) -> None:
-        """Load what the first answers need."""
-        self.about()
-        fullest = int(self.database.lengths.argmax())
-        sight = Sight.of_cell(self.database, fullest)
+        """Compute indexes and images that the first answers need."""
+        _ = self.about
+        longest = int(self.database.lengths.argmax())
+        sight = Sight.of_cell(self.database, longest)
         marks = self._compass(sight)[:MARKS_TO_PREPARE]
         for error in (None, "unknown"):
             self.answer({"views": [{"compass": marks, "heading_error": error}]})
 
-    def about(self) -> dict[str, Any]:
-        """Return what the page shows of the city before anything is asked."""
-        return self._about
-
     @cached_property
-    def _about(self) -> dict[str, Any]:
+    def about(self) -> dict[str, Any]:
+        """The facts about the city that the page shows first."""
         database = self.database
         image, bounds = city_image(database, SHADES)
         shares = self._shares
         signs = class_signs(database.taxonomy)
         ranges = database.taxonomy.ranges(database.spec.radius)
-        # A class that half of the cells see tells most, seen or not.
+        # A class that half of the cells see is the most informative, seen or not.
         present = set(database.present_codes.tolist())
         kinds = sorted(
             (item for item in self.taxonomy.classes if item.code in present),
@@ -204,10 +203,10 @@ class Workbench:
         }
 
     def photo(self, content: bytes, name: str) -> dict[str, Any]:
-        """Return what a picture says of its camera; InputError if it is none."""
+        """Return camera and place of a picture, from its metadata; InputError if it is none."""
         shot = picture_shot(content, name)
         width, height = shot.size or (0, 0)
-        panorama = shot.focal is None and width == PANORAMA * height
+        panorama = shot.focal is None and width == PANORAMA_RATIO * height
         if panorama:
             shot = replace(shot, camera="equirectangular")
         fov = field_of_view(shot)
@@ -220,8 +219,8 @@ class Workbench:
             north = North.of("magnetic" if shot.north == "magnetic" else "true", crs, bounds)
             heading = float(wrap_degrees(heading + north.turn))
             notes.append(
-                f"Its compass says that it looks at {shot.heading:.0f}° from {shot.north} north, "
-                f"give or take {shot.heading_error:g}°."
+                f"Its compass direction is {shot.heading:.0f}° from {shot.north} north, "
+                f"± {shot.heading_error:g}°."
             )
         return {
             "sha256": hashlib.sha256(content).hexdigest(),
@@ -236,16 +235,16 @@ class Workbench:
             "notes": notes,
         }
 
-    def boxes(self, told: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the boxes of a detector's file, as marks of the photos that the page shows."""
-        name = PurePosixPath(str(told.get("name") or "boxes.json")).name or "boxes.json"
-        photos = {str(photo.get("name")): photo for photo in told.get("photos") or []}
+    def boxes(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the boxes of a detector's file as marks of the photos of the page."""
+        name = PurePosixPath(str(body.get("name") or "boxes.json")).name or "boxes.json"
+        photos = {str(photo.get("name")): photo for photo in body.get("photos") or []}
         shots = {key: _shot(photo) for key, photo in photos.items()}
         stems = {PurePosixPath(key).stem: key for key in photos}
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, name)
-            file.write_text(str(told.get("text") or ""), encoding="utf-8")
-            if names := told.get("classes"):
+            file.write_text(str(body.get("text") or ""), encoding="utf-8")
+            if names := body.get("classes"):
                 Path(folder, "classes.txt").write_text(str(names), encoding="utf-8")
             try:
                 pictures = read_pictures([file])
@@ -253,27 +252,35 @@ class Workbench:
                 raise InputError(str(error).replace(f"{folder}/", "")) from error
         tally = Tally()
         detector = Detector(
-            labels=LabelMap.open(told.get("labels") or (), self.taxonomy),
+            labels=LabelMap.open(body.get("labels") or (), self.taxonomy),
             taxonomy=self.taxonomy,
             shots=shots | {stem: shots[key] for stem, key in stems.items()},
         )
-        found: dict[str, list[dict[str, Any]]] = {}
+        marks: dict[str, list[dict[str, Any]]] = {}
         for picture in pictures:
             key = stems.get(PurePosixPath(picture.name).stem)
             if key is not None:
-                found.setdefault(key, []).extend(self._marks(detector, picture, tally))
-        if not found:
+                marks.setdefault(key, []).extend(self._marks(detector, picture, tally))
+        if not marks:
             listed = ", ".join(sorted({picture.name for picture in pictures})[:3]) or "no picture"
             raise InputError(
-                f"{name} has boxes of {listed}, and none of these photos is open here; open them "
-                "first."
+                f"{name} contains boxes of {listed}, and none of these photos is open here; open "
+                "them first."
             )
-        return {"photos": found, "notes": _left_out(tally)}
+        ignored = (
+            (tally.below_min_score, "with a low score"),
+            (tally.unknown.total(), "with labels that are in no label map"),
+            (tally.no_objects.total(), "of things that are not street objects"),
+            (tally.not_in_city.total(), "of classes that the city does not have"),
+        )
+        notes = [f"Left out: {count:,} boxes {reason}." for count, reason in ignored if count]
+        return {"photos": marks, "notes": notes}
 
     def _marks(self, detector: Detector, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
-        seen = detector.sightings(picture, tally)
+        """Return the boxes of a picture as marks of the page."""
+        sightings = detector.sightings(picture, tally)
         names = {item.code: item.name for item in self.taxonomy.classes}
-        turn = seen.shot.heading or 0.0
+        turn = sightings.shot.heading or 0.0
         return [
             {
                 "box": [round(side, 1) for side in corners],
@@ -284,27 +291,27 @@ class Workbench:
                 "range_error": None if math.isnan(metres) else round(error, 3),
             }
             for corners, code, scores, bearing, metres, error in zip(
-                seen.corners.tolist(),
-                seen.codes.tolist(),
-                seen.scores,
-                seen.bearings.tolist(),
-                seen.ranges.tolist(),
-                seen.range_errors.tolist(),
+                sightings.corners.tolist(),
+                sightings.codes.tolist(),
+                sightings.scores,
+                sightings.bearings.tolist(),
+                sightings.ranges.tolist(),
+                sightings.range_errors.tolist(),
                 strict=True,
             )
         ]
 
-    def answer(self, told: object) -> dict[str, Any]:
-        """Return the answer to a question, and all that the page draws of it."""
+    def answer(self, body: object) -> dict[str, Any]:
+        """Return the answer to a question as the page shows it."""
         start = time.perf_counter()
-        question, location = self._located(told)
+        question, location = self._located(body)
         table = self._index(question).table
         drawing = answer_drawing(
             location, question, table=table, shares=self._shares, pixels=self._pixels
         )
         noise = self._noise(question)
         options = [*(self.options or [str(self.city.path)])]
-        options += [] if noise == PLAIN else ["--noise", noise]
+        options += [] if noise == COMMAND_NOISE else ["--noise", noise]
         return drawing | {
             "command": question.command(self.taxonomy, options=options),
             "views": question.rows(self.taxonomy),
@@ -312,13 +319,13 @@ class Workbench:
             "seconds": time.perf_counter() - start,
         }
 
-    def export(self, told: object, suffix: str) -> bytes:
-        """Return the answer to a question as a file."""
+    def export(self, body: object, suffix: str) -> bytes:
+        """Return the answer to a question as the content of a file."""
         if suffix not in FORMATS:
             raise UnknownNameError(
                 f"the format {suffix!r} is unknown; give one of {', '.join(FORMATS)}."
             )
-        _, location = self._located(told)
+        _, location = self._located(body)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, f"answer.{suffix}")
             export_answer(location, self.database, file)
@@ -327,9 +334,9 @@ class Workbench:
     def _noise(self, question: Question) -> str:
         """Return the name of the noise model of a question."""
         name = next(iter(self.noises)) if question.noise is None else question.noise
-        return self._known_noise(name)
+        return self._checked_noise(name)
 
-    def _known_noise(self, name: object) -> str:
+    def _checked_noise(self, name: object) -> str:
         if not (isinstance(name, str) and name in self.noises):
             hint = nearest_name(str(name), self.noises)
             raise UnknownNameError(
@@ -338,7 +345,7 @@ class Workbench:
         return name
 
     def _index(self, question: Question) -> LikelihoodIndex:
-        """Return what views of a question are compared with."""
+        """Return the index for a question, built on first use."""
         key = self._noise(question), question.seen_from
         if key not in self._indexes:
             self._indexes[key] = method_index(self.database, self._method(question))
@@ -350,7 +357,7 @@ class Workbench:
         return LikelihoodMethod(noise=noise, on_grid=question.seen_from == "cells")
 
     def _locator(self, question: Question) -> LikelihoodLocator:
-        """Return what answers a question."""
+        """Return the locator for a question."""
         locator = make_locator(
             self.database,
             self._method(question),
@@ -369,111 +376,112 @@ class Workbench:
         return with_unplaced(locator, question.views[0], absent=question.absent)
 
     def _is_quick(self, question: Question) -> bool:
-        """Tell whether an answer leaves out what takes long, and there is something to leave."""
+        """Whether the answer skips the slow steps, which only exist for places anywhere."""
         return question.quick and question.seen_from == "anywhere"
 
-    def _located(self, asked: object) -> tuple[Question, Location]:
-        """Return a question and its answer, which is found once."""
-        question = Question.parse(asked, taxonomy=self.taxonomy, radius=self.database.spec.radius)
+    def _located(self, body: object) -> tuple[Question, Location]:
+        """Return a question and its answer; the last answer is cached."""
+        question = Question.parse(body, taxonomy=self.taxonomy, radius=self.database.spec.radius)
         rows = question.rows(self.taxonomy)
         setting = self._noise(question), question.seen_from
         hints = question.absent, question.near
         key = rows, *setting, *hints, question.top, self._is_quick(question)
         if self._last is None or self._last[0] != key:
             locator = self._locator(question)
-            # Views that did not change are not compared with the city again.
-            kept: dict[str, CellScores] = {}
+            # Reuse the scores of views that did not change since the last question.
+            cache: dict[str, CellScores] = {}
             scores: list[CellScores] = []
             names = [json.dumps([*setting, view.to_dict(self.taxonomy)]) for view in question.views]
             for number, (name, view) in enumerate(zip(names, question.views, strict=True)):
-                told, prior = ((), None) if number else (hints, locator.log_prior)
+                # Hints are about the first place only.
+                view_hints, prior = ((), None) if number else (hints, locator.log_prior)
                 scanned = self._scores.get(name) or locator.scan(view)
-                ranked = json.dumps([name, told, locator.quick])
-                best = self._scores.get(ranked) or locator.scores(view, prior, scanned=scanned)
-                kept |= {name: scanned, ranked: best}
+                score_key = json.dumps([name, view_hints, locator.quick])
+                best = self._scores.get(score_key) or locator.scores(view, prior, scanned=scanned)
+                cache |= {name: scanned, score_key: best}
                 scores.append(best)
-            self._scores = kept
-            views, first = question.views, kept[names[0]]
+            self._scores = cache
+            views, first = question.views, cache[names[0]]
             if question.legs:
                 locations = locator.locate_route(views, question.legs, scores=scores, scanned=first)
             else:
                 locations = (locator.locate(views[0], scores=scores[0], scanned=first),)
             self._last = key, locations
-        return question, self._last[1][question.shown]
+        return question, self._last[1][question.place_number]
 
-    def suggest(self, told: object) -> list[dict[str, Any]]:
-        """Return what to look for next, what is expected to tell most first."""
-        question, location = self._located(told)
-        questions = next_questions(self._index(question), location, absent=question.absent)
-        return [one.to_dict() for one in questions]
+    def suggest(self, body: object) -> list[dict[str, Any]]:
+        """Return what to look for next, with the largest expected gain first."""
+        question, location = self._located(body)
+        suggestions = next_questions(self._index(question), location, absent=question.absent)
+        return [suggestion.to_dict() for suggestion in suggestions]
 
-    def cell(self, told: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what is seen from the middle of the cell at a place, and how many see alike."""
+    def cell(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the view from the middle of the cell at a place, and the number of like cells."""
         database = self.database
-        _, _, cell = self._there(told)
+        _, _, cell = self._place(body)
         sight, types = Sight.of_cell(database, cell), database.type_sequences
-        alike = int((types.inverse == types.inverse[cell]).sum()) - 1
+        same_types = int((types.inverse == types.inverse[cell]).sum())
         return {
             "cell": int(database.cell_ids[cell]),
             "place": exact_latlon(database.xy[cell : cell + 1], database.crs)[0],
             "types": database.types(cell),
             "view": {"compass": self._compass(sight), "heading_error": None, "step": None},
             "distances": np.round(sight.distances, 1).tolist(),
-            "alike": alike,
+            "alike": same_types - 1,
         }
 
-    def _there(self, told: Mapping[str, Any]) -> tuple[list[float], NDArray[np.float64], int]:
-        """Return a place in degrees and in metres, and its cell."""
-        lat, lon = degrees(told.get("place"))
+    def _place(self, body: Mapping[str, Any]) -> tuple[list[float], NDArray[np.float64], int]:
+        """Return the place of a request in degrees and in metres, and its cell."""
+        lat, lon = latlon(body.get("place"))
         place = to_metres((lat, lon), self.database.crs)
         cell = int(self.database.cells_at(place)[0])
         if cell < 0:
             raise InputError("there is no cell at that place; choose one that is shaded.")
         return [lat, lon], place, cell
 
-    def simulate(self, told: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what would be seen from a place, and spoiled as a noise model says, as a view."""
+    def simulate(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a simulated view from a place, with the errors of a noise model."""
         database = self.database
-        latlon, place, cell = self._there(told)
+        degrees, place, cell = self._place(body)
         sight = self._sight(place, cell)
         look: dict[str, Any] = {"sectors": None}
-        if (fov := told.get("fov")) is not None:
-            heading = number(told.get("heading") or 0.0, "a heading", most=FULL_TURN)
+        if (fov := body.get("fov")) is not None:
+            heading = number(body.get("heading") or 0.0, "a heading", most=FULL_TURN)
             photo = Photo.looking(
                 heading=heading, fov=number(fov, "a field of view", most=FULL_TURN)
             )
             sight = replace(sight, photo=photo)
             look = {"sectors": [[low, high % FULL_TURN] for low, high in photo.sectors] or None}
-        noise = told.get("noise")
+        noise = body.get("noise")
         chain = []
         if noise is not None:
-            chain.append(SimulatedDetector(noise=self.noises[self._known_noise(noise)]))
-        seed = told.get("seed", 0)
+            chain.append(SimulatedDetector(noise=self.noises[self._checked_noise(noise)]))
+        seed = body.get("seed", 0)
         if not isinstance(seed, int) or not 0 <= seed <= 10**18:
             raise InputError(f"a seed was given as {seed!r}; give a whole number from 0 to 10**18.")
-        seen = prepare_chain(chain, CitySights.of(database))(sight, seed, 0)
+        distorted = prepare_chain(chain, CitySights.of(database))(sight, seed, 0)
         return {
             "view": {
-                "compass": self._compass(seen),
+                "compass": self._compass(distorted),
                 "heading_error": None,
                 "step": None,
                 **look,
             },
             "cell": int(database.cell_ids[cell]),
             "objects": len(sight),
-            "truth": {"place": latlon},
+            "truth": {"place": degrees},
         }
 
-    def _compass(self, seen: Sight) -> list[dict[str, Any]]:
-        """Return what is seen as the page composes it."""
+    def _compass(self, sight: Sight) -> list[dict[str, Any]]:
+        """Return the marks of a compass view with the objects of a sight."""
         names = {item.code: item.name for item in self.taxonomy.classes}
         return [
             {"class": names[code], "bearing": round(bearing, 2) % FULL_TURN, "range": None}
-            for code, bearing in zip(seen.codes.tolist(), seen.bearings.tolist(), strict=True)
+            for code, bearing in zip(sight.codes.tolist(), sight.bearings.tolist(), strict=True)
         ]
 
     def _sight(self, place: NDArray[np.float64], cell: int) -> Sight:
-        """Return what is seen from a place, or from the middle of its cell."""
+        """Return the true view from a place, or without objects from the middle of its cell."""
         if self.store is None:
             return Sight.of_cell(self.database, cell)
         views = visible_objects_at(
@@ -487,7 +495,7 @@ class Workbench:
 
 
 def _shot(photo: Mapping[str, Any]) -> Shot:
-    """Return what the page knows of a photo."""
+    """Return the camera and heading of a photo of the page."""
     camera = camera_of(photo)
     heading = photo.get("heading")
     return Shot(
@@ -496,14 +504,3 @@ def _shot(photo: Mapping[str, Any]) -> Shot:
         heading=None if heading is None else number(heading, "a heading", most=FULL_TURN),
         size=(camera.width, camera.height),
     )
-
-
-def _left_out(tally: Tally) -> list[str]:
-    """Return what there is to say of boxes that are no marks."""
-    told = (
-        (tally.below_min_score, "with a low score"),
-        (tally.unknown.total(), "with labels that are in no label map"),
-        (tally.no_objects.total(), "of things that are not street objects"),
-        (tally.not_in_city.total(), "of classes that the city does not have"),
-    )
-    return [f"Left out: {count:,} boxes {what}." for count, what in told if count]

@@ -88,7 +88,7 @@ def script(name: str) -> str:
     return resources.files("semsig_gis.maps").joinpath("js", name).read_text(encoding="utf-8")
 
 
-(POINTED,) = re.findall(r'pointed: "(#\w{6})"', script("layers.js"))
+(POINTED,) = re.findall(r'highlight: "(#\w{6})"', script("layers.js"))
 LIGHT_PAPER, DARK_PAPER = re.findall(r"--paper: (#\w{6})", script("page.css"))
 GROUND = re.findall(r'dark \? "(#\w{6})" : "(#\w{6})"', script("ground.js"))
 FLIPPED, LIFTED = (

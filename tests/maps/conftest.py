@@ -1,4 +1,4 @@
-"""A browser with a page, and an evaluated city to show in it."""
+"""A browser page, and the map of an evaluation in it."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def page(browser: Chrome, tmp_path: Path, carried: None) -> Iterator[MapPage]:  # noqa: ARG001
-    """Return a page to open a map in, which must report no error and ask for nothing."""
+    """Return a page to open a map in, which must report no error and request nothing."""
     yield MapPage(browser, tmp_path)
     assert_quiet(browser)
 
 
 @pytest.fixture(scope="session")
-def evaluation_page(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the address of the map of an evaluation."""
+def evaluation_address(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the address of a page with the map of an evaluation."""
     file = tmp_path_factory.mktemp("evaluation") / "map.html"
     save_map(evaluation_map(small_evaluation("medium"), small_city()[0]), file, self_contained=True)
     return file.as_uri()
 
 
 @pytest.fixture
-def evaluated(page: MapPage, evaluation_page: str) -> MapPage:
+def evaluation_page(page: MapPage, evaluation_address: str) -> MapPage:
     """Return the page with the map of an evaluation."""
-    page.visit(evaluation_page)
+    page.visit(evaluation_address)
     return page

@@ -1,4 +1,4 @@
-"""Maps for whoever uses a keyboard, a screen reader or a finger."""
+"""Accessibility of maps: keyboard, screen reader and touch."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ MAPS: dict[str, Callable[[], folium.Map]] = {
 }
 
 
-# The rules of axe that a page breaks, and where.
+# The rules of axe that a page violates, and the elements.
 VIOLATIONS = """
 axe.run({resultTypes: ["violations"]}).then(({violations}) => arguments[0](
   violations.map(({id, nodes}) => [id, nodes.map(({target}) => target)])));
@@ -71,44 +71,44 @@ axe.run({resultTypes: ["violations"]}).then(({violations}) => arguments[0](
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_axe_finds_nothing_in_light_and_dark_on_desk_and_phone(name: str, page: MapPage) -> None:
-    broken = {}
+def test_axe_finds_no_violation(name: str, page: MapPage) -> None:
+    violations = {}
     page.open(MAPS[name]())
     page.browser.execute_script(Axe().axe_script)
     for screen in ((1440, 900), (390, 844)):
         with page.screen(*screen, mobile=screen[0] < 800):
             for colours in ("light", "dark"):
                 page.ask("map.fire('click', {latlng: map.getCenter()})")
-                page.told()
-                broken[(screen, colours, "told")] = page.ask_later(VIOLATIONS)
+                page.facts()
+                violations[(screen, colours, "panel")] = page.ask_later(VIOLATIONS)
                 page.ask("semsig.hide(map)")
-                page.ask("document.querySelectorAll('details').forEach((one) => one.open = true)")
-                broken[(screen, colours, "")] = page.ask_later(VIOLATIONS)
+                page.ask("document.querySelectorAll('details').forEach((box) => box.open = true)")
+                violations[(screen, colours, "")] = page.ask_later(VIOLATIONS)
                 page.ask("document.querySelector('.semsig-colours').click()")
-    assert {key: rules for key, rules in broken.items() if rules} == {}
+    assert {key: rules for key, rules in violations.items() if rules} == {}
 
 
-def test_what_can_be_pressed_is_as_large_as_a_finger(page: MapPage) -> None:
+def test_controls_are_at_least_44_pixels_large(page: MapPage) -> None:
     sizes = """
     const parts = "button, .leaflet-bar a, .semsig-search input, summary, .leaflet-control-layers "
       + "label, .leaflet-control-layers-toggle";
-    return [...document.querySelectorAll(parts)].map((one) => {
-      const {width, height} = one.getBoundingClientRect();
-      return [one.className || one.textContent, width, height];
+    return [...document.querySelectorAll(parts)].map((element) => {
+      const {width, height} = element.getBoundingClientRect();
+      return [element.className || element.textContent, width, height];
     }).filter(([, width, height]) => width && Math.min(width, height) < 44);
     """
     with page.screen(390, 844):
         page.open(MAPS["ambiguity"]())
         page.ask("map.fire('click', {latlng: map.getCenter()})")
-        page.told()
+        page.facts()
         small = page.ask(sizes)
         page.ask("semsig.hide(map)")
-        page.ask("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+        page.ask("document.querySelectorAll('details').forEach((box) => { box.open = true; })")
         page.ask("document.querySelector('.leaflet-control-layers-toggle').click()")
         assert small + page.ask(sizes) == []
 
 
-def test_a_map_is_named_and_used_by_keys_alone(page: MapPage) -> None:
+def test_map_has_a_name_and_works_by_keyboard(page: MapPage) -> None:
     page.browser.execute_cdp_cmd(
         "Browser.grantPermissions",
         {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]},
@@ -123,11 +123,11 @@ def test_a_map_is_named_and_used_by_keys_alone(page: MapPage) -> None:
         order.append(page.browser.switch_to.active_element.accessible_name)
     assert order[0] == "Cells that look the same"
     assert order[1].startswith("Search")
-    assert [one for one in order if one in {"Zoom in", "Dark colours", "Print this view"}] == [
+    assert [name for name in order if name in {"Zoom in", "Dark colours", "Print this view"}] == [
         *("Zoom in", "Dark colours", "Print this view")
     ]
     map_.send_keys("c")
-    said = page.one("[role=status].semsig-said")
+    status = page.one("[role=status].semsig-status")
     # The clipboard answers later.
-    WebDriverWait(page.browser, PATIENCE_S).until(lambda _: said.text)
-    assert said.text.startswith("Copied: ")
+    WebDriverWait(page.browser, PATIENCE_S).until(lambda _: status.text)
+    assert status.text.startswith("Copied: ")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import Evaluation
 
 SUCCESSFUL, FAILED = (mark.colour for mark in OUTCOMES.values())
-# How much of the lines is drawn.
+# The sum of the pixel values of the lines.
 LINES = """
 const canvas = document.querySelector("canvas.semsig-lines");
 if (canvas === null) return null;
@@ -37,38 +37,38 @@ return data.reduce((sum, part) => sum + part, 0);
 CITY, EVALUATION = small_city()[0], small_evaluation("medium")
 
 
-def test_an_evaluation_in_a_browser(evaluated: MapPage) -> None:
+def test_evaluation_map_has_layers_of_outcomes(evaluation_page: MapPage) -> None:
     successes = int(EVALUATION.successful.sum())
     assert 0 < successes < len(EVALUATION.queries)
-    assert evaluated.browser.title == "Localization errors"
-    assert evaluated.circles("successful") == successes
-    assert evaluated.circles("failed") == len(EVALUATION.queries) - successes
-    image = evaluated.one(IMAGES)
-    assert evaluated.ask("return arguments[0].naturalWidth", image) > 100
-    assert f"{len(EVALUATION.queries)} queries" in evaluated.one(LEGEND).text
+    assert evaluation_page.browser.title == "Localization errors"
+    assert evaluation_page.circles("successful") == successes
+    assert evaluation_page.circles("failed") == len(EVALUATION.queries) - successes
+    image = evaluation_page.one(IMAGES)
+    assert evaluation_page.ask("return arguments[0].naturalWidth", image) > 100
+    assert f"{len(EVALUATION.queries)} queries" in evaluation_page.one(LEGEND).text
     for name, colour in (("Successful", SUCCESSFUL), ("Failed", FAILED)):
-        before = evaluated.drawn(colour)
+        before = evaluation_page.drawn(colour)
         assert before > 0
-        evaluated.switch(name)
-        assert evaluated.drawn(colour) == 0
-        evaluated.switch(name)
-        assert evaluated.drawn(colour) >= before * 0.9
-    assert len(evaluated.all("canvas.semsig-field")) == 1
-    evaluated.ask("map.setZoom(20, {animate: false})")
-    assert evaluated.all("input:disabled") == []
-    evaluated.switch("Objects seen")
-    assert evaluated.all("canvas.semsig-field") == []
-    assert evaluated.all(IMAGES) == [image]
-    evaluated.switch("Nothing")
-    assert evaluated.all(IMAGES) == []
-    assert evaluated.ask(LINES) is None
-    evaluated.switch("Lines")
-    assert evaluated.drawn(FAILED) >= 0  # after the next frame
-    assert evaluated.ask(LINES) > 0
+        evaluation_page.switch(name)
+        assert evaluation_page.drawn(colour) == 0
+        evaluation_page.switch(name)
+        assert evaluation_page.drawn(colour) >= before * 0.9
+    assert len(evaluation_page.all("canvas.semsig-field")) == 1
+    evaluation_page.ask("map.setZoom(20, {animate: false})")
+    assert evaluation_page.all("input:disabled") == []
+    evaluation_page.switch("Objects seen")
+    assert evaluation_page.all("canvas.semsig-field") == []
+    assert evaluation_page.all(IMAGES) == [image]
+    evaluation_page.switch("Nothing")
+    assert evaluation_page.all(IMAGES) == []
+    assert evaluation_page.ask(LINES) is None
+    evaluation_page.switch("Lines")
+    assert evaluation_page.drawn(FAILED) >= 0  # after the next frame
+    assert evaluation_page.ask(LINES) > 0
 
 
 def spread_evaluation() -> Evaluation:
-    """Return an evaluation over three kilometres, in which more fails the further east."""
+    """Return an evaluation over three kilometres, with more failures in the east."""
     rng = np.random.default_rng(0)
     queries = EVALUATION.queries.iloc[np.arange(800) % len(EVALUATION.queries)]
     east, north = rng.uniform(0.0, 3000.0, (2, len(queries)))
@@ -78,8 +78,8 @@ def spread_evaluation() -> Evaluation:
     return dataclasses.replace(EVALUATION, queries=queries)
 
 
-def test_the_field_is_the_same_at_every_zoom(page: MapPage) -> None:
-    """The oracle weighs every query for every place, in metres of the ground."""
+def test_field_is_equal_at_every_zoom(page: MapPage) -> None:
+    """The oracle computes the weighted share of failures from all queries for each place."""
     spread, radius = spread_evaluation(), 400.0
     page.open(evaluation_map(spread, CITY, smooth=radius))
     xy = np.stack([spread.queries.geometry.x, spread.queries.geometry.y], axis=1)
@@ -97,15 +97,15 @@ def test_the_field_is_the_same_at_every_zoom(page: MapPage) -> None:
     latlon = np.stack([degrees.y, degrees.x], axis=1).tolist()
     colours = [list(bytes.fromhex(colour[1:])) for colour in FAILURES.values()]
     for zoom in (12, 15, 18):
-        with page.screen(300, 200, mobile=False):  # all of which is drawn for each place
-            told = page.ask_later("fieldAt(...arguments)", latlon, zoom)
-        levels = np.array([colours.index(colour) for colour in told])
+        with page.screen(300, 200, mobile=False):  # small, so that each place is drawn quickly
+            colours_at = page.ask_later("fieldAt(...arguments)", latlon, zoom)
+        levels = np.array([colours.index(colour) for colour in colours_at])
         assert np.abs(levels - expected).max() <= 1
         assert (levels == expected)[~unsure].all() or zoom == 12
 
 
 @pytest.mark.parametrize(("count", "least", "most"), [(3, 0.3, 0.7), (60, 0.95, 1.0)])
-def test_the_field_is_hatched_where_few_speak(
+def test_field_is_hatched_where_queries_are_few(
     page: MapPage, count: int, least: float, most: float
 ) -> None:
     some = dataclasses.replace(EVALUATION, queries=EVALUATION.queries[:count])
@@ -120,121 +120,128 @@ def test_the_field_is_hatched_where_few_speak(
     assert page.ask_later("fieldCover(...arguments)", 40) == 0.0
 
 
-def test_outcomes_have_shapes(evaluated: MapPage) -> None:
+def test_outcomes_have_different_shapes(evaluation_page: MapPage) -> None:
     page = page_of_map(evaluation_map(EVALUATION, CITY), self_contained=False)
-    signs = evaluated.all(f"{LEGEND} .semsig-sign path")
+    signs = evaluation_page.all(f"{LEGEND} .semsig-sign path")
     assert [(sign.get_attribute("d"), sign.get_attribute("fill")) for sign in signs] == [
         (OUTLINES[mark.shape], mark.colour) for mark in OUTCOMES.values()
     ]
     assert all(f'"{OUTLINES[mark.shape]}"' in page for mark in OUTCOMES.values())
-    # Of a triangle, the corners of its box are clear.
-    counts = [evaluated.ask("return signArea(arguments[0])", one) for one in OUTCOMES]
+    # A triangle covers half of its box.
+    counts = [evaluation_page.ask("return signArea(arguments[0])", outcome) for outcome in OUTCOMES]
     assert counts[0] == pytest.approx(np.pi / 4, abs=0.1)
     assert counts[1] == pytest.approx(0.5, abs=0.1)
 
 
-def test_a_click_shows_the_signature_and_the_place_found(evaluated: MapPage) -> None:
+def test_click_shows_signatures_and_best_place(evaluation_page: MapPage) -> None:
     row = EVALUATION.queries.iloc[-1]
-    assert evaluated.all(".semsig-details") == []
+    assert evaluation_page.all(".semsig-details") == []
     last = "failed" if not EVALUATION.successful[-1] else "successful"
-    evaluated.point_at("signs(arguments[0]).at(-1)", last)
+    evaluation_page.point_at("signs(arguments[0]).at(-1)", last)
     canvas = ".leaflet-marker-pane canvas"
     for mark in OUTCOMES.values():  # on light and on dark
         assert mark.edge in {"#000000", "#ffffff"}
-    assert evaluated.drawn(OUTCOMES[last].edge, canvas) > 0
-    text = evaluated.panel().replace("\u00a0", " ")
+    assert evaluation_page.drawn(OUTCOMES[last].edge, canvas) > 0
+    text = evaluation_page.panel().replace("\u00a0", " ")
     legend = f"{row['types'][0]} {CITY.taxonomy.by_symbol(row['types'][0]).title}"
-    for said in (row["types"], row["query_types"], legend, str(row["cell_id"])):
-        assert said in text
+    for words in (row["types"], row["query_types"], legend, str(row["cell_id"])):
+        assert words in text
     assert f"of {len(CITY):,}" in text
     following = np.searchsorted(CITY.cell_ids, EVALUATION.next_cell_ids[-1])
     off = np.hypot(*(CITY.xy[following] - [row.geometry.x, row.geometry.y]).T)
     assert ", ".join(f"{metres:,.0f} m off" for metres in off) in text
-    dashed = "return lines((one) => one.options.dashArray === '5 5').length"
-    assert evaluated.ask(dashed) == 1  # to the best place
-    empty = "return shown((one) => one instanceof L.CircleMarker && !one.options.fill).length"
-    assert evaluated.ask(empty) == 2 + len(EVALUATION.next_cell_ids[-1])  # and the query
-    evaluated.ask("semsig.hide(map)")
-    assert evaluated.ask(dashed) == 0
+    dashed = "return lines(({options}) => options.dashArray === '5 5').length"
+    assert evaluation_page.ask(dashed) == 1  # to the best place
+    empty = "return shown((layer) => layer instanceof L.CircleMarker && !layer.options.fill).length"
+    assert evaluation_page.ask(empty) == 2 + len(EVALUATION.next_cell_ids[-1])  # and the query
+    evaluation_page.ask("semsig.hide(map)")
+    assert evaluation_page.ask(dashed) == 0
 
 
-def test_the_panel_draws_signatures_as_wheels(evaluated: MapPage) -> None:
+def test_panel_draws_signatures_as_wheels(evaluation_page: MapPage) -> None:
     lengths = EVALUATION.queries["query_length"]
     letters = """
-    return [...document.querySelectorAll(".semsig-wheels text")].map((one) =>
-      one.getAttribute("font-size") * one.getScreenCTM().a);
+    return [...document.querySelectorAll(".semsig-wheels text")].map((letter) =>
+      letter.getAttribute("font-size") * letter.getScreenCTM().a);
     """
     for query in (int(lengths.argmin()), int(lengths.argmax())):
         name = f"Query {query + 1:,}: "
-        assert evaluated.search(name, Keys.ENTER)[0].startswith(name)
-        assert evaluated.panel().startswith(name)
-        assert min(evaluated.ask(letters)) >= 9.0
-    wheels = evaluated.all(".semsig-wheels figure")
+        assert evaluation_page.search(name, Keys.ENTER)[0].startswith(name)
+        assert evaluation_page.panel().startswith(name)
+        assert min(evaluation_page.ask(letters)) >= 9.0
+    wheels = evaluation_page.all(".semsig-wheels figure")
     row = EVALUATION.queries.iloc[query]
-    seen = (
+    expected = (
         ("Query", row["query_types"], EVALUATION.query_bearings[query]),
         ("True cell sees", row["types"], CITY.signature(int(row["cell"])).bearings),
     )
     assert wheels[0].rect["y"] == wheels[1].rect["y"]  # side by side
-    for wheel, (label, types, bearings) in zip(wheels, seen, strict=False):
+    for wheel, (label, types, bearings) in zip(wheels, expected, strict=False):
         assert bearings is not None
         assert wheel.find_element(By.TAG_NAME, "figcaption").text.removesuffix(", to 30 m") == label
-        degrees = [f"{symbol} {round(float(one)) % 360}°"
-                   for symbol, one in zip(types, bearings, strict=True)]  # fmt: skip
-        told = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
-        assert re.sub(r" \d+ m", "", told) == f"{label}, clockwise from north: {', '.join(degrees)}"
-        places = evaluated.ask("return signPlaces(arguments[0])", wheel)
-        for (x, y), one in zip(places, bearings, strict=True):
-            turn = (np.degrees(np.arctan2(x, -y)) - one + 180.0) % 360.0 - 180.0
+        degrees = [f"{symbol} {round(float(bearing)) % 360}°"
+                   for symbol, bearing in zip(types, bearings, strict=True)]  # fmt: skip
+        description = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
+        assert (
+            re.sub(r" \d+ m", "", description)
+            == f"{label}, clockwise from north: {', '.join(degrees)}"
+        )
+        places = evaluation_page.ask("return signPlaces(arguments[0])", wheel)
+        for (x, y), bearing in zip(places, bearings, strict=True):
+            turn = (np.degrees(np.arctan2(x, -y)) - bearing + 180.0) % 360.0 - 180.0
             assert abs(turn) <= 0.51  # north up, clockwise, whole degrees
             assert np.hypot(x, y) < 54.0
     # Every object of both has one verdict, and the key counts them.
-    kinds = "return [...arguments[0].querySelectorAll('.object')].map((one) => one.classList[1])"
-    counts = [Counter(evaluated.ask(kinds, wheel)) for wheel in wheels]
-    asked, cell = counts
-    assert (
-        asked["matched"] == cell["matched"] <= (Counter(seen[0][1]) & Counter(seen[1][1])).total()
+    kinds = (
+        "return [...arguments[0].querySelectorAll('.object')].map(({classList}) => classList[1])"
     )
-    assert asked["misnamed"] == cell["misnamed"]
-    assert (asked["missed"], cell["false"]) == (0, 0)
-    key = evaluated.texts(".semsig-key span")
-    both = asked | {"missed": cell["missed"]}
-    words = {one: one for one in ("matched", "misnamed", "missed")} | {"false": "extra"}
-    assert key == [f"{both[one]} {word}" for one, word in words.items() if both[one]]
-    # Beside it, what the best cell sees.
-    evaluated.all(".semsig-choices button")[1].click()
-    assert evaluated.all("figcaption")[1].text.startswith("Best cell sees")
+    counts = [Counter(evaluation_page.ask(kinds, wheel)) for wheel in wheels]
+    query_counts, cell_counts = counts
+    assert (
+        query_counts["matched"]
+        == cell_counts["matched"]
+        <= (Counter(expected[0][1]) & Counter(expected[1][1])).total()
+    )
+    assert query_counts["misnamed"] == cell_counts["misnamed"]
+    assert (query_counts["missed"], cell_counts["false"]) == (0, 0)
+    key = evaluation_page.texts(".semsig-key span")
+    both = query_counts | {"missed": cell_counts["missed"]}
+    words = {verdict: verdict for verdict in ("matched", "misnamed", "missed")} | {"false": "extra"}
+    assert key == [f"{both[verdict]} {word}" for verdict, word in words.items() if both[verdict]]
+    # The second choice is the best cell.
+    evaluation_page.all(".semsig-choices button")[1].click()
+    assert evaluation_page.all("figcaption")[1].text.startswith("Best cell sees")
 
 
-def test_wheels_show_what_queries_looked_at(page: MapPage) -> None:
-    seen = evaluate(CITY, queries=3, distortion="view:120, ranges:25", method=Method())
-    longest = int(seen.queries["query_length"].argmax())
-    page.open(evaluation_map(seen, CITY))
+def test_wheels_show_sectors_of_queries(page: MapPage) -> None:
+    evaluation = evaluate(CITY, queries=3, distortion="view:120, ranges:25", method=Method())
+    longest = int(evaluation.queries["query_length"].argmax())
+    page.open(evaluation_map(evaluation, CITY))
     page.search(f"Query {longest + 1:,}: ", Keys.ENTER)
-    asked, cell = page.all(".semsig-wheels figure")
+    query, cell = page.all(".semsig-wheels figure")
     pale = []
-    for wheel in (cell, asked):
+    for wheel in (cell, query):
         assert len(wheel.find_elements(By.CSS_SELECTOR, "path.looked")) == 1
         pale.append(len(wheel.find_elements(By.CSS_SELECTOR, ".outside")))
-    row = seen.queries.iloc[longest]
+    row = evaluation.queries.iloc[longest]
     assert pale == [row["length"] - row["query_length"], 0]
-    assert asked.text.endswith("Query, to 30 m")
+    assert query.text.endswith("Query, to 30 m")
 
 
-def test_queries_of_which_nothing_is_left(page: MapPage) -> None:
+def test_empty_queries_are_described(page: MapPage) -> None:
     strong = small_evaluation()
-    lost = strong.queries["tied"] == 0
-    assert lost.any()
-    only = dataclasses.replace(strong, queries=strong.queries[lost].reset_index(drop=True))
+    empty = strong.queries["tied"] == 0
+    assert empty.any()
+    only = dataclasses.replace(strong, queries=strong.queries[empty].reset_index(drop=True))
     page.open(evaluation_map(only, CITY))
     page.switch("Lines")
     assert page.ask(LINES) == 0
-    said = page.panel_of("failed")
-    assert "nothing left of it" in said
-    assert "infinite, not localized" in said
+    text = page.panel_of("failed")
+    assert "nothing left of it" in text
+    assert "infinite, not localized" in text
 
 
-def test_queries_from_cells_that_the_database_has_not(page: MapPage) -> None:
+def test_queries_from_unknown_cells_are_described(page: MapPage) -> None:
     queries = EVALUATION.queries.copy()
     queries.loc[:2, ["cell", "cell_id"]] = -1, -7
     queries.loc[:2, "types"] = ""
@@ -249,7 +256,7 @@ def test_queries_from_cells_that_the_database_has_not(page: MapPage) -> None:
 
 
 @pytest.mark.parametrize(("number", "most"), [(500, 400_000), (10_000, 3_000_000)])
-def test_ten_thousand_queries_stay_small(number: int, most: int) -> None:
+def test_page_of_10_000_queries_is_small(number: int, most: int) -> None:
     rows = np.arange(number) % len(EVALUATION.queries)
     queries = EVALUATION.queries.iloc[rows].reset_index(drop=True)
     many = dataclasses.replace(EVALUATION, queries=queries)

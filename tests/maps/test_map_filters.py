@@ -1,4 +1,4 @@
-"""Which queries are drawn: by outcome, error, objects seen, class and chance; and their files."""
+"""Filters of queries by outcome, error, objects seen, class and chance; and downloads."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 
 CITY, EVALUATION = small_city()[0], small_evaluation()
 QUERIES, FAILED = EVALUATION.queries, ~EVALUATION.successful
-SELECTION = "return semsig.held.queries.selection()"
+SELECTION = "return semsig.layerSets.queries.selection()"
 FILE = """
-const set = semsig.held.queries;
+const set = semsig.layerSets.queries;
 return semsig.files[arguments[0]](semsig.queryColumns(set), set.selection());
 """
 STATE = "return new URLSearchParams(location.hash.slice(1)).get('queries')"
 
 
 @pytest.fixture
-def strong(page: MapPage) -> MapPage:
+def filters_page(page: MapPage) -> MapPage:
     page.open(evaluation_map(EVALUATION, CITY))
     return page
 
 
 def slide(page: MapPage, label: str, value: int) -> None:
-    """Move a slider as a mouse does."""
+    """Move a slider like a mouse."""
     slider = page.one(f".semsig-filters input[aria-label='{label}']")
     page.ask(
         "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))",
@@ -49,45 +49,47 @@ def slide(page: MapPage, label: str, value: int) -> None:
 
 
 def assert_selected(page: MapPage, expected: NDArray[np.bool_]) -> None:
-    """Check which queries are drawn, and what is told of their number."""
+    """Check which queries are drawn, and the text with their number."""
     assert page.ask(SELECTION) == np.flatnonzero(expected).tolist()
     count, failed = int(expected.sum()), int((expected & FAILED).sum())
     of = "" if count == len(expected) else f"{count} of "
-    said = f"{of}{len(expected)} queries, {failed} failed"
-    assert page.text(".semsig-filters summary") == said
+    summary = f"{of}{len(expected)} queries, {failed} failed"
+    assert page.text(".semsig-filters summary") == summary
 
 
-def test_queries_are_chosen_by_all_that_is_known_of_them(strong: MapPage) -> None:
+def test_filters_select_queries(filters_page: MapPage) -> None:
     everything = np.ones(len(QUERIES), np.bool_)
-    assert_selected(strong, everything)
+    assert_selected(filters_page, everything)
     lengths, types = QUERIES["length"].to_numpy(), QUERIES["types"]
-    slide(strong, "Objects seen, least", 6)
-    slide(strong, "Objects seen, most", 12)
+    slide(filters_page, "Objects seen, least", 6)
+    slide(filters_page, "Objects seen, most", 12)
     few = (lengths >= 6) & (lengths <= 12)
     assert 0 < few.sum() < len(few)
-    assert_selected(strong, few)
-    assert "Objects seen: 6 to 12" in strong.one(".semsig-filters").text
+    assert_selected(filters_page, few)
+    assert "Objects seen: 6 to 12" in filters_page.one(".semsig-filters").text
     symbol = types[few].iloc[0][0]
     title = CITY.taxonomy.by_symbol(symbol).title
-    strong.one(".semsig-filters select").send_keys(title)
-    seen = few & types.str.contains(symbol, regex=False).to_numpy()
-    assert_selected(strong, seen)
-    slide(strong, "P(error ≤ 50 m), most", 9)
-    unsure = seen & (QUERIES["p50"].to_numpy() <= 0.455)
-    assert_selected(strong, unsure)
-    (outcome,) = (one for one in strong.all(".semsig-filters label") if "failed" in one.text)
+    filters_page.one(".semsig-filters select").send_keys(title)
+    with_class = few & types.str.contains(symbol, regex=False).to_numpy()
+    assert_selected(filters_page, with_class)
+    slide(filters_page, "P(error ≤ 50 m), most", 9)
+    unsure = with_class & (QUERIES["p50"].to_numpy() <= 0.455)
+    assert_selected(filters_page, unsure)
+    (outcome,) = (
+        element for element in filters_page.all(".semsig-filters label") if "failed" in element.text
+    )
     outcome.click()
-    assert_selected(strong, unsure & ~FAILED)
-    strong.one(".semsig-download button").click()  # all
-    assert_selected(strong, everything)
-    strong.switch("Successful")
-    assert_selected(strong, FAILED)
+    assert_selected(filters_page, unsure & ~FAILED)
+    filters_page.one(".semsig-download button").click()  # all
+    assert_selected(filters_page, everything)
+    filters_page.switch("Successful")
+    assert_selected(filters_page, FAILED)
 
 
-def test_the_histogram_is_brushed_and_its_sliders_moved_by_keys(strong: MapPage) -> None:
+def test_histogram_and_sliders_select_errors(filters_page: MapPage) -> None:
     errors = QUERIES["error_m"].to_numpy()
     assert np.isinf(errors).any()
-    edges = strong.ask(
+    edges = filters_page.ask(
         "return semsig.errorEdges([...arguments[0], Infinity])",
         errors[np.isfinite(errors)].tolist(),
     )
@@ -95,22 +97,22 @@ def test_the_histogram_is_brushed_and_its_sliders_moved_by_keys(strong: MapPage)
     assert {0, 10, 50, 100} <= set(edges)
     assert edges[-3] <= errors[np.isfinite(errors)].max() <= edges[-2]
     low, high = edges.index(50), edges.index(200)
-    drawing = strong.one(".semsig-histogram")
+    drawing = filters_page.one(".semsig-histogram")
     step = drawing.size["width"] / (len(edges) - 1)
     start = round((low + 0.5) * step - drawing.size["width"] / 2)
-    brush = ActionChains(strong.browser).move_to_element_with_offset(drawing, start, 0)
+    brush = ActionChains(filters_page.browser).move_to_element_with_offset(drawing, start, 0)
     brush.click_and_hold().move_by_offset(round((high - low - 1) * step), 0).release().perform()
-    assert_selected(strong, (errors > 50) & (errors <= 200))
-    assert "Expected error: 50 m to 200 m" in strong.one(".semsig-filters").text
-    least = strong.one("input[aria-label='Expected error, least']")
+    assert_selected(filters_page, (errors > 50) & (errors <= 200))
+    assert "Expected error: 50 m to 200 m" in filters_page.one(".semsig-filters").text
+    least = filters_page.one("input[aria-label='Expected error, least']")
     least.send_keys(Keys.ARROW_LEFT)
-    assert_selected(strong, (errors > edges[low - 1]) & (errors <= 200))
-    least.send_keys(Keys.END)  # it takes the other along
-    assert_selected(strong, np.zeros(len(errors), np.bool_))
-    most = strong.one("input[aria-label='Expected error, most']")
+    assert_selected(filters_page, (errors > edges[low - 1]) & (errors <= 200))
+    least.send_keys(Keys.END)  # it moves the other handle too
+    assert_selected(filters_page, np.zeros(len(errors), np.bool_))
+    most = filters_page.one("input[aria-label='Expected error, most']")
     assert most.get_attribute("aria-valuetext") == "not localized"
     least.send_keys(Keys.ARROW_LEFT)
-    assert_selected(strong, np.isinf(errors))
+    assert_selected(filters_page, np.isinf(errors))
 
 
 def rows_of(page: MapPage, kind: str) -> tuple[str, list[dict[str, Any]]]:
@@ -127,22 +129,22 @@ def rows_of(page: MapPage, kind: str) -> tuple[str, list[dict[str, Any]]]:
     return kind_of_file, rows
 
 
-def test_the_selection_is_written_to_files(strong: MapPage) -> None:
-    slide(strong, "Objects seen, most", 4)
+def test_selection_is_downloaded_as_files(filters_page: MapPage) -> None:
+    slide(filters_page, "Objects seen, most", 4)
     expected = QUERIES[QUERIES["length"] <= 4].to_crs("EPSG:4326")
     assert len(expected)
     for kind, media in (("geojson", "application/geo+json"), ("csv", "text/csv")):
-        told, rows = rows_of(strong, kind)
-        assert told == media
+        media_type, rows = rows_of(filters_page, kind)
+        assert media_type == media
         assert [int(row["query"]) for row in rows] == (expected.index + 1).tolist()
         places = [[float(row["longitude"]), float(row["latitude"])] for row in rows]
         points = np.stack([expected.geometry.x, expected.geometry.y], axis=1)
         assert np.abs(np.array(places) - points).max() < 1e-6
         for row, (_, query) in zip(rows, expected.iterrows(), strict=True):
-            lost = np.isinf(query["error_m"])
+            infinite = np.isinf(query["error_m"])
             assert (
                 row["error_m"] == ("" if kind == "csv" else None)
-                if lost
+                if infinite
                 else (float(row["error_m"]) == query["error_m"])
             )
             assert str(row["cell_id"]).strip('"') == str(query["cell_id"])
@@ -150,46 +152,46 @@ def test_the_selection_is_written_to_files(strong: MapPage) -> None:
             assert str(row["outcome"]).strip('"') == (
                 "failed" if query["p50"] < 0.5 else "successful"
             )
-    # No text is a formula.
+    # Texts that look like formulas are quoted.
     formula = "return semsig.files.csv({types: () => arguments[0]}, [0])[1]"
-    assert strong.ask(formula, '=1+"2"') == 'types\r\n"\'=1+""2"""\r\n'
+    assert filters_page.ask(formula, '=1+"2"') == 'types\r\n"\'=1+""2"""\r\n'
     saved = """
     const click = HTMLAnchorElement.prototype.click;
     const names = [];
     HTMLAnchorElement.prototype.click = function () { names.push(this.download); };
-    document.querySelectorAll(".semsig-download button").forEach((one) => one.click());
+    document.querySelectorAll(".semsig-download button").forEach((button) => button.click());
     HTMLAnchorElement.prototype.click = click;
     setTimeout(() => arguments[0](names), 1100);
     """
-    assert strong.ask_later(saved) == ["queries.geojson", "queries.csv"]
+    assert filters_page.ask_later(saved) == ["queries.geojson", "queries.csv"]
 
 
-def test_filters_are_in_the_address(strong: MapPage) -> None:
-    slide(strong, "Objects seen, least", 6)
-    slide(strong, "Expected error, most", 8)
-    strong.one(".semsig-filters select").send_keys(CITY.taxonomy.by_symbol("D").title)
-    selection = strong.ask(SELECTION)
-    edge = strong.ask("return semsig.errorEdges([...semsig.held.queries.data.error])[8]")
-    assert strong.ask_later("setTimeout(() => arguments[0]((() => {" + STATE + "})()), 400)") == (
-        f"error:~{edge},seen:6~,class:D"
-    )
-    address = strong.browser.current_url
-    strong.browser.get("about:blank")
+def test_filters_are_stored_in_the_address(filters_page: MapPage) -> None:
+    slide(filters_page, "Objects seen, least", 6)
+    slide(filters_page, "Expected error, most", 8)
+    filters_page.one(".semsig-filters select").send_keys(CITY.taxonomy.by_symbol("D").title)
+    selection = filters_page.ask(SELECTION)
+    edge = filters_page.ask("return semsig.errorEdges([...semsig.layerSets.queries.data.error])[8]")
+    assert filters_page.ask_later(
+        "setTimeout(() => arguments[0]((() => {" + STATE + "})()), 400)"
+    ) == (f"error:~{edge},seen:6~,class:D")
+    address = filters_page.browser.current_url
+    filters_page.browser.get("about:blank")
     for log in ("browser", "performance"):
-        strong.browser.get_log(log)
-    strong.visit(f"{address}&told=query:1")
-    assert strong.told()["title"].startswith("Query 1")
-    assert strong.ask(SELECTION) == selection
-    assert strong.one(".semsig-filters select").get_attribute("value") == "D"
-    strong.ask("map.semsigParts.get('queries').write('class:%23,seen:x~,error:3~4')")
-    assert len(strong.ask(SELECTION)) == len(QUERIES)
-    assert strong.all("canvas.semsig-board")
-    for box in strong.all("[data-group=queries] input:checked"):
+        filters_page.browser.get_log(log)
+    filters_page.visit(f"{address}&told=query:1")
+    assert filters_page.facts()["title"].startswith("Query 1")
+    assert filters_page.ask(SELECTION) == selection
+    assert filters_page.one(".semsig-filters select").get_attribute("value") == "D"
+    filters_page.ask("map.semsigParts.get('queries').write('class:%23,seen:x~,error:3~4')")
+    assert len(filters_page.ask(SELECTION)) == len(QUERIES)
+    assert filters_page.all("canvas.semsig-board")
+    for box in filters_page.all("[data-group=queries] input:checked"):
         box.click()
-    assert not strong.all(".leaflet-marker-pane canvas.semsig-board")
+    assert not filters_page.all(".leaflet-marker-pane canvas.semsig-board")
 
 
-def test_chances_that_a_method_gave_and_two_evaluations(page: MapPage) -> None:
+def test_two_evaluations_have_separate_filters(page: MapPage) -> None:
     stated = evaluate(CITY, queries=30, method=build_index(CITY, named_noise("medium")))
     map_ = evaluation_map(stated, CITY)
     evaluation_map(dataclasses.replace(EVALUATION, queries=QUERIES), CITY, map_=map_)
@@ -197,8 +199,8 @@ def test_chances_that_a_method_gave_and_two_evaluations(page: MapPage) -> None:
     slide(page, "Chance given, least", 18)
     chances = stated.queries["chance"].fillna(0.0).to_numpy()
     assert page.ask(SELECTION) == np.flatnonzero(np.rint(100 * chances) >= 90).tolist()
-    assert [one.text for one in page.all(".semsig-filters[open]")] != []
+    assert [element.text for element in page.all(".semsig-filters[open]")] != []
     assert len(page.all(".semsig-filters")) == 2
-    both = "return Object.values(semsig.held).map((one) => one.data.outcome.length)"
+    both = "return Object.values(semsig.layerSets).map(({data}) => data.outcome.length)"
     counts: Sequence[int] = page.ask(both)
     assert counts == [30, len(QUERIES)]

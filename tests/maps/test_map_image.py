@@ -1,4 +1,4 @@
-"""Pictures of cells, in which every cell is where the map has it; and data in scripts."""
+"""Images of cells, in which every cell is at its place; and data in scripts."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def a_city(
     crs: str = "EPSG:2154",
     origin: tuple[float, float] = (765_200.0, 6_275_000.0),
 ) -> SignatureDatabase:
-    """Return a city that sees random numbers of objects from the given cells."""
+    """Return a city with random numbers of visible objects in the given cells."""
     return cells_at(columns, rows, longest=14, crs=CRS(crs), grid=GridSpec(10.0, origin))
 
 
 @pytest.mark.parametrize("crs", ["EPSG:32760", "EPSG:32701", "EPSG:3460"])
-def test_a_city_across_180_degrees_is_as_small_as_it_is(crs: str) -> None:
+def test_city_across_180_degrees_has_its_true_size(crs: str) -> None:
     place = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(180.0, -16.8)
     x, y = (10.0 * round(side / 10.0) - 200.0 for side in place)
     city = a_city(*scattered(40, 0.5), crs=crs, origin=(x, y))
@@ -74,17 +74,17 @@ def scattered(side: int, share: float, seed: int = 1) -> tuple[NDArray[np.int64]
 
 
 def decoded(png: bytes) -> tuple[NDArray[np.uint8], bytes]:
-    """Return the palette indices of a PNG, and the palette, of which the first is transparent."""
+    """Return the palette indices of a PNG and its palette, where entry 0 is transparent."""
     image = Image.open(io.BytesIO(png))
     assert (image.mode, image.info["transparency"]) == ("P", 0)
     assert image.palette is not None
     return np.asarray(image), bytes(image.palette.palette)
 
 
-def seen_at(
+def indices_at(
     image: bytes, bounds: list[list[float]], xy: NDArray[np.float64], crs: CRS
 ) -> NDArray[np.uint8]:
-    """Return the palette indices where a web map puts places."""
+    """Return the palette indices at the pixels where a web map draws places."""
     pixels, _ = decoded(image)
     to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
     from_degrees = Transformer.from_crs("EPSG:4326", "EPSG:3857")
@@ -101,27 +101,29 @@ def seen_at(
 
 @pytest.mark.parametrize("side", [7, 600])
 @pytest.mark.parametrize(("crs", "origin"), PLACES)
-def test_cells_lie_where_the_map_has_them(side: int, crs: str, origin: tuple[float, float]) -> None:
+def test_cells_are_at_their_places_in_the_image(
+    side: int, crs: str, origin: tuple[float, float]
+) -> None:
     database = a_city(*scattered(side, 0.4), crs=crs, origin=origin)
     image, bounds = city_image(database, SHADES)
     # A pixel is at most half a cell wide, so the middle of a cell always has the cell's shade.
     expected = np.digitize(database.lengths, list(SHADES))
-    assert (seen_at(image, bounds, database.xy, database.crs) == expected).all()
+    assert (indices_at(image, bounds, database.xy, database.crs) == expected).all()
     free = np.ones((database.columns.max() + 1, database.rows.max() + 1), bool)
     free[database.columns, database.rows] = False
     free[: database.columns.min()] = free[:, : database.rows.min()] = False
     absent = database.grid.viewpoints(*np.nonzero(free))
-    assert not seen_at(image, bounds, absent, database.crs).any()
+    assert not indices_at(image, bounds, absent, database.crs).any()
 
 
-def test_one_cell() -> None:
+def test_city_of_one_cell_has_an_image() -> None:
     database = a_city(np.array([-5]), np.array([3]))
     image, bounds = city_image(database, SHADES)
-    assert seen_at(image, bounds, database.xy, database.crs).all()
+    assert indices_at(image, bounds, database.xy, database.crs).all()
     assert 0 < np.diff(bounds, axis=0).min() <= np.diff(bounds, axis=0).max() < 2e-4
 
 
-def test_palette_and_size() -> None:
+def test_image_has_the_palette_and_at_most_2048_pixels() -> None:
     image, _ = city_image(a_city(*scattered(500, 0.3)), SHADES)
     pixels, palette = decoded(image)
     assert palette[3:] == bytes.fromhex("e0e0e0a0a0a0505050")
@@ -129,7 +131,7 @@ def test_palette_and_size() -> None:
     assert set(np.unique(pixels)) == {0, 1, 2, 3}
 
 
-def test_a_wide_city_is_drawn_in_blocks_with_their_means(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_of_a_wide_city_show_means(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(map_image, "_BLOCKS", 50)
     database = a_city(*scattered(140, 0.5))
     image, bounds = city_image(database, SHADES)
@@ -137,21 +139,24 @@ def test_a_wide_city_is_drawn_in_blocks_with_their_means(monkeypatch: pytest.Mon
     block = 3
     places = np.stack([database.columns, database.rows], axis=1) // block
     corners, members = np.unique(places, axis=0, return_inverse=True)
-    means = [database.lengths[members.ravel() == one].mean() for one in range(len(corners))]
+    means = [
+        database.lengths[members.ravel() == block_number].mean()
+        for block_number in range(len(corners))
+    ]
     middles = np.array(database.grid.origin) + (corners + 0.5) * block * database.grid.step
     expected = np.digitize(means, list(SHADES))
-    assert (seen_at(image, bounds, middles, database.crs) == expected).all()
+    assert (indices_at(image, bounds, middles, database.crs) == expected).all()
 
 
-def test_levels_are_where_the_cells_are() -> None:
+def test_level_image_shows_the_level_of_each_cell() -> None:
     city = a_city(*scattered(40, 0.4))
     levels = np.random.default_rng(3).integers(0, 4, len(city)).astype(np.uint8)
     image, bounds = level_image(city, levels, ["#111111", "#222222", "#333333"])
-    assert seen_at(image, bounds, city.xy, city.crs).tolist() == levels.tolist()
+    assert indices_at(image, bounds, city.xy, city.crs).tolist() == levels.tolist()
     assert decoded(image)[1] == bytes([0, 0, 0, 17, 17, 17, 34, 34, 34, 51, 51, 51])
 
 
-def test_a_block_has_its_highest_level(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_block_shows_its_highest_level(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(map_image, "_BLOCKS", 8)
     city = a_city(*scattered(16, 1.0))
     levels = np.zeros(len(city), np.uint8)
@@ -163,27 +168,27 @@ def test_a_block_has_its_highest_level(monkeypatch: pytest.MonkeyPatch) -> None:
 def between(
     lattice: NDArray[np.float64], box: list[float], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return values at points by those at the crossings of a lattice, one point at a time."""
+    """Return interpolated values of a lattice at points, point by point."""
     lines = len(lattice) - 1
-    found = []
+    values_at = []
     for point in points:
         place = (point - np.array(box[:2])) / (np.array(box[2:]) - np.array(box[:2])) * lines
         column, row = np.minimum(place.astype(int), lines - 1)
         right, up = place - [column, row]
         low = lattice[row, column] * (1 - right) + lattice[row, column + 1] * right
         high = lattice[row + 1, column] * (1 - right) + lattice[row + 1, column + 1] * right
-        found.append(low * (1 - up) + high * up)
-    return np.array(found)
+        values_at.append(low * (1 - up) + high * up)
+    return np.array(values_at)
 
 
 @pytest.mark.parametrize(("crs", "origin"), PLACES)
-def test_lattices_place_cells_to_a_centimetre(crs: str, origin: tuple[float, float]) -> None:
+def test_lattices_are_exact_to_a_centimetre(crs: str, origin: tuple[float, float]) -> None:
     database = a_city(*scattered(300, 0.01), crs=crs, origin=origin)
     lattices = place_lattices(database)
     to_degrees = Transformer.from_crs(crs, "EPSG:4326")
     latlon = np.stack(to_degrees.transform(*database.xy.T), axis=1)
-    found = between(lattices.degrees, lattices.metric_box, database.xy)
-    assert np.abs(found - latlon).max() < 1e-7  # degrees
+    values_at = between(lattices.degrees, lattices.metric_box, database.xy)
+    assert np.abs(values_at - latlon).max() < 1e-7  # degrees
     to_mercator = Transformer.from_crs(crs, "EPSG:3857", always_xy=True)
     web = np.stack(to_mercator.transform(*database.xy.T), axis=1)
     back = between(lattices.metres, lattices.mercator_box, web)
@@ -203,20 +208,20 @@ values = st.recursive(
 @example("{{ this._parent }}{% raw %}{# gone #}")
 @example({"{": {"{{": "{%"}, "": {}})
 @example("</script><!--<script>")
-def test_two_renderings_leave_the_value_as_it_was(value: object) -> None:
+def test_script_json_is_not_changed_by_two_renderings(value: object) -> None:
     written = script_json(value)
     once = Template(written).render()
     assert json.loads(Template(once).render()) == value
 
 
 @given(values)
-def test_nothing_in_it_is_markup(value: object) -> None:
+def test_script_json_contains_no_markup(value: object) -> None:
     written = script_json(value)
     assert written.isascii()
     assert not re.search(r"[<>&]|\{[{%#]", written)
 
 
 @pytest.mark.parametrize("number", [float("nan"), float("inf")])
-def test_numbers_that_json_does_not_have_are_refused(number: float) -> None:
+def test_script_json_refuses_nan_and_infinity(number: float) -> None:
     with pytest.raises(ValueError, match="not JSON compliant"):
         script_json([number])

@@ -1,4 +1,4 @@
-"""Legends: what they say, and that text from data stays text."""
+"""Texts of legends, and hostile text from data in them."""
 
 from __future__ import annotations
 
@@ -53,10 +53,12 @@ CHANGES = ObjectChanges(
 
 
 def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[str, str]:
-    """Return every legend, with the texts of a city and the name of a noise model and a class."""
+    """Return all legends of a city, with a name for a noise model and a class."""
     noise = dataclasses.replace(named_noise("light"), name=name)
     exact = evaluate(city, queries=5, distortion="none", top=3, method=Method())
-    asked = dataclasses.replace(EVALUATION.asked, distortions=(MissingClasses(classes=(name,)),))
+    query_spec = dataclasses.replace(
+        EVALUATION.asked, distortions=(MissingClasses(classes=(name,)),)
+    )
     by_types, by_both = (
         localize(city, TYPES, top=7, method=Method()),
         localize(city, QUERY, top=7, method=Method()),
@@ -70,7 +72,7 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
     return {
         "evaluation": evaluation_legend(EVALUATION, radius=250.0, licenses=city.licenses),
         "evaluation_of_classes": evaluation_legend(
-            dataclasses.replace(EVALUATION, asked=asked), radius=250.0, licenses=()
+            dataclasses.replace(EVALUATION, asked=query_spec), radius=250.0, licenses=()
         ),
         "evaluation_without_distortion": evaluation_legend(exact, radius=1000.0, licenses=()),
         "localization": localization_legend(by_both),
@@ -94,13 +96,13 @@ LEGENDS = {name: HtmlPage(text) for name, text in legends(CITY, OBJECTS, "light"
 
 
 @pytest.mark.parametrize("name", LEGENDS)
-def test_what_a_legend_says(name: str, snapshot: Callable[[str, str], None]) -> None:
+def test_legend_text_is_as_in_the_snapshot(name: str, snapshot: Callable[[str, str], None]) -> None:
     text = LEGENDS[name].text.replace(semsig_gis.__version__, "VERSION")
     lines = (" ".join(line.split()) for line in text.splitlines())
     snapshot(f"{name}.txt", "\n".join(line for line in lines if line) + "\n")
 
 
-def test_the_numbers_are_those_of_the_results() -> None:
+def test_legend_numbers_equal_results() -> None:
     facts = chances_of(CITY).summary()
     distances = localize(CITY, QUERY, top=7, method=Method()).candidates["distance"]
     for name, words in (
@@ -113,7 +115,7 @@ def test_the_numbers_are_those_of_the_results() -> None:
         assert words in LEGENDS[name].text
 
 
-def test_text_from_data_stays_text_and_turns_no_other() -> None:
+def test_hostile_text_in_legends_stays_text() -> None:
     classes = [dataclasses.replace(item, title=HOSTILE) for item in CITY.taxonomy.classes]
     taxonomy = Taxonomy(tuple(classes))
     city = dataclasses.replace(CITY, taxonomy=taxonomy, licenses=(HOSTILE,))

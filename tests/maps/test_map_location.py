@@ -29,27 +29,27 @@ STORE = ObjectStore.of(WORLD.street_objects)
 LONGEST = int(CITY.lengths.argmax())
 
 
-def found() -> Location:
-    """Return where the richest cell was seen, with an error of each kind."""
+def answer_with_errors() -> Location:
+    """Return the answer to a query from the cell with most objects, with an error of each kind."""
     query = CITY.signature(LONGEST)
     assert query.codes is not None
     assert query.bearings is not None
-    seen = query.codes.copy()
-    seen[1] = next(code for code in CITY.present_codes if code != seen[1])
+    signature = query.codes.copy()
+    signature[1] = next(code for code in CITY.present_codes if code != signature[1])
     gap = (query.bearings[-1] + 360.0 + query.bearings[0]) / 2.0 % 360.0
-    codes = np.append(np.delete(seen, 3), seen[0])
+    codes = np.append(np.delete(signature, 3), signature[0])
     query = Signature(codes, np.append(np.delete(query.bearings, 3), gap))
     index = build_index(CITY, cell_noise(named_noise("medium"), 10.0))
     return locate(index, query, explained=2, top=5, store=STORE, refined=True, north_sigma=math.inf)
 
 
-def test_a_location_in_a_browser(page: MapPage) -> None:
-    location = found()
+def test_location_map_has_layers_legend_and_signs(page: MapPage) -> None:
+    location = answer_with_errors()
     assert location.answer.given
     page.open(location_map(location))
     assert page.browser.title == "Where it was seen"
     assert len(page.all(IMAGES)) == 2
-    numbers = [str(one.get_property("textContent")) for one in page.all(".semsig-number")]
+    numbers = [str(element.get_property("textContent")) for element in page.all(".semsig-number")]
     assert sorted(numbers) == ["1", "2", "3", "4", "5"]
     legend = page.text(LEGEND)
     assert "The answer: 100.0 % within 50 m" in legend
@@ -61,7 +61,7 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     for verdict in ("matched", "misnamed", "false"):
         assert page.circles(VERDICTS[verdict]) == counts[verdict]
     ellipse = """
-    const rings = lines((one) => one.options.color === arguments[0]);
+    const rings = lines(({options}) => options.color === arguments[0]);
     const [ring] = rings[0].getLatLngs();
     return [rings.length, map.distance(ring[0], ring[36]), ring.length];
     """
@@ -83,69 +83,69 @@ def test_a_location_in_a_browser(page: MapPage) -> None:
     assert page.circles(ANSWERS["given"].colour) == 0
 
 
-def test_clicks_tell_of_places_and_objects(page: MapPage) -> None:
-    location = found()
+def test_clicks_describe_places_and_objects(page: MapPage) -> None:
+    location = answer_with_errors()
     page.open(location_map(location))
     page.point_at("circles(arguments[0])[0]", ANSWERS["given"].colour)
-    said = page.panel()
-    assert said.startswith("The answer")
-    assert f"{percent(location.answer.mass)} within 50 m" in said
-    assert f"± {location.estimate.heading_sigma:.1f}°" in said
-    said = page.panel_of(VERDICTS["matched"])
+    text = page.panel()
+    assert text.startswith("The answer")
+    assert f"{percent(location.answer.mass)} within 50 m" in text
+    assert f"± {location.estimate.heading_sigma:.1f}°" in text
+    text = page.panel_of(VERDICTS["matched"])
     rows = location.explanations[0].to_dict()["rows"]
     matched = next(row for row in rows if row["verdict"] == "matched")
     title = CITY.taxonomy.by_name(matched["object_class"]).title
     for fact in ("Matched", title, matched["source_id"], f"{matched['distance']:.1f} m"):
-        assert fact in said
-    page.ask("circles('#ffffff').find((one) => one.getTooltip()).fire('click')")
+        assert fact in text
+    page.ask("circles('#ffffff').find((circle) => circle.getTooltip()).fire('click')")
     assert page.panel().startswith("Rank 5 of")
 
 
-def test_wheels_show_where_a_view_looked_and_how_far(page: MapPage) -> None:
-    seen = CITY.signature(LONGEST)
-    assert seen.bearings is not None
+def test_wheels_show_sectors_and_distances_of_a_view(page: MapPage) -> None:
+    signature = CITY.signature(LONGEST)
+    assert signature.bearings is not None
     metres = CITY.distances[CITY.offsets[LONGEST] : CITY.offsets[LONGEST + 1]]
-    photo = Photo.looking(heading=float(seen.bearings[0]), fov=120)
-    view = View.of(seen, ranges=np.append(metres[:-1], np.nan), photos=(photo,))
-    outside = ~photo.sees(seen.bearings)
+    photo = Photo.looking(heading=float(signature.bearings[0]), fov=120)
+    view = View.of(signature, ranges=np.append(metres[:-1], np.nan), photos=(photo,))
+    outside = ~photo.sees(signature.bearings)
     assert 0 < outside.sum() < len(view)
     page.open(localization_map(localize(CITY, view, top=1, method=Method()), CITY))
     assert "Looked at: " in page.text(LEGEND)
-    page.ask("shown((one) => one instanceof L.CircleMarker)[0].fire('click')")
+    page.ask("shown((layer) => layer instanceof L.CircleMarker)[0].fire('click')")
     assert page.panel()
-    asked, cell = page.all(".semsig-wheels figure")
-    assert asked.text.endswith("Query, to 30 m")
-    for wheel in (asked, cell):
+    query, cell = page.all(".semsig-wheels figure")
+    assert query.text.endswith("Query, to 30 m")
+    for wheel in (query, cell):
         assert len(wheel.find_elements(By.CSS_SELECTOR, "path.looked")) == 1
         objects = wheel.find_elements(By.CSS_SELECTOR, ".object")
-        pale = ["outside" in str(one.get_attribute("class")) for one in objects]
+        pale = ["outside" in str(element.get_attribute("class")) for element in objects]
         assert pale == outside.tolist()
-        told = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
-        assert told.count("(outside)") == outside.sum()
+        description = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
+        assert description.count("(outside)") == outside.sum()
         out = np.hypot(*np.transpose(page.ask("return signPlaces(arguments[0])", wheel)))
         assert np.corrcoef(out[:-1], metres[:-1])[0, 1] > 0.8
-    assert len(asked.find_elements(By.CSS_SELECTOR, "line.ray")) == 1
+    assert len(query.find_elements(By.CSS_SELECTOR, "line.ray")) == 1
     assert cell.find_elements(By.CSS_SELECTOR, "line.ray") == []
 
 
-def test_an_explanation_shows_what_was_looked_at(page: MapPage) -> None:
+def test_explanation_shows_sectors_of_photos(page: MapPage) -> None:
     photos = tuple(Photo.looking(heading=heading, fov=70) for heading in (10, 200))
-    seen = CITY.signature(LONGEST)
-    assert seen.bearings is not None
-    owners = photos[1].sees(seen.bearings).astype(int)
-    view = View.of(seen, photo=owners, photos=photos)
-    view = view.select(photos[0].sees(seen.bearings) | photos[1].sees(seen.bearings))
+    signature = CITY.signature(LONGEST)
+    assert signature.bearings is not None
+    owners = photos[1].sees(signature.bearings).astype(int)
+    view = View.of(signature, photo=owners, photos=photos)
+    view = view.select(photos[0].sees(signature.bearings) | photos[1].sees(signature.bearings))
     index = build_index(CITY, named_noise("light"))
     page.open(location_map(locate(index, view, explained=1)))
     outlines = """
-    const sectors = lines((one) => one.options.color === arguments[0])[0].getLatLngs();
-    return sectors.map((one) => map.distance(one[0], one[1]));
+    const sectors = lines(({options}) => options.color === arguments[0])[0].getLatLngs();
+    return sectors.map(([first, second]) => map.distance(first, second));
     """
     reach = page.ask(outlines, SECTOR["color"])
     assert reach == pytest.approx([30.0, 30.0], abs=0.2)
 
 
-def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
+def test_withheld_answer_shows_all_candidates(page: MapPage) -> None:
     query = Signature(CITY.signature(LONGEST).codes[:1], None)  # type: ignore[index]
     index = build_index(CITY, named_noise("strong"))
     location = locate(index, query, top=7)
@@ -156,30 +156,36 @@ def test_what_cannot_be_told_is_shown_from_afar(page: MapPage) -> None:
     assert "matched" not in legend
     assert page.circles(ANSWERS["withheld"].colour) == 1
     boxes = page.all(".leaflet-control-layers-overlays label")
-    on = [one.text for one in boxes if one.find_element(By.TAG_NAME, "input").is_selected()]
+    on = [
+        element.text
+        for element in boxes
+        if element.find_element(By.TAG_NAME, "input").is_selected()
+    ]
     assert [name.strip() for name in on if "Chance" in name] == ["Chance within 50 m"]
-    inside = "return circles('#ffffff').every((one) => map.getBounds().contains(one.getLatLng()))"
+    inside = (
+        "return circles('#ffffff').every((circle) => map.getBounds().contains(circle.getLatLng()))"
+    )
     assert page.ask(inside)
 
 
-def test_a_localization_in_a_browser(page: MapPage) -> None:
+def test_localization_map_describes_candidates(page: MapPage) -> None:
     page.open(
         localization_map(localize(CITY, CITY.signature(LONGEST), top=50, method=Method()), CITY)
     )
     assert page.browser.title == "Candidate places"
     texts = """
-    return shown((one) => one instanceof L.CircleMarker).map((one) => content(one));
+    return shown((layer) => layer instanceof L.CircleMarker).map((circle) => content(circle));
     """
-    told = page.ask(texts)
-    assert len(told) == 50
-    best = told[-1]  # drawn last, on top
+    descriptions = page.ask(texts)
+    assert len(descriptions) == 50
+    best = descriptions[-1]  # drawn last, on top
     assert best.startswith("Rank 1")
     assert "Rank\t1 of " in best
     assert str(CITY.cell_ids[LONGEST]) in best
     assert CITY.types(LONGEST) in best
     # The query and what the cell sees, side by side.
     page.ask("circles(arguments[0])[0].fire('click')", CANDIDATE_RAMP[0])
-    captions = [one.get_property("innerText") for one in page.all("figcaption")]
+    captions = [element.get_property("innerText") for element in page.all("figcaption")]
     assert captions == ["Query", "Signature, to 30 m"]
     page.ask("semsig.hide(map)")
     assert f"Types: {CITY.types(LONGEST)}" in page.text(LEGEND)
@@ -187,21 +193,21 @@ def test_a_localization_in_a_browser(page: MapPage) -> None:
     assert page.ask(texts) == []
 
 
-def test_signs_on_a_map_of_vectors(page: MapPage) -> None:
-    page.open(location_map(found(), map_=folium.Map(tiles=None)))
+def test_signs_are_drawn_on_a_map_with_svg(page: MapPage) -> None:
+    page.open(location_map(answer_with_errors(), map_=folium.Map(tiles=None)))
     outline = OUTLINES[ANSWERS["given"].shape]
     assert len(page.all(f'.leaflet-marker-pane path[d="{outline}"]')) == 1
 
 
-def test_what_has_bearings_alone_is_drawn_as_dots(page: MapPage) -> None:
-    seen = CITY.signature(LONGEST)
+def test_query_without_types_is_drawn_as_dots(page: MapPage) -> None:
+    signature = CITY.signature(LONGEST)
     page.open(
         localization_map(
-            localize(CITY, Signature(None, seen.bearings), top=1, method=Method()), CITY
+            localize(CITY, Signature(None, signature.bearings), top=1, method=Method()), CITY
         )
     )
     page.panel_of(CANDIDATE_RAMP[0])
-    asked, cell = page.all(".semsig-wheels figure")
-    assert len(asked.find_elements(By.CSS_SELECTOR, ".object .north")) == len(seen)
-    assert asked.find_elements(By.TAG_NAME, "text") == []
-    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched text")) == len(seen)
+    query, cell = page.all(".semsig-wheels figure")
+    assert len(query.find_elements(By.CSS_SELECTOR, ".object .north")) == len(signature)
+    assert query.find_elements(By.TAG_NAME, "text") == []
+    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched text")) == len(signature)

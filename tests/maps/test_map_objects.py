@@ -35,7 +35,7 @@ HOUSE, STREET = "#e4ded3", "#cfd3d8"
 WORLD = random_town()
 CITY, OBJECTS = WORLD.database, WORLD.street_objects
 SIGNS = class_signs(OBJECTS.taxonomy)
-NUMBER = 7  # of the object that is asked for
+NUMBER = 7  # index of the object of the tests
 CODE = int(OBJECTS.codes[NUMBER])
 TITLE = OBJECTS.taxonomy.by_code(CODE).title
 COUNT = OBJECTS.class_counts[CODE]
@@ -53,7 +53,7 @@ def click(page: MapPage, number: int) -> str:
     return page.panel()
 
 
-def test_objects_in_a_browser(page: MapPage) -> None:
+def test_objects_map_has_layers_and_legend_by_class(page: MapPage) -> None:
     page.open(objects_map(OBJECTS, database=CITY))
     assert page.browser.title == "Street objects"
     names = page.layers()
@@ -64,10 +64,10 @@ def test_objects_in_a_browser(page: MapPage) -> None:
     legend = page.one(LEGEND).text
     assert f"{len(OBJECTS):,} objects of {len(OBJECTS.class_counts)} classes" in legend
     for signs in (".semsig-legend", ".leaflet-control-layers-overlays"):
-        for part, named in (("path", "colour"), ("text", "ink")):
+        for part, field in (("path", "colour"), ("text", "ink")):
             shown = page.all(f"{signs} .semsig-sign {part}")
-            colours = [getattr(SIGNS[code], named) for code in OBJECTS.class_counts]
-            assert [one.get_attribute("fill") for one in shown] == colours
+            colours = [getattr(SIGNS[code], field) for code in OBJECTS.class_counts]
+            assert [element.get_attribute("fill") for element in shown] == colours
     assert str(OBJECTS.licenses[0]) in page.one(".leaflet-control-attribution").text
     assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
     boxes = "'.leaflet-control-layers-overlays input:checked'"
@@ -77,42 +77,42 @@ def test_objects_in_a_browser(page: MapPage) -> None:
     assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
 
 
-def test_a_click_tells_of_the_nearest_object(page: MapPage) -> None:
+def test_click_describes_the_nearest_object(page: MapPage) -> None:
     table = OBJECTS.table.assign(count=3, merged="osm:node/9")
     objects = dataclasses.replace(OBJECTS, table=table)
     page.open(objects_map(objects))
     text = click(page, NUMBER)
     assert text.startswith(TITLE)
-    for said in ("world", "3 rows of its source", "osm:node/9"):
-        assert said in text
-    # Whoever lies on it may be told of instead.
+    for words in ("world", "3 rows of its source", "osm:node/9"):
+        assert words in text
+    # An object at the same place may be described instead.
     there = np.hypot(*(OBJECTS.xy - OBJECTS.xy[NUMBER]).T) < 0.5
     ids = OBJECTS.table["source_id"][there]
-    assert any(f"Identifier\t{one}" in text for one in ids)
+    assert any(f"Identifier\t{identifier}" in text for identifier in ids)
     assert len(page.all(".leaflet-shadow-pane canvas")) == 1
     page.ask("semsig.hide(map)")
     corner = OBJECTS.xy.min(axis=0) - 50.0
     page.click_at(to_latlon(corner[None], OBJECTS.crs)[0].tolist())
-    assert page.told()["title"] == "A place on the map"
+    assert page.facts()["title"] == "A place on the map"
 
 
-def test_the_script_has_every_object_where_it_is(page: MapPage) -> None:
+def test_objects_are_at_their_places(page: MapPage) -> None:
     page.open(objects_map(OBJECTS))
     places = page.ask_later("placesOfObjects(...arguments)", 40)
     expected = np.array([place_of(number) for number in range(40)])
     assert np.abs(np.array(places) - expected).max() < 4e-6  # a quarter of a metre
 
 
-def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
+def test_search_finds_names_cells_and_places(page: MapPage) -> None:
     page.open(objects_map(OBJECTS, database=CITY))
-    offered = page.search(TITLE[:4].upper())
-    assert f"{TITLE}\nall {COUNT:,}" in offered
+    results = page.search(TITLE[:4].upper())
+    assert f"{TITLE}\nall {COUNT:,}" in results
     page.ask("map.setZoom(20, {animate: false})")
     page.search(TITLE, Keys.ENTER)
     every = [place_of(number) for number in np.flatnonzero(OBJECTS.codes == CODE).tolist()]
     assert page.ask("return arguments[0].every((at) => map.getBounds().contains(at))", every)
-    offered = page.search(str(len(OBJECTS) - 1), Keys.ENTER)
-    assert offered[0].startswith(f"{len(OBJECTS) - 1}\n")
+    results = page.search(str(len(OBJECTS) - 1), Keys.ENTER)
+    assert results[0].startswith(f"{len(OBJECTS) - 1}\n")
     assert f"Identifier\t{len(OBJECTS) - 1}" in page.panel()
     assert page.ask("return map.getZoom()") >= 18
     middle = len(CITY) // 2
@@ -121,7 +121,7 @@ def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
     centre = "const place = map.getCenter(); return [place.lat, place.lng];"
     cell = str(CITY.cell_ids[middle])
     degrees = "latitude, longitude"
-    for typed, said in (
+    for typed, words in (
         (cell, f"Cell {cell}"),
         (f"{CITY.cell_ids[middle]:,}", f"Cell {cell}"),
         (f"{latitude}, {longitude}", degrees),
@@ -133,39 +133,39 @@ def test_the_search_finds_names_cells_and_places(page: MapPage) -> None:
     ):
         page.ask("map.setZoom(14, {animate: false})")
         (offer,) = page.search(typed, Keys.ENTER)
-        assert said in offer
+        assert words in offer
         text = page.panel()
         assert re.findall(r"Cell\D*(\d+)", text) == [cell]
         for label, place in (("Latitude, longitude", (latitude, longitude)),
                              ("x, y in EPSG:2154", (x, y))):  # fmt: skip
             (numbers,) = re.findall(rf"{label}\t(.*), (.*)", text)
-            assert [float(one) for one in numbers] == pytest.approx(place, abs=0.1, rel=1e-7)
-        # What is near the edge moves the map a little.
-        page.ask("map.setView(toldPlace(), 19, {animate: false})")
+            assert [float(number) for number in numbers] == pytest.approx(place, abs=0.1, rel=1e-7)
+        # Uncovering a place near the edge moves the map a little.
+        page.ask("map.setView(panelPlace(), 19, {animate: false})")
         assert page.ask(centre) == pytest.approx([latitude, longitude], abs=2e-6)
 
 
-def test_the_search_is_used_by_keyboard(page: MapPage) -> None:
+def test_search_works_by_keyboard(page: MapPage) -> None:
     page.open(objects_map(OBJECTS, database=CITY))
     box = page.one(".semsig-search input")
-    offered = page.search("1")
-    assert len(offered) == 8
-    assert page.one("[aria-selected=true]").text == offered[0]
-    assert page.ask("return covered()") == 0  # no button lies on what is offered
+    results = page.search("1")
+    assert len(results) == 8
+    assert page.one("[aria-selected=true]").text == results[0]
+    assert page.ask("return covered()") == 0  # no button lies on what is results
     box.send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN)
-    assert page.one("[aria-selected=true]").text == offered[2]
+    assert page.one("[aria-selected=true]").text == results[2]
     active = box.get_attribute("aria-activedescendant")
-    assert page.browser.find_element(By.ID, str(active)).text == offered[2]
+    assert page.browser.find_element(By.ID, str(active)).text == results[2]
     box.send_keys(Keys.ARROW_UP, Keys.ESCAPE)
     assert box.get_attribute("aria-expanded") == "false"
     for nothing in ("no such thing", "0, 0", "1e400", "99999999999999999999"):
         assert page.search(nothing, Keys.ENTER) == []
-        said = page.one(".semsig-search [role=status]")
-        assert said.text == "Nothing on this map has that name, number or place."
+        status = page.one(".semsig-search [role=status]")
+        assert status.text == "Nothing on this map has that name, number or place."
 
 
 @pytest.mark.usefixtures("carried")
-def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
+def test_colours_are_switched_and_stored(browser: Chrome, tmp_path: Path) -> None:
     page = MapPage(browser, tmp_path)
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     panel = "return getComputedStyle(document.querySelector('.semsig-legend')).color"
@@ -182,9 +182,9 @@ def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
         assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
         assert_quiet(browser)
         browser.refresh()
-        assert not page.ask("return semsig.isDark(map)")  # what was chosen is kept
+        assert not page.ask("return semsig.isDark(map)")  # the choice is stored
         page.ask("localStorage.clear()")
-        # A page that may keep nothing.
+        # A page without local storage.
         text = html.escape((tmp_path / "map.html").read_text(encoding="utf-8"))
         frame = f'<iframe sandbox="allow-scripts" srcdoc="{text}"></iframe>'
         (tmp_path / "frame.html").write_text(frame, encoding="utf-8")
@@ -199,7 +199,7 @@ def test_light_and_dark(browser: Chrome, tmp_path: Path) -> None:
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
-def test_a_narrow_screen(page: MapPage) -> None:
+def test_panel_is_below_the_map_on_a_narrow_screen(page: MapPage) -> None:
     with page.screen(390, 844, dots=2):
         page.open(objects_map(OBJECTS, database=CITY))
         box = page.one(".semsig-search").rect
@@ -214,7 +214,7 @@ def test_a_narrow_screen(page: MapPage) -> None:
         assert page.one(LEGEND).is_displayed()
 
 
-def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
+def test_hostile_data_is_shown_as_text(page: MapPage) -> None:
     harm = HOSTILE + "M" * 10_000
     classes = (dataclasses.replace(item, title=harm) for item in OBJECTS.taxonomy.classes)
     table = OBJECTS.table.assign(source=harm, source_id=harm, merged=harm)
@@ -224,8 +224,8 @@ def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
     credit = ".leaflet-control-attribution"
     for selector, times in {LEGEND: kinds + 2, layers: kinds, credit: 2}.items():
         assert page.text(selector).count(harm) == times
-    # No sign of direction reaches what stands beside, and no name fills the page.
-    assert all(page.text(f"{alone} bdi").endswith(harm) for alone in (credit, layers))
+    # Text direction does not spread to other text, and long names do not fill the page.
+    assert all(page.text(f"{part} bdi").endswith(harm) for part in (credit, layers))
     highest = "return Math.max(...[...document.querySelectorAll(arguments[0])].map(height))"
     click(page, NUMBER)
     assert page.text(".semsig-panel").count(harm) == 5
@@ -239,7 +239,7 @@ def test_hostile_data_is_shown_and_never_run(page: MapPage) -> None:
         assert page.all(f".leaflet-container {element}") == []
 
 
-def test_a_hundred_thousand_objects_are_a_small_page() -> None:
+def test_page_of_100_000_objects_is_small() -> None:
     rng = np.random.default_rng(0)
     rows = rng.choice(len(OBJECTS), 100_000)
     table = OBJECTS.table.iloc[rows].assign(source_id=np.arange(len(rows)).astype(str))
@@ -256,7 +256,7 @@ def square(x: float, y: float, side: float) -> shapely.Polygon:
     return shapely.box(765_300.0 + x, 6_275_100.0 + y, 765_300.0 + x + side, 6_275_100.0 + y + side)
 
 
-def test_buildings_and_streets_in_a_browser(page: MapPage) -> None:
+def test_ground_map_draws_buildings_and_streets(page: MapPage) -> None:
     court = shapely.difference(square(0, 0, 100), square(25, 25, 50))
     lane = shapely.LineString([(765_280.0, 6_275_090.0), (765_420.0, 6_275_090.0)])
     hut = square(150, 0, 3)
@@ -269,10 +269,10 @@ def test_buildings_and_streets_in_a_browser(page: MapPage) -> None:
     page.one(".semsig-colours").click()
     assert page.drawn(HOUSE, GROUND) == 0
     assert page.drawn("#272b30", GROUND) == pytest.approx(house, rel=0.02)
-    # What would be a pixel or less is drawn all the same.
+    # Shapes of a pixel or less are drawn too.
     page.ask("map.setZoom(13, {animate: false})")
     assert page.drawn("#272b30", GROUND) > 0
-    # Where a page may keep nothing, it turns light and dark all the same.
+    # Colours are switched without local storage too.
     page.ask("Storage.prototype.setItem = () => { throw new Error('not allowed'); }")
     page.one(".semsig-colours").click()
     assert page.drawn(HOUSE, GROUND) > 0
@@ -280,7 +280,7 @@ def test_buildings_and_streets_in_a_browser(page: MapPage) -> None:
     assert page.all(GROUND) == []
 
 
-def test_maps_lie_over_each_other_and_the_ground_below_all(page: MapPage) -> None:
+def test_several_maps_are_drawn_on_one_map(page: MapPage) -> None:
     x, y = CITY.xy.mean(axis=0)
     house = table(shapely.box(x - 50, y - 50, x + 50, y + 50))
     house.attrs["licenses"] = ["Mapper (CC0)"]
@@ -303,7 +303,7 @@ def test_maps_lie_over_each_other_and_the_ground_below_all(page: MapPage) -> Non
     assert [credit.count(line) for line in ("Mapper (CC0)", str(OBJECTS.licenses[0]))] == [1, 1]
 
 
-def test_a_city_of_sixty_thousand_buildings_is_a_small_page() -> None:
+def test_page_of_60_000_buildings_is_small() -> None:
     rng = np.random.default_rng(0)
     size = 60_000
     corners = np.array([[0, 0], [12, 0], [12, 6], [9, 6], [9, 14], [3, 14], [3, 9], [0, 9]])
@@ -315,14 +315,16 @@ def test_a_city_of_sixty_thousand_buildings_is_a_small_page() -> None:
     assert len(page_of_map(ground_map(buildings=houses), self_contained=False)) < 3_000_000
 
 
-def test_only_what_is_in_the_box() -> None:
+def test_ground_map_is_limited_to_the_box() -> None:
     many = table(*(square(30.0 * at, 0.0, 20.0) for at in range(200)))
     box = (765_300.0, 6_275_100.0, 765_600.0, 6_275_200.0)
-    every, some = (ground_map(buildings=many, box=one).get_root().render() for one in (None, box))
+    every, some = (
+        ground_map(buildings=many, box=limits).get_root().render() for limits in (None, box)
+    )
     assert len(some) < len(every)
 
 
-def test_streets_are_found_by_their_names(page: MapPage) -> None:
+def test_search_finds_streets_by_name(page: MapPage) -> None:
     lines = [[(0, 0), (90, 5)], [(200, 0), (300, 0)], [(95, 5), (95, 60)], [(0, 90), (50, 90)]]
     streets = gpd.GeoDataFrame(
         {"name": ["Rue de l'Église", None, "Rue de l'Église", HOSTILE]},
@@ -335,15 +337,15 @@ def test_streets_are_found_by_their_names(page: MapPage) -> None:
     assert page.panel() == ""
     assert page.search("eglise") == ["Rue de l'Église\nstreet"]
     page.search("EGLISE", Keys.ENTER)
-    assert page.told()["title"] == "Rue de l'Église"
-    marked = page.ask("return lines((one) => one.options.weight === 6)[0].getLatLngs().length")
+    assert page.facts()["title"] == "Rue de l'Église"
+    marked = page.ask("return lines(({options}) => options.weight === 6)[0].getLatLngs().length")
     assert marked == 2
     page.browser.get_log("performance")
     wait = WebDriverWait(page.browser, PATIENCE_S)
     wait.until(lambda _: "told=" in page.browser.current_url)
     page.browser.refresh()  # with the street in the address
     wait.until(lambda _: "Rue de" in page.panel())
-    assert page.told()["title"] == "Rue de l'Église"
+    assert page.facts()["title"] == "Rue de l'Église"
     page.ask("semsig.openers.street(map, arguments[0])", HOSTILE)
     page.panel()
     assert page.text(".semsig-panel h2") == HOSTILE

@@ -1,4 +1,4 @@
-"""Pages of maps: files that they carry, so that nothing is left to be requested."""
+"""Pages of maps with all their files, so that nothing is requested."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 carried = pytest.mark.usefixtures("carried")
 
 
-def a_map(*elements: folium.Element) -> folium.Map:
-    """Return a map with one of each element that needs a file: popup, marker, control."""
+def map_with_marker(*elements: folium.Element) -> folium.Map:
+    """Return a map with the elements that need files: popup, marker, control."""
     map_ = folium.Map(location=[43.6, 3.88], zoom_start=14, tiles=None)
     map_.options["maxZoom"] = 20
     folium.Marker([43.6, 3.88], popup="<b>here</b>").add_to(map_)
@@ -44,31 +44,31 @@ def a_map(*elements: folium.Element) -> folium.Map:
 
 
 def linked_page() -> str:
-    page: str = a_map().get_root().render()
+    page: str = map_with_marker().get_root().render()
     return page
 
 
-def test_every_link_of_a_folium_page_is_known() -> None:
-    known = {file for asset in assets().values() for file in asset.stands_for}
+def test_all_links_of_a_folium_page_are_in_the_manifest() -> None:
+    replaceable = {file for asset in assets().values() for file in asset.replaces}
     linked = {address.rpartition("/")[2] for address in external_files(linked_page())}
-    # and nothing in our lists is left over from an older folium
-    assert linked == known | map_page.UNUSED
+    # Our lists contain no files of older folium versions.
+    assert linked == replaceable | map_page.UNUSED
 
 
 @carried
-def test_a_page_is_left_without_addresses_to_load() -> None:
+def test_inlined_page_loads_nothing() -> None:
     page = inline_assets(linked_page())
     assert external_files(page) == ()
     parsed = HtmlPage(page)
     assert [address for address in parsed.loaded if not address.startswith("data:")] == []
-    # one element a file: nothing inside a script or style closed it early
+    # One element per file: nothing inside a script or style has closed it early.
     assert [text for text in parsed.text_of["style"] if "images/" in text] == []
     assert sum("Leaflet 1.9.3" in text for text in parsed.text_of["script"]) == 1
     assert "sourceMappingURL" not in page
 
 
 @carried
-def test_the_rest_of_the_page_is_not_touched() -> None:
+def test_inlining_changes_only_the_head() -> None:
     page = linked_page()
     inlined = inline_assets(page)
     assert inlined.partition("</head>\n<body>")[2] == page.partition("</head>\n<body>")[2]
@@ -78,18 +78,18 @@ def test_the_rest_of_the_page_is_not_touched() -> None:
 
 
 @carried
-def test_an_element_that_needs_another_file_is_linked_or_refused() -> None:
+def test_other_files_are_linked_or_refused() -> None:
     icon = folium.Marker([43.6, 3.88], icon=folium.Icon(color="red"))
     cluster = folium.plugins.MarkerCluster([[43.6, 3.88]])
     for element in (icon, cluster, folium.plugins.Draw()):
-        map_ = a_map(element)
+        map_ = map_with_marker(element)
         assert external_files(page_of_map(map_)) != ()
         with pytest.raises(InputError, match="A self-contained map cannot"):
             page_of_map(map_, self_contained=True)
 
 
 @carried
-def test_the_end_of_an_element_inside_a_file_is_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_end_tags_in_files_are_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
     content = b"let a = '</SCRIPT><!-- </style>';"
     monkeypatch.setattr(map_page, "_content", lambda _: content)
     assert asset_text("jquery.min.js") == r"let a = '<\/SCRIPT><\!-- </style>';"
@@ -100,13 +100,15 @@ def test_the_end_of_an_element_inside_a_file_is_escaped(monkeypatch: pytest.Monk
     ("name", "words"),
     [("jquery.js", "nearest is 'jquery.min.js'"), ("layers.png", "'layers.png' is not a map file")],
 )
-def test_unknown_names(name: str, words: str) -> None:
+def test_unknown_asset_names_are_refused(name: str, words: str) -> None:
     with refused(UnknownNameError, words):
         asset_text(name)
 
 
 @pytest.mark.parametrize("damage", ["absent", "changed"])
-def test_without_the_files(damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_files_are_linked_or_refused(
+    damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assets()  # the manifest is read once, from the package
     if damage == "changed":
         (tmp_path / "leaflet.js").write_text("alert(1)", encoding="utf-8")
@@ -114,18 +116,18 @@ def test_without_the_files(damage: str, tmp_path: Path, monkeypatch: pytest.Monk
     assert not map_page.available()
     with pytest.raises(InputError, match=r"does not contain leaflet\.js of leaflet 1\.9\.3; make"):
         asset_text("leaflet.js")
-    assert external_files(framed_page(a_map()))
-    assert not save_map(a_map(), tmp_path / "map.html")
+    assert external_files(framed_page(map_with_marker()))
+    assert not save_map(map_with_marker(), tmp_path / "map.html")
     before = (tmp_path / "map.html").read_bytes()
     with pytest.raises(InputError, match="does not contain"):
-        save_map(a_map(), tmp_path / "map.html", self_contained=True)
+        save_map(map_with_marker(), tmp_path / "map.html", self_contained=True)
     assert (tmp_path / "map.html").read_bytes() == before
 
 
 @carried
-def test_the_page_works_in_a_browser_and_requests_nothing(browser: Chrome, tmp_path: Path) -> None:
+def test_saved_page_works_without_requests(browser: Chrome, tmp_path: Path) -> None:
     file = tmp_path / "map.html"
-    assert save_map(a_map(), file)
+    assert save_map(map_with_marker(), file)
     browser.get(file.as_uri())
     marker = browser.find_element("css selector", "img.leaflet-marker-icon")
     assert browser.execute_script("return arguments[0].naturalWidth", marker) == 25
@@ -138,7 +140,7 @@ def test_the_page_works_in_a_browser_and_requests_nothing(browser: Chrome, tmp_p
 
 
 @carried
-def test_a_map_says_whether_it_makes_requests(tmp_path: Path) -> None:
+def test_save_map_returns_whether_a_page_needs_no_requests(tmp_path: Path) -> None:
     file = tmp_path / "map.html"
     assert not save_map(folium.Map(tiles=None), file, self_contained=False)
     before = file.read_text(encoding="utf-8")
@@ -161,7 +163,7 @@ def framed_page(map_: folium.Map) -> str:
 
 
 @carried
-def test_a_framed_map_makes_no_request_names_its_language_and_may_be_enlarged() -> None:
+def test_framed_map_has_language_and_zoom_and_no_requests() -> None:
     map_ = folium.Map(tiles=None)
     folium.Marker((0, 0), tooltip='<b>"a" & b</b>').add_to(map_)
     page = framed_page(map_)

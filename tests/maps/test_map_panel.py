@@ -1,4 +1,4 @@
-"""The panel of a map: what it says, where it lies, and how it opens and closes."""
+"""The panel of a map: its text and position, and how it opens and closes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CITY = random_town().database
 OBJECTS = random_town().street_objects
 PLACES = to_latlon(CITY.xy, CITY.crs)
 SCREENS = [(1440, 900), (390, 844)]
-# The first of some places where the map is on top: its number, and where it is on the screen.
+# The first place that nothing covers: its index, and its position on the screen.
 ON_TOP = """
 for (const [number, place] of arguments[0].entries()) {
   const {x, y} = map.latLngToContainerPoint(place);
@@ -32,14 +32,14 @@ for (const [number, place] of arguments[0].entries()) {
   if (top && !top.closest(".semsig-panel, .leaflet-control")) return [number, x, y];
 }
 """
-# Click at a share of the half width from the middle: does the map glide?
+# Click at a share of the half width from the middle; return whether the map glides.
 GLIDES = """
-map.once("semsig-told", () => arguments[1](Boolean(map._panAnim?._inProgress)));
+map.once("semsig-panel", () => arguments[1](Boolean(map._panAnim?._inProgress)));
 const x = (1 + arguments[0]) * map.getSize().x / 2;
 map.fire("click", {latlng: map.containerPointToLatLng([x, map.getSize().y / 2])});
 """
-BESIDE_THE_PANEL = """
-const {x, y} = map.latLngToContainerPoint(toldPlace());
+NOT_COVERED = """
+const {x, y} = map.latLngToContainerPoint(panelPlace());
 const box = document.querySelector(".semsig-panel").getBoundingClientRect();
 return 0 <= x && x <= innerWidth && 0 <= y && y <= innerHeight && !(box.x <= x && box.y <= y);
 """
@@ -52,12 +52,12 @@ def press(page: MapPage, x: float, y: float) -> None:
 
 
 def wait_for(page: MapPage, key: str | None) -> None:
-    told = "return map.semsigPanel.told?.key ?? null"
-    WebDriverWait(page.browser, PATIENCE_S, 0.02).until(lambda _: page.ask(told) == key, str(key))
+    script = "return map.semsigPanel.selection?.key ?? null"
+    WebDriverWait(page.browser, PATIENCE_S, 0.02).until(lambda _: page.ask(script) == key, str(key))
 
 
 @pytest.mark.parametrize("screen", SCREENS)
-def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int]) -> None:
+def test_every_click_on_a_cell_opens_the_panel(page: MapPage, screen: tuple[int, int]) -> None:
     rng = np.random.default_rng(7)
     with page.screen(*screen, mobile=False):
         page.open(ambiguity_map(CITY))
@@ -67,32 +67,32 @@ def test_every_click_on_a_cell_is_answered(page: MapPage, screen: tuple[int, int
             number, *where = page.ask(ON_TOP, PLACES[some].tolist())
             press(page, *where)
             wait_for(page, f"cell:{CITY.cell_ids[some[number]]}")
-            assert page.ask(BESIDE_THE_PANEL)
+            assert page.ask(NOT_COVERED)
 
 
 @pytest.mark.parametrize("screen", SCREENS)
-def test_what_is_told_of_is_never_covered(page: MapPage, screen: tuple[int, int]) -> None:
+def test_selected_query_is_never_covered(page: MapPage, screen: tuple[int, int]) -> None:
     with page.screen(*screen, mobile=False):
         page.open(evaluation_map(small_evaluation("medium"), small_city()[0]))
         count = page.ask("return signs('failed').length")
         for query in range(0, count, max(1, count // 12)):
             page.ask("signs('failed')[arguments[0]].fire('click')", query)
-            assert page.ask(BESIDE_THE_PANEL)
+            assert page.ask(NOT_COVERED)
 
 
 @pytest.mark.parametrize("moving", [False, True])
-def test_the_map_glides_unless_that_is_disliked(page: MapPage, moving: bool) -> None:  # noqa: FBT001
+def test_map_glides_unless_reduced_motion_is_set(page: MapPage, moving: bool) -> None:  # noqa: FBT001
     with page.screen(1440, 900, mobile=False, moving=moving):
         page.open(ambiguity_map(CITY))
         page.ask("map.setView(arguments[0], 19, {animate: false})", PLACES[0].tolist())
         for side in (-0.95, 0.95):
             assert page.ask_later(GLIDES, side) == moving
             page.rest()
-            assert page.ask(BESIDE_THE_PANEL)
+            assert page.ask(NOT_COVERED)
             page.ask("semsig.hide(map)")
 
 
-def test_a_click_beside_the_cells_is_answered_too(page: MapPage) -> None:
+def test_click_outside_cells_describes_nearest_cell_or_place(page: MapPage) -> None:
     page.open(ambiguity_map(CITY))
     page.ask("map.setZoom(19, {animate: false})")
     outermost = int(CITY.xy[:, 0].argmin())
@@ -100,18 +100,18 @@ def test_a_click_beside_the_cells_is_answered_too(page: MapPage) -> None:
     for away, title in ((30.0, "Cells that look the same"), (90.0, "No cell here")):
         (place,) = to_latlon(np.array([[x - away, y]]), CITY.crs).tolist()
         page.click_at(place)
-        said = page.told()
-        assert said["title"] == title
+        facts = page.facts()
+        assert facts["title"] == title
         if away < 50.0:
-            assert said["Nearest cell"] == "30 m from the click"
-            assert said["Cell"] == str(CITY.cell_ids[outermost])
+            assert facts["Nearest cell"] == "30 m from the click"
+            assert facts["Cell"] == str(CITY.cell_ids[outermost])
         else:
-            assert said["Seen"] == "nothing from this place"
-            numbers = [float(one) for one in said["Latitude, longitude"].split(", ")]
+            assert facts["Seen"] == "nothing from this place"
+            numbers = [float(part) for part in facts["Latitude, longitude"].split(", ")]
             assert numbers == pytest.approx(place, abs=2e-6)
 
 
-def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
+def test_panel_has_a_name_and_closes_by_key_button_and_swipe(page: MapPage) -> None:
     with page.screen(390, 844, mobile=False):
         page.open(ambiguity_map(CITY))
         panel = page.one(".semsig-panel")
@@ -119,7 +119,7 @@ def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
         assert names == ["region", "polite", "About this place"]
         number = str(CITY.cell_ids[0])
         key = f"cell:{number}"
-        # By keyboard it gets the focus, and gives it back.
+        # Opened by keyboard, it gets the focus; closed, it returns the focus.
         page.search(number, Keys.ENTER)
         wait_for(page, key)
         focused = "return document.activeElement.className.split(' ')[0]"
@@ -146,20 +146,20 @@ def test_the_panel_is_named_and_closes_in_three_ways(page: MapPage) -> None:
         wait_for(page, None)
 
 
-def test_what_a_key_names_is_told_again(page: MapPage) -> None:
+def test_openers_open_the_panel_for_a_key(page: MapPage) -> None:
     city, evaluation = small_city()[0], small_evaluation("medium")
     map_ = evaluation_map(evaluation, city)
-    for some in (OBJECTS, OBJECTS):
-        objects_map(some, map_=map_)
+    for objects in (OBJECTS, OBJECTS):
+        objects_map(objects, map_=map_)
     page.open(map_)
     opened = "return [semsig.openers[arguments[0]](map, arguments[1]), panel().split('\\n')[0]]"
     for kind, rest, title in (("query", "17", "Query 17: "), ("place", "48.1,2.1", "A place")):
-        known, said = page.ask(opened, kind, rest)
-        assert known
-        assert said.startswith(title)
+        success, text = page.ask(opened, kind, rest)
+        assert success
+        assert text.startswith(title)
         wait_for(page, {"place": "place:48.100000,2.100000"}.get(kind, f"{kind}:{rest}"))
     layers = page.ask(
-        "return Object.keys(semsig.held).filter("
+        "return Object.keys(semsig.layerSets).filter("
         "(name) => /^objects/.test(name)).map((name) => name.slice(7))"
     )
     assert len(layers) == 2
@@ -172,17 +172,17 @@ def test_what_a_key_names_is_told_again(page: MapPage) -> None:
 
 LIT = """
 return [...document.querySelectorAll(".semsig-wheels figure")].map((wheel) =>
-  [...wheel.querySelectorAll(".object")].map((one) => one.classList.contains("lit")));
+  [...wheel.querySelectorAll(".object")].map(({classList}) => classList.contains("lit")));
 """
 
 
 def lit(page: MapPage) -> list[list[bool]]:
-    """Return of each object of each wheel whether it is lit."""
+    """Return for each object of each wheel whether it is highlighted."""
     return list(page.ask(LIT))
 
 
-def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
-    """The oracle is where the objects are that the city was made from."""
+def test_object_is_highlighted_in_wheel_and_map(page: MapPage) -> None:
+    """The oracle is the positions of the objects of the city."""
     cell = int(CITY.lengths.argmax())
     with page.screen(1440, 900, mobile=False):
         page.open(ambiguity_map(CITY))
@@ -207,13 +207,15 @@ def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
         assert page.text(".semsig-lit-object") == hint
         assert not any(map(any, lit(page)))
         # From the map to the wheel.
-        page.ask("shown((one) => one.getElement?.()?.matches?.('.semsig-object'))[2].fire('click')")
+        page.ask(
+            "shown((layer) => layer.getElement?.()?.matches?.('.semsig-object'))[2].fire('click')"
+        )
         assert lit(page)[0].index(True) == 2
-        # A click of a mouse asks for what is below.
+        # A click with a mouse describes the cell below the sign.
         sign = page.all(".semsig-object")[0]
         ActionChains(page.browser).move_to_element(sign).click().perform()
-        told = "return map.semsigPanel.told.key"
-        WebDriverWait(page.browser, PATIENCE_S).until(lambda _: page.ask(told) != key)
+        script = "return map.semsigPanel.selection.key"
+        WebDriverWait(page.browser, PATIENCE_S).until(lambda _: page.ask(script) != key)
         page.click(CITY, cell)
         objects = page.all(".semsig-wheels figure:first-child .object")
         # By keyboard, round and back.
@@ -224,15 +226,15 @@ def test_an_object_is_lit_in_the_wheel_and_on_the_map(page: MapPage) -> None:
         assert lit(page)[0].index(True) == 0
 
 
-def test_what_was_seen_but_not_how_far_is_a_ray(page: MapPage) -> None:
+def test_object_without_distance_is_drawn_as_a_ray(page: MapPage) -> None:
     page.open(evaluation_map(small_evaluation("light"), small_city()[0]))
     longest = int(small_evaluation("light").queries["query_length"].argmax())
     page.search(f"Query {longest + 1}:", Keys.ENTER)
-    ray = "return lines((one) => one.options.color === arguments[0] && one.options.dashArray)"
+    ray = "return lines(({options}) => options.color === arguments[0] && options.dashArray)"
     count = len(page.all(".semsig-wheels figure:first-child .object"))
     assert page.ask(f"{ray}.length", "#808080") == count
     ActionChains(page.browser).move_to_element(page.one(".semsig-wheels .object")).perform()
     assert page.ask(f"{ray}.length", "#808080") == count - 1
-    page.ask("lines((one) => one.options.color === semsig.pointed && one.options.weight === 5)[0]"
+    page.ask("lines(({options}) => options.color === semsig.highlight && options.weight === 5)[0]"
              ".fire('mouseout')")  # fmt: skip
     assert page.ask(f"{ray}.length", "#808080") == count

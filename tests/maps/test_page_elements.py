@@ -1,4 +1,4 @@
-"""What all maps share: boxes, search, layers, and refusals."""
+"""Elements that all maps share: boxes, search, layers, and errors."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ DRIFT = partial(drift_map, CITY, CITY)
 TURNED = dataclasses.replace(OBJECTS, table=OBJECTS.table.to_crs("EPSG:32631"))
 NOWHERE, FAR = LANE.set_crs(None, allow_override=True), (0.0, 0.0, 1.0, 1.0)
 BROWSER_FILES = sorted(
-    one.name for one in resources.files("semsig_gis.maps").joinpath("js").iterdir()
+    file.name for file in resources.files("semsig_gis.maps").joinpath("js").iterdir()
 )
 
 
 def maps_of(
     city: SignatureDatabase, objects: StreetObjects, evaluation: Evaluation, noise: Noise
 ) -> dict[str, Callable[..., folium.Map]]:
-    """Return what draws each map of a city."""
+    """Return a function for each map of a city."""
     query, index = city.signature(0), build_index(city, noise)
     location = locate(index, query, top=5, explained=1, store=ObjectStore.of(objects))
     chances = dataclasses.replace(chances_of(city), noise=noise)
@@ -123,7 +123,7 @@ LAYERS = {
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> None:
+def test_maps_are_added_twice_to_a_given_map(name: str) -> None:
     draw, layers = MAPS[name], LAYERS.get(name, set())
     own = folium.Map([43.0, 3.0], zoom_start=12, tiles=None)
     assert draw(map_=own) is own
@@ -133,13 +133,13 @@ def test_a_map_of_ones_own_is_drawn_on_twice_and_keeps_its_view(name: str) -> No
     for once in ("Objects seen from a cell", "Describe a cell when clicked"):
         assert names.count(once) <= 1
     body = own.get_root().render().partition("</head>")[2]
-    # No legend brings a view along.
+    # Legends on a given map set no view.
     assert all(" null, " in call[-12:] for call in re.findall(r"semsig\.legend\(.*\);", body))
     assert "NaN" not in body
 
 
 @pytest.mark.parametrize("name", sorted(MAPS.keys() - {"ground"}))
-def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
+def test_tiles_are_for_new_maps_only(name: str) -> None:
     draw = MAPS[name]
     body = draw(tiles="openstreetmap.mapnik").get_root().render()
     assert "tile.openstreetmap.org" in body
@@ -157,11 +157,14 @@ def test_tiles_are_those_of_folium_and_of_a_new_map(name: str) -> None:
         ("https://tiles.example/{z}/{x}/{y}.png", "not known"),
     ],
 )
-def test_tiles_that_nobody_can_see_are_refused_with_some_that_can(tiles: str, words: str) -> None:
+def test_unusable_tiles_are_refused(tiles: str, words: str) -> None:
     with refused(InputError, tiles, words, "'OpenStreetMap.Mapnik'"):
         MAPS["ambiguity"](tiles=tiles)
     draw = MAPS["ambiguity"](tiles="CyclOSM")
-    assert len([one for one in layers_of(draw).values() if isinstance(one, folium.TileLayer)]) == 1
+    assert (
+        len([layer for layer in layers_of(draw).values() if isinstance(layer, folium.TileLayer)])
+        == 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -185,7 +188,7 @@ def test_tiles_that_nobody_can_see_are_refused_with_some_that_can(tiles: str, wo
         (partial(ground_map, buildings=HOUSE, streets=NOWHERE), CrsError, "one CRS"),
     ],
 )
-def test_what_cannot_be_drawn(
+def test_unusable_inputs_are_refused(
     draw: Callable[[], folium.Map], error: type[Exception], words: str
 ) -> None:
     with refused(error, words):
@@ -193,7 +196,7 @@ def test_what_cannot_be_drawn(
 
 
 @pytest.mark.parametrize("file", BROWSER_FILES)
-def test_style_and_script_end_where_their_element_does(file: str) -> None:
+def test_browser_files_contain_no_end_tags(file: str) -> None:
     assert page_element(file).count("</") == 1
 
 
@@ -226,7 +229,7 @@ HELPED = int(np.flatnonzero((chances_of(CITY).gains > 0.1).any(axis=1))[0])
         ("identifiability", HELPED, (9, 3)),
     ],
 )
-def test_hostile_data_is_shown_word_for_word_and_never_run(
+def test_hostile_data_is_shown_as_text(
     page: MapPage, name: str, subject: str | int, counts: tuple[int, int]
 ) -> None:
     page.open(HARMFUL_MAPS[name]())
@@ -240,7 +243,7 @@ def test_hostile_data_is_shown_word_for_word_and_never_run(
 
 
 @pytest.mark.parametrize("screen", [(390, 800), (844, 390), (720, 600)])
-def test_a_small_screen_is_not_covered(page: MapPage, screen: tuple[int, int]) -> None:
+def test_legends_are_folded_on_small_screens(page: MapPage, screen: tuple[int, int]) -> None:
     map_ = evaluation_map(EVALUATION, CITY)
     localization_map(LOCALIZATION, CITY, map_=map_)
     with page.screen(*screen):
@@ -253,58 +256,58 @@ def test_a_small_screen_is_not_covered(page: MapPage, screen: tuple[int, int]) -
             legend.find_element(By.TAG_NAME, "summary").click()
             assert legend.size["height"] > 100
             assert legend.size["width"] <= screen[0] - 20
-            # One is open at a time, and both are below the buttons.
+            # Only one is open at a time, and both are below the buttons.
             assert len(page.all(".semsig-legend[open]")) == 1
-            assert min(one.rect["y"] for one in legends) >= top["y"] + top["height"]
+            assert min(legend.rect["y"] for legend in legends) >= top["y"] + top["height"]
 
 
-def test_boxes_fold_when_the_window_becomes_small(evaluated: MapPage) -> None:
+def test_boxes_fold_in_a_small_window(evaluation_page: MapPage) -> None:
     boxes = ".semsig-legend[open], .leaflet-control-layers-expanded"
-    wait = WebDriverWait(evaluated.browser, PATIENCE_S)
-    assert len(evaluated.all(boxes)) == 2
-    with evaluated.screen(500, 900, mobile=False):
-        wait.until(lambda _: evaluated.all(boxes) == [])
-    wait.until(lambda _: len(evaluated.all(boxes)) == 1)
-    evaluated.switch("Failed")  # the layers are there again
-    assert evaluated.circles("failed") == 0
+    wait = WebDriverWait(evaluation_page.browser, PATIENCE_S)
+    assert len(evaluation_page.all(boxes)) == 2
+    with evaluation_page.screen(500, 900, mobile=False):
+        wait.until(lambda _: evaluation_page.all(boxes) == [])
+    wait.until(lambda _: len(evaluation_page.all(boxes)) == 1)
+    evaluation_page.switch("Failed")  # the layer control works again
+    assert evaluation_page.circles("failed") == 0
 
 
-def test_nothing_lies_below_the_boxes(evaluated: MapPage) -> None:
-    legend = evaluated.one(LEGEND).rect
-    layers = evaluated.one(".leaflet-control-layers").rect
-    left, right = legend["x"] + legend["width"], layers["x"]
+def test_boxes_do_not_cover_queries(evaluation_page: MapPage) -> None:
+    legend = evaluation_page.one(LEGEND).rect
+    layers = evaluation_page.one(".leaflet-control-layers").rect
+    west, east = legend["x"] + legend["width"], layers["x"]
     places = """
     return [...signs("successful"), ...signs("failed")].map(
-      (one) => map.latLngToContainerPoint(one.getLatLng()).x);
+      (sign) => map.latLngToContainerPoint(sign.getLatLng()).x);
     """
-    across = evaluated.ask(places)
-    assert left <= min(across) <= max(across) <= right
+    across = evaluation_page.ask(places)
+    assert west <= min(across) <= max(across) <= east
     for side in (-0.95, 0.95):
-        evaluated.ask("clickAt(signs('failed')[0], arguments[0])", side)
-        where = evaluated.ask("return map.latLngToContainerPoint(toldPlace()).x")
-        assert left <= where <= evaluated.one(".semsig-panel").rect["x"]
-        rows = [line.split("\t") for line in evaluated.panel().splitlines() if "\t" in line]
+        evaluation_page.ask("clickAt(signs('failed')[0], arguments[0])", side)
+        where = evaluation_page.ask("return map.latLngToContainerPoint(panelPlace()).x")
+        assert west <= where <= evaluation_page.one(".semsig-panel").rect["x"]
+        rows = [line.split("\t") for line in evaluation_page.panel().splitlines() if "\t" in line]
         assert [label for label, *_ in rows[:3]] == [
             "Expected error",
             "P(error ≤ 50 m)",
             "True rank",
         ]
-        evaluated.ask("semsig.hide(map)")
+        evaluation_page.ask("semsig.hide(map)")
 
 
-def test_the_search_offers_the_best_match_first(evaluated: MapPage) -> None:
-    for number in (1, 2, 5, 12, 60):  # of both layers
+def test_search_lists_the_best_match_first(evaluation_page: MapPage) -> None:
+    for number in (1, 2, 5, 12, 60):  # of both outcomes
         for text in (f"Query {number}", f"query {number}:", str(number)):
-            assert evaluated.search(text)[0].startswith(f"Query {number}: ")
-    # By its number it is as well called as what is called so on another map.
-    exact = "return semsig.finders.flatMap((one) => one('12', 9)).map((one) => one.rank)"
-    assert evaluated.ask(exact).count(0) == 1
-    assert evaluated.search("query")[0].startswith("Query")
-    assert evaluated.search(f"of {60}") == []
-    evaluated.search("Query 3", Keys.ENTER)
-    assert evaluated.panel().startswith("Query 3: ")
-    evaluated.browser.switch_to.active_element.send_keys(Keys.ESCAPE)
-    assert evaluated.ask("return panel() === ''")
+            assert evaluation_page.search(text)[0].startswith(f"Query {number}: ")
+    # Only the query itself has the number as its whole name.
+    exact = "return semsig.finders.flatMap((find) => find('12', 9)).map(({rank}) => rank)"
+    assert evaluation_page.ask(exact).count(0) == 1
+    assert evaluation_page.search("query")[0].startswith("Query")
+    assert evaluation_page.search(f"of {60}") == []
+    evaluation_page.search("Query 3", Keys.ENTER)
+    assert evaluation_page.panel().startswith("Query 3: ")
+    evaluation_page.browser.switch_to.active_element.send_keys(Keys.ESCAPE)
+    assert evaluation_page.ask("return panel() === ''")
 
 
 @settings(max_examples=20)
@@ -314,7 +317,7 @@ def test_the_search_offers_the_best_match_first(evaluated: MapPage) -> None:
     st.floats(0.0, 1.0),
     st.floats(10.0, 40_000.0),
 )
-def test_the_search_places_x_and_y_to_the_centimetre(
+def test_search_polynomial_is_exact_to_a_centimetre(
     crs: str, across: float, along: float, size: float
 ) -> None:
     system = CRS(crs)
@@ -330,7 +333,7 @@ def test_the_search_places_x_and_y_to_the_centimetre(
     area = search_area(StreetObjects(table, paper_taxonomy(), ()))
     place = corners[0] + size * np.array([across, along])
     u, v = (place - area["middle"]) / area["half"]
-    found = sum(u**i * v**j * np.array(weights) for i, j, *weights in area["terms"])
+    result = sum(u**i * v**j * np.array(weights) for i, j, *weights in area["terms"])
     expected = to_latlon(place[None], system, digits=12)[0]
-    metres = (found - expected) * 111_320.0 * [1.0, np.cos(np.radians(expected[0]))]
+    metres = (result - expected) * 111_320.0 * [1.0, np.cos(np.radians(expected[0]))]
     assert np.hypot(*metres) < 0.01

@@ -21,12 +21,10 @@ if TYPE_CHECKING:
 
     from semsig_gis.serve import Workbench
 
-from semsig_gis.serve import Workbench
-
 
 @pytest.mark.parametrize("path", ["/", "/api/city", "/api/answer", "/static/x", "/?token=wrong"])
 @pytest.mark.parametrize("token", ["", "wrong", "the-token-of-the-testt"])
-def test_who_has_not_the_token_gets_nothing(page: Page, path: str, token: str) -> None:
+def test_request_without_token_is_refused(page: Page, path: str, token: str) -> None:
     code, text = page.refused(path, X_Semsig_Token=token)
     assert (code, "token" in text) == (403, True)
 
@@ -45,22 +43,22 @@ def test_who_has_not_the_token_gets_nothing(page: Page, path: str, token: str) -
     ],
 )
 @pytest.mark.parametrize("path", ["/?token=the-token-of-the-tests", "/api/city"])
-def test_pages_of_other_sites_may_not_ask(
+def test_request_of_another_site_is_refused(
     page: Page, path: str, headers: dict[str, str], code: int
 ) -> None:
-    told = {name: value.format(port=page.port) for name, value in headers.items()}
-    assert page.refused(path, **told)[0] == code
+    own_headers = {name: value.format(port=page.port) for name, value in headers.items()}
+    assert page.refused(path, **own_headers)[0] == code
 
 
-def test_its_own_page_may_ask(page: Page) -> None:
+def test_request_of_the_own_page_is_answered(page: Page) -> None:
     for host in ("127.0.0.1", "localhost"):
         here = f"{host}:{page.port}"
         own = {"Host": here, "Origin": f"http://{here}", "Sec_Fetch_Site": "same-origin"}
         assert page.ask("/api/city", **own)["name"] == "town"
 
 
-def test_the_page_runs_its_own_scripts_alone(page: Page, carried: None) -> None:  # noqa: ARG001
-    seen = set()
+def test_page_allows_only_its_own_scripts(page: Page, carried: None) -> None:  # noqa: ARG001
+    nonces = set()
     for _ in range(2):
         code, headers, content = page.send(f"/?token={page.token}", X_Semsig_Token="")
         html, rules = content.decode(), headers["content-security-policy"]
@@ -71,7 +69,7 @@ def test_the_page_runs_its_own_scripts_alone(page: Page, carried: None) -> None:
         )
         nonce = re.search(r"script-src 'nonce-([\w-]{22})'", rules)
         assert nonce
-        seen.add(nonce[1])
+        nonces.add(nonce[1])
         assert "default-src 'none'" in rules
         assert "unsafe" not in rules
         assert re.findall("<(?:script|style)[^>]*>", html)
@@ -80,7 +78,7 @@ def test_the_page_runs_its_own_scripts_alone(page: Page, carried: None) -> None:
         assert not re.search(r"<(link|script)\b[^>]*\b(href|src)=\"(?!data:)", html)
         assert page.token not in html
         assert "town" not in html
-    assert len(seen) == 2
+    assert len(nonces) == 2
 
 
 @pytest.mark.parametrize(
@@ -95,23 +93,23 @@ def test_the_page_runs_its_own_scripts_alone(page: Page, carried: None) -> None:
         ("/api/export?format=exe", b'{"views": []}', 422, "exe"),
     ],
 )
-def test_a_request_that_makes_no_sense_gets_one_sentence(
+def test_invalid_request_is_refused(
     page: Page, path: str, body: bytes, code: int, word: str
 ) -> None:
-    found, text = page.refused(path, body)
-    assert (found, word in text) == (code, True), text
+    status, text = page.refused(path, body)
+    assert (status, word in text) == (code, True), text
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_a_body_that_is_too_long_is_not_read(page: Page, told: bool) -> None:  # noqa: FBT001
+@pytest.mark.parametrize("with_length", [True, False])
+def test_too_long_body_is_refused(page: Page, with_length: bool) -> None:  # noqa: FBT001
     with socket.create_connection(("127.0.0.1", page.port)) as line:
-        size = "Content-Length: 104857600" if told else "Transfer-Encoding: chunked"
+        size = "Content-Length: 104857600" if with_length else "Transfer-Encoding: chunked"
         line.sendall(
             f"POST /api/photo?name=big.jpg HTTP/1.1\r\nHost: 127.0.0.1:{page.port}\r\n"
             f"X-Semsig-Token: {page.token}\r\n{size}\r\n\r\n".encode()
         )
         piece = b"x" * 2**20
-        for _ in range(0 if told else 26):
+        for _ in range(0 if with_length else 26):
             line.sendall(b"100000\r\n" + piece + b"\r\n")
         answer = line.recv(65536)
         while b"}" not in answer:
@@ -121,39 +119,39 @@ def test_a_body_that_is_too_long_is_not_read(page: Page, told: bool) -> None:  #
     assert error == "the file is too large; give one of at most 25 MB."
 
 
-def test_a_port_that_another_program_has_is_told() -> None:
-    with open_listener(0) as taken, refused(InputError, "--port"):
-        open_listener(taken.getsockname()[1])
+def test_used_port_is_refused() -> None:
+    with open_listener(0) as listener, refused(InputError, "--port"):
+        open_listener(listener.getsockname()[1])
 
 
 OTHER = 2
 
 
-def test_a_newer_question_of_a_page_makes_its_others_obsolete(
+def test_newer_question_cancels_older_ones_of_the_page(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     begun, go_on, answered = threading.Event(), threading.Event(), list[int]()
     arrived, read = threading.Semaphore(0), server_module._json
 
     class Slow:
-        def answer(self, told: dict[str, int]) -> dict[str, int]:
-            answered.append(told["number"])
+        def answer(self, body: dict[str, int]) -> dict[str, int]:
+            answered.append(body["number"])
             begun.set()
             assert go_on.wait(PATIENCE_S)
-            share_rows(len, 1)  # as all that takes long
-            return told
+            share_rows(len, 1)  # like all slow steps
+            return body
 
     async def reading(request: Request) -> Any:  # noqa: ANN401 - any JSON
-        told = await read(request)
+        body = await read(request)
         arrived.release()
-        return told
+        return body
 
     monkeypatch.setattr(server_module, "_json", reading)
     codes: dict[int, int] = {}
 
     def ask(number: int) -> None:
-        told = {"number": number, "page": "other" if number == OTHER else "own"}
-        codes[number] = page.send("/api/answer", json.dumps(told).encode())[0]
+        body = {"number": number, "page": "other" if number == OTHER else "own"}
+        codes[number] = page.send("/api/answer", json.dumps(body).encode())[0]
 
     with serving(cast("Workbench", Slow())) as page:
         threads = [threading.Thread(target=ask, args=[number]) for number in range(5)]

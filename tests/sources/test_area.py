@@ -1,4 +1,4 @@
-"""Areas: bounding boxes, files of polygons, and what is inside them."""
+"""Areas: bounding boxes, files of polygons, and clipping of layers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def write(folder: Path, *geometries: shapely.Geometry | None, crs: str | None = 
     st.floats(0.001, 1),
     st.floats(0.001, 1),
 )
-def test_a_bounding_box_comes_back(west: float, south: float, width: float, height: float) -> None:
+def test_bounding_box_is_parsed(west: float, south: float, width: float, height: float) -> None:
     bounds = (west, south, west + width, south + height)
     area = parse_area(",".join(map(repr, bounds)))
     assert area.bounds == bounds
@@ -62,7 +62,7 @@ def test_a_bounding_box_comes_back(west: float, south: float, width: float, heig
         ("-180,-90,180,90", [(-180, -90, 180, 90)]),
     ],
 )
-def test_a_box_may_cross_180_degrees(
+def test_bounding_box_may_cross_180_degrees(
     text: str, boxes: list[tuple[float, float, float, float]]
 ) -> None:
     area = parse_area(text)
@@ -86,12 +86,12 @@ def test_a_box_may_cross_180_degrees(
         ("nan,1,2,3", "neither a bounding box nor a file"),
     ],
 )
-def test_what_is_no_area_is_said(text: str, words: str) -> None:
+def test_invalid_area_is_refused(text: str, words: str) -> None:
     with refused(InputError, words):
         parse_area(text)
 
 
-def test_a_place_is_told_from_a_file(tmp_path: Path) -> None:
+def test_place_names_are_distinguished_from_files(tmp_path: Path) -> None:
     (tmp_path / "plain").touch()
     assert names_place("Saint-Denis, La Réunion")
     assert names_place("19th arrondissement")
@@ -100,7 +100,7 @@ def test_a_place_is_told_from_a_file(tmp_path: Path) -> None:
     assert not names_place(str(tmp_path / "plain"))
 
 
-def test_the_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
+def test_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
     east = shapely.box(3.9, 43.5, 4.0, 43.7)
     area = parse_area(write(tmp_path, shapely.box(*BOX), east, shapely.box(5, 5, 6, 6), None))
     assert area.name == "quarter"
@@ -110,7 +110,7 @@ def test_the_polygons_of_a_file_are_joined(tmp_path: Path) -> None:
     assert join_areas(np.array([shapely.Point(1, 2)])) is None
 
 
-def test_a_table_of_polygons_is_an_area() -> None:
+def test_area_of_a_table_of_polygons() -> None:
     table = gpd.GeoDataFrame(geometry=[shapely.box(*BOX)], crs="EPSG:4326")
     assert parse_area(table.to_crs(2154)).bounds == pytest.approx(BOX, abs=1e-6)
     with refused(InputError, "the table contains Point", "give a table of polygons"):
@@ -119,7 +119,7 @@ def test_a_table_of_polygons_is_an_area() -> None:
         parse_area(table.set_crs(None, allow_override=True))
 
 
-def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
+def test_polygon_is_transformed_to_degrees_and_made_valid(tmp_path: Path) -> None:
     box = gpd.GeoSeries([shapely.box(*BOX)], crs="EPSG:4326").to_crs(2154)
     area = parse_area(write(tmp_path, box.iloc[0], crs="EPSG:2154"))
     assert area.bounds == pytest.approx(BOX, abs=1e-6)
@@ -138,14 +138,14 @@ def test_a_polygon_is_put_in_degrees_and_mended(tmp_path: Path) -> None:
         (shapely.Polygon([(0, 0), (1, 1), (0, 0)]), "encloses no area"),
     ],
 )
-def test_a_file_without_area_is_said(
+def test_file_without_area_is_refused(
     tmp_path: Path, geometry: shapely.Geometry | None, words: str
 ) -> None:
     with refused(InputError, words, "give a file of polygons"):
         parse_area(write(tmp_path, geometry))
 
 
-def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+def test_unreadable_polygon_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "quarter.geojson"
     with refused(SemsigError, "does not exist"):
         parse_area(str(path))
@@ -160,10 +160,10 @@ def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("role", "kept"), [("objects", ["1", "none"]), ("streets", ["1", "2", "none"])]
+    ("role", "ids"), [("objects", ["1", "none"]), ("streets", ["1", "2", "none"])]
 )
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:2154"])
-def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
+def test_layer_is_clipped(role: str, ids: list[str], crs: str) -> None:
     inside = shapely.LineString([(3.81, 43.6), (3.82, 43.6)])
     across = shapely.LineString([(3.89, 43.6), (4.2, 43.6)])
     outside = shapely.LineString([(4.1, 43.6), (4.2, 43.6)])
@@ -175,26 +175,26 @@ def test_a_layer_is_clipped(role: str, kept: list[str], crs: str) -> None:
     spec = LayerSpec(name="x", class_name="", role=role, geometry="line")  # type: ignore[arg-type]
     layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=9, filtered=5))
     clipped = clip_layer(layer, parse_area(",".join(map(str, BOX))))
-    assert clipped.table["source_id"].tolist() == kept
-    assert clipped.table.index.tolist() == list(range(len(kept)))
+    assert clipped.table["source_id"].tolist() == ids
+    assert clipped.table.index.tolist() == list(range(len(ids)))
     assert clipped.table.crs == table.crs
-    assert clipped.counts == RowCounts(read=9, filtered=5, outside=4 - len(kept))
+    assert clipped.counts == RowCounts(read=9, filtered=5, outside=4 - len(ids))
 
 
-def test_a_line_is_clipped_at_its_middle_in_metres() -> None:
+def test_line_is_clipped_by_its_centroid_in_metres() -> None:
     # At 60 degrees north, a degree to the east is half as long as one to the north.
     line = shapely.LineString([(25.0, 60.0), (25.0, 60.001), (25.002, 60.001)])
     table = gpd.GeoDataFrame({"source_id": ["1"]}, geometry=[line], crs="EPSG:4326")
     spec = LayerSpec(name="x", class_name="bench", geometry="line")
     layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=1))
-    for east, kept in ((25.00051, 1), (25.00049, 0)):
-        assert len(clip_layer(layer, parse_area(f"24,59,{east},61")).table) == kept
+    for east, count in ((25.00051, 1), (25.00049, 0)):
+        assert len(clip_layer(layer, parse_area(f"24,59,{east},61")).table) == count
 
 
 def benches(
     *places: tuple[float, float], extent: str | None = None, role: str = "objects"
 ) -> RawLayer:
-    """Return a layer of points, or of small houses, whose file says that it covers a box."""
+    """Return a layer of points or small houses; `extent` is the box that its file states."""
     shapes = shapely.points(places)
     shapes = shapes if role == "objects" else shapely.buffer(shapes, 0.001)
     table = gpd.GeoDataFrame(
@@ -208,20 +208,20 @@ def benches(
     )
 
 
-def test_rows_outside_the_box_of_their_file_are_told_and_clipped() -> None:
+def test_rows_outside_the_box_of_their_file_are_noted_and_clipped() -> None:
     places = ((25.0, 60.0), (25.1, 60.1), (25.12, 60.0), (25.1005, 60.0))
     layer = benches(*places, extent="24.9,59.9,25.1,60.1")
     (note,) = note_outside(layer).notes
     assert note.startswith("2 of 4 rows are outside the box that the file says it covers")
     metres = Geod(ellps="WGS84").inv(25.1, 60.0, 25.12, 60.0)[2]
-    told = float(note.partition("up to ")[2].partition(" m;")[0].replace(",", ""))
-    assert told == pytest.approx(metres, rel=0.005)
-    # A house at the edge is there.
+    distance = float(note.partition("up to ")[2].partition(" m;")[0].replace(",", ""))
+    assert distance == pytest.approx(metres, rel=0.005)
+    # A house that crosses the edge is inside.
     houses = benches(*places, extent="24.9,59.9,25.1,60.1", role="buildings")
     assert note_outside(houses).notes[0].startswith("1 of 4 rows")
     other = benches((25.12, 60.0), (25.2, 60.0))
-    for one, clipped in zip((2, 3, 0), clip_layers([layer, houses, other], "box"), strict=True):
-        assert (clipped.counts.kept, clipped.counts.outside) == (one, clipped.counts.read - one)
+    for count, clipped in zip((2, 3, 0), clip_layers([layer, houses, other], "box"), strict=True):
+        assert (clipped.counts.kept, clipped.counts.outside) == (count, clipped.counts.read - count)
         assert note_outside(clipped).notes == ()
     other = benches((25.12, 60.0), extent="25.11,59.9,25.2,60.1")
     both = clip_layers([layer, other], "box")  # of both extracts
@@ -231,6 +231,6 @@ def test_rows_outside_the_box_of_their_file_are_told_and_clipped() -> None:
     assert note_outside(clipped).notes[0].startswith("2 of 3 rows")
 
 
-def test_a_box_that_no_file_says_is_refused() -> None:
+def test_clip_to_box_is_refused_without_a_stated_box() -> None:
     with refused(InputError, "none of the files", "'box'", "west,south,east,north"):
         clip_layers([benches((25.0, 60.0))], "box")

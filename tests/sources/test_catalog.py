@@ -1,4 +1,4 @@
-"""Catalogues: what their files say, what is wrong in them, and which files hold their layers."""
+"""Catalogues: content of their files, errors in them, and the files of their layers."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ TOWN = (DATA / "town.toml").read_text(encoding="utf-8")
 
 @pytest.fixture
 def town(tmp_path: Path) -> Town:
-    """Return a writer of the catalogue ``town.toml`` in which one text is replaced by another."""
+    """Return a function that writes the catalogue ``town.toml`` with one text replaced."""
 
     def write(old: str = "", new: str = "") -> Path:
         assert not old or TOWN.count(old) == 1
@@ -66,7 +66,7 @@ def town(tmp_path: Path) -> Town:
     return write
 
 
-def test_a_catalogue_is_what_its_file_says(town: Town, snapshot: Snapshot) -> None:
+def test_catalogue_has_the_values_of_its_file(town: Town, snapshot: Snapshot) -> None:
     path = town()
     catalog = load_catalog(path)
     hash(catalog)
@@ -85,7 +85,7 @@ def ranges_of(taxonomy: Taxonomy) -> dict[str, float]:
     return {c.name: c.range_m for c in taxonomy.classes if c.range_m is not None}
 
 
-def test_ranges_go_into_the_taxonomy(town: Town) -> None:
+def test_taxonomy_has_the_ranges_of_the_catalogue(town: Town) -> None:
     assert ranges_of(load_catalog(town()).taxonomy) == {}
     path = town('title = "Kiosk"', 'title = "Kiosk"\nrange_m = 60')
     assert ranges_of(load_catalog(path).taxonomy) == {"kiosk": 60.0}
@@ -96,13 +96,13 @@ def test_ranges_go_into_the_taxonomy(town: Town) -> None:
     assert (ranges[11], ranges[30], ranges[3]) == (50.0, 12.5, 30.0)
 
 
-def test_heights_go_into_the_taxonomy(town: Town) -> None:
+def test_taxonomy_has_the_heights_of_the_catalogue(town: Town) -> None:
     text = 'title = "Kiosk"\nheight_m = 3\nheight_sigma = 0.5'
     kiosk = load_catalog(town('title = "Kiosk"', text)).taxonomy.by_name("kiosk")
     assert (kiosk.height_m, kiosk.height_sigma) == (3.0, 0.5)
 
 
-def test_streets_say_how_wide_they_are(town: Town) -> None:
+def test_layer_of_streets_has_widths(town: Town) -> None:
     old = 'name = "posts"\nclass = "street_light"'
     new = (
         'name = "posts"\nrole = "streets"\nwidth_field = "WIDTH"\nname_field = "NAME"\n'
@@ -141,13 +141,13 @@ def mistake(row: str) -> tuple[str, str, list[str]]:
 
 
 @pytest.mark.parametrize("row", MISTAKES)
-def test_a_mistake_has_its_sentence(town: Town, row: str) -> None:
+def test_invalid_catalogue_is_refused(town: Town, row: str) -> None:
     old, new, words = mistake(row)
     with refused(CatalogError, "town.toml", *words):
         load_catalog(town(old, new))
 
 
-def test_a_file_that_cannot_be_read_is_named(town: Town, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreadable_catalogue_file_is_refused(town: Town, monkeypatch: pytest.MonkeyPatch) -> None:
     path = town()
     for nowhere in (path.with_name("city.toml"), "nowhere/town.toml"):
         with refused(CatalogError, str(nowhere), "does not exist", "'montpellier'"):
@@ -162,7 +162,7 @@ def test_a_file_that_cannot_be_read_is_named(town: Town, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("name", ["montpelier", "Montpellier", "taxonomy", "", "town.tml"])
-def test_an_unknown_catalogue_is_named(name: str) -> None:
+def test_unknown_catalogue_is_refused(name: str) -> None:
     with refused(UnknownNameError, repr(name), "'montpellier'", "path of a .toml file"):
         load_catalog(name)
 
@@ -173,7 +173,7 @@ def catalog_of(**values: object) -> Catalog:
     return Catalog(**{**plain, **values})  # type: ignore[arg-type]
 
 
-def test_several_catalogues_become_one() -> None:
+def test_catalogues_are_combined() -> None:
     both = combine_catalogs([load_catalog("openstreetmap"), load_catalog("montpellier")])
     assert both.name == "openstreetmap+montpellier"
     assert both.metric_crs == "EPSG:2154"
@@ -184,7 +184,7 @@ def test_several_catalogues_become_one() -> None:
     assert combine_catalogs([load_catalog("montpellier")]) == load_catalog("montpellier")
 
 
-def test_the_first_radius_and_range_hold() -> None:
+def test_first_catalogue_decides_radius_and_range() -> None:
     kiosk = paper_taxonomy().extended([ObjectClass(30, "Z", "kiosk", "Kiosk")])
     ranges = {"bench": 25.0, "bus_stop": 50.0, "kiosk": 40.0}
     radii = (("bench", 9.0), ("bus_stop", 5.0))
@@ -199,7 +199,7 @@ def test_the_first_radius_and_range_hold() -> None:
     assert combine_catalogs([second, first]).taxonomy.by_name("bench").range_m == 25.0
 
 
-def test_the_first_height_holds() -> None:
+def test_first_catalogue_decides_height() -> None:
     sizes: list[dict[str, Any]] = [{}, {"height_m": 3.0, "height_sigma": 0.5}]
     sizes += [{"range_m": 9.0, "height_m": 2.0, "height_sigma": 0.1}]
     kiosks = [dataclasses.replace(ObjectClass(30, "Z", "kiosk", "Kiosk"), **size) for size in sizes]
@@ -211,7 +211,7 @@ def test_the_first_height_holds() -> None:
     assert (both.range_m, both.height_m, both.height_sigma) == (9.0, 3.0, 0.5)
 
 
-def test_catalogues_that_do_not_go_together() -> None:
+def test_contradictory_catalogues_are_refused() -> None:
     clash = paper_taxonomy().extended([ObjectClass(12, "Q", "quay", "Quay")])
     with refused(CatalogError, "montpellier", "town", "12"):
         combine_catalogs([load_catalog("montpellier"), catalog_of(taxonomy=clash)])
@@ -220,7 +220,7 @@ def test_catalogues_that_do_not_go_together() -> None:
             combine_catalogs(catalogs)
 
 
-def test_classes_keep_their_codes_and_symbols_in_every_database(snapshot: Snapshot) -> None:
+def test_codes_and_symbols_of_classes_do_not_change(snapshot: Snapshot) -> None:
     taxonomies = {name: load_catalog(name).taxonomy for name in NAMES}
     assert all(item.title for taxonomy in taxonomies.values() for item in taxonomy.classes)
     lines = [
@@ -232,7 +232,7 @@ def test_classes_keep_their_codes_and_symbols_in_every_database(snapshot: Snapsh
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_layer_says_what_it_needs_to(name: str) -> None:
+def test_built_in_layers_are_complete(name: str) -> None:
     catalog = load_catalog(name)
     assert catalog.name == name
     for spec in catalog.layers:
@@ -245,7 +245,7 @@ def test_every_layer_says_what_it_needs_to(name: str) -> None:
     assert not paper & ranges_of(catalog.taxonomy).keys()
 
 
-def test_the_classes_of_all_catalogues_go_together() -> None:
+def test_all_built_in_catalogues_can_be_combined() -> None:
     assert list(catalog_names()) == sorted(NAMES)
     together = combine_catalogs([load_catalog(name) for name in NAMES])
     assert len(together.taxonomy.classes) == 11 + 7 + 11
@@ -255,12 +255,12 @@ def test_the_classes_of_all_catalogues_go_together() -> None:
 MONTPELLIER = [spec.name for spec in load_catalog("montpellier").layers]
 
 
-def test_the_layers_of_montpellier_are_complete(snapshot: Snapshot) -> None:
+def test_layers_of_montpellier_do_not_change(snapshot: Snapshot) -> None:
     snapshot("montpellier.txt", "\n".join(MONTPELLIER))
 
 
 @pytest.mark.parametrize("layer", MONTPELLIER)
-def test_a_layer_of_montpellier_is_as_its_publisher_left_it(layer: str, geodata: Path) -> None:
+def test_layer_of_montpellier_matches_the_published_file(layer: str, geodata: Path) -> None:
     spec = load_catalog("montpellier").layer(layer)
     (((_, path),), _) = find_files([spec], [geodata / "montpellier"])
     frame = pyogrio.read_dataframe(path)
@@ -271,14 +271,14 @@ def test_a_layer_of_montpellier_is_as_its_publisher_left_it(layer: str, geodata:
     # The files spell their CRS as ESRI does, so it is compared by what it does to a point.
     assert spec.crs is not None
     there = frame.geometry.head(1)
-    moved = there.to_crs(CRS(spec.crs)).geometry.iloc[0]
-    assert shapely.distance(moved, there.iloc[0]) < 1e-3
-    named = dict(spec.where)
+    position = there.to_crs(CRS(spec.crs)).geometry.iloc[0]
+    assert shapely.distance(position, there.iloc[0]) < 1e-3
+    where = dict(spec.where)
     if spec.class_by is not None:
-        named[spec.class_by.field] = tuple(value for value, _ in spec.class_by.classes)
+        where[spec.class_by.field] = tuple(value for value, _ in spec.class_by.classes)
     if spec.width_by is not None:
-        named[spec.width_by.field] = tuple(value for value, _ in spec.width_by.widths)
-    for field, accepted in named.items():
+        where[spec.width_by.field] = tuple(value for value, _ in spec.width_by.widths)
+    for field, accepted in where.items():
         assert set(accepted) <= set(frame[field]), field
     if spec.id_field is not None:
         assert frame[spec.id_field].notna().any()
@@ -298,7 +298,7 @@ def touch(folder: Path, *names: str) -> list[Path]:
     return paths
 
 
-def test_layers_are_paired_with_files(tmp_path: Path) -> None:
+def test_find_files_pairs_layers_with_files(tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     zipped, _, lights, *_ = touch(
         folder, "Trees_2014.ZIP", "trees.geojson", "lights.shp", "lights.dbf", "readme.txt"
@@ -312,14 +312,14 @@ def test_layers_are_paired_with_files(tmp_path: Path) -> None:
     assert {*DRIVERS, ".zip"} < FILE_SUFFIXES
 
 
-def test_a_layer_of_openstreetmap_may_be_in_several_extracts(tmp_path: Path) -> None:
+def test_find_files_pairs_a_layer_with_several_extracts(tmp_path: Path) -> None:
     files = ("*.osm", "*.pbf")
     spec = LayerSpec(name="trees", class_name="alignment_tree", files=files, reader="osm_file")
     extracts = touch(tmp_path, "east.osm.pbf", "west.osm")
     assert find_files([spec], [tmp_path]) == (tuple((spec, path) for path in extracts), ())
 
 
-def test_files_that_cannot_be_paired(tmp_path: Path) -> None:
+def test_find_files_refuses_unmatched_files(tmp_path: Path) -> None:
     first, second = touch(tmp_path, "trees_a.zip", "trees_b.zip")
     for paths in ([tmp_path], [first, second]):
         with refused(SourceError, f"'trees' is matched by {first} and {second}; give one"):
@@ -327,8 +327,8 @@ def test_files_that_cannot_be_paired(tmp_path: Path) -> None:
     with refused(SourceError, "none.zip does not exist"):
         find_files(SPECS, [tmp_path / "none.zip"])
     (other,) = touch(tmp_path / "folder", "cars.zip")
-    known = "the layers and their files are trees (*trees*.zip, *trees*), lights"
-    with refused(SourceError, "cars.zip is not the file of any layer", known):
+    layers = "the layers and their files are trees (*trees*.zip, *trees*), lights"
+    with refused(SourceError, "cars.zip is not the file of any layer", layers):
         find_files(SPECS, [other])
     with refused(SourceError, "contains no file of any layer"):
         find_files(SPECS, [other.parent])

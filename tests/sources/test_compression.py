@@ -1,4 +1,4 @@
-"""Packed files that are made to fill a disk, and those that are only packed well."""
+"""Compressed files with a ratio that is too high, and files that are only well compressed."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SPEC = LayerSpec(name="a", class_name="bench", tags=((("amenity", ("bench",)),),))
-# Members of an archive one after the other, so that a test need not pack so much.
+# Several members in succession, so that the test compresses less.
 GZIP_BOMB = gzip.compress(b" " * 2**24) * 10
 BZIP_BOMB = bz2.compress(b" " * 2**24) * 10
 
 
 @pytest.mark.parametrize(("suffix", "bomb"), [(".gz", GZIP_BOMB), (".bz2", BZIP_BOMB)])
-def test_an_extract_that_swells_is_refused(tmp_path: Path, suffix: str, bomb: bytes) -> None:
+def test_extract_with_a_high_ratio_is_refused(tmp_path: Path, suffix: str, bomb: bytes) -> None:
     path = tmp_path / f"city.osm{suffix}"
     path.write_bytes(bomb)
     with refused(SourceError, f"{path} unpacks to more than 250 times", "give what is inside"):
         read_layers(path, [SPEC])
 
 
-def test_an_archive_that_swells_is_refused(tmp_path: Path) -> None:
+def test_archive_with_a_high_ratio_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "city.zip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("city.csv", b" " * (HARMLESS_BYTES + 1))
@@ -47,7 +47,7 @@ def test_an_archive_that_swells_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [gzip.compress(b" " * 2**24), GZIP_BOMB[:1000], b"", b"no archive"]
 )
-def test_what_is_small_or_damaged_is_left_to_its_reader(tmp_path: Path, content: bytes) -> None:
+def test_small_or_damaged_file_passes(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "city.osm.gz"
     path.write_bytes(content)
     check_compression_ratio(path)

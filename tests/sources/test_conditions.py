@@ -19,7 +19,7 @@ values = st.none() | st.booleans() | numbers | plain
 
 
 @given(values)
-def test_a_value_is_itself_and_nothing_is_missing(value: Any) -> None:  # noqa: ANN401
+def test_value_matches_itself_and_no_missing_value(value: Any) -> None:  # noqa: ANN401
     if value is None:
         assert not matches(value, "None")
     else:
@@ -28,13 +28,13 @@ def test_a_value_is_itself_and_nothing_is_missing(value: Any) -> None:  # noqa: 
 
 
 @given(numbers, numbers)
-def test_numbers_compare_as_numbers(a: float, b: float) -> None:
+def test_numbers_are_compared_as_numbers(a: float, b: float) -> None:
     assert matches(a, b) == (a == b)
     assert matches(repr(a), b) == (a == b)
 
 
 @given(plain, plain)
-def test_text_compares_as_text(a: str, b: str) -> None:
+def test_text_is_compared_as_text(a: str, b: str) -> None:
     assert matches(a, b) == (a == b)
 
 
@@ -63,7 +63,7 @@ def test_text_compares_as_text(a: str, b: str) -> None:
         ("a/b", "a/b", True),
     ],
 )
-def test_near_is_not_equal_and_a_text_between_slashes_is_a_pattern(
+def test_match_is_exact_or_a_pattern(
     value: object,
     wanted: Any,  # noqa: ANN401
     *,
@@ -93,21 +93,21 @@ AT_STREET_LEVEL = ">=0 or none"
         ("", [""], ["x", None]),
     ],
 )  # fmt: skip
-def test_what_is_accepted(accepted: Any, yes: list[Any], no: list[Any]) -> None:  # noqa: ANN401
+def test_condition_accepts(accepted: Any, yes: list[Any], no: list[Any]) -> None:  # noqa: ANN401
     condition = Condition.parse(accepted if isinstance(accepted, list) else [accepted])
     assert [value for value in yes if not condition.accepts(value)] == []
     assert [value for value in no if condition.accepts(value)] == []
 
 
 @given(st.lists(st.integers(-9, 9), min_size=1), st.integers(-9, 9))
-def test_some_of_several_numbers_or_every_one(numbers: list[int], limit: int) -> None:
+def test_comparison_of_any_or_every_number(numbers: list[int], limit: int) -> None:
     """A thing on several levels is left out as too low only where all of them are."""
     text = ";".join(map(str, numbers))
     assert Condition.parse([f">={limit}"]).accepts(text) == (max(numbers) >= limit)
     assert Condition.parse([f"<{limit}"]).accepts(text, every=True) == (max(numbers) < limit)
 
 
-def test_of_what_is_no_number_nothing_is_known() -> None:
+def test_comparison_rejects_text() -> None:
     below = Condition.parse(["<0"])
     for text in ("ground", "-1;ground", "", None, "-1;"):
         assert not below.accepts(text, every=True)
@@ -116,6 +116,6 @@ def test_of_what_is_no_number_nothing_is_known() -> None:
 @pytest.mark.parametrize(
     "text", [">=x", "=>0", "=0", "!=no", "≥0", ">=0 or <", "<unknown>", "> =1"]
 )
-def test_a_comparison_that_is_none(text: str) -> None:
+def test_invalid_comparison_is_refused(text: str) -> None:
     with refused(CatalogError, "is not a comparison", "'>=0 or none'", "'/"):
         Condition.parse([text])

@@ -53,7 +53,7 @@ def read(path: Path, reader: str = "vector", **what: Any) -> RawLayer:  # noqa: 
 
 @pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
 @pytest.mark.parametrize("encoding", WORDS)
-def test_every_encoding_is_told(tmp_path: Path, encoding: str, reader: str) -> None:
+def test_encoding_is_detected(tmp_path: Path, encoding: str, reader: str) -> None:
     path = tmp_path / "a.csv"
     words = WORDS[encoding]
     lines = ["nom;lon;lat", *(f"{word};2,5;48,5" for word in words)]
@@ -61,12 +61,12 @@ def test_every_encoding_is_told(tmp_path: Path, encoding: str, reader: str) -> N
     layer = read(path, reader, id_field="nom", x_field="lon", y_field="lat")
     assert tuple(layer.table.source_id) == words
     assert set(layer.table.geometry.to_wkt()) == {"POINT (2.5 48.5)"}
-    told = [f"the file is not in UTF-8; it is read as {encoding.replace('-', '_')}"]
+    notes = [f"the file is not in UTF-8; it is read as {encoding.replace('-', '_')}"]
     marked = encoding in {"utf-8-sig", "utf-16", "utf-32"}
-    assert list(layer.notes) == ([] if marked else told)
+    assert list(layer.notes) == ([] if marked else notes)
 
 
-def test_text_that_is_damaged_is_told(tmp_path: Path) -> None:
+def test_invalid_utf8_is_noted(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes("nom;lon;lat\nérable;2;48\nhêtre;2;48\n".encode() + b"ch\xeane;2;48\n")
     layer = read(path, id_field="nom")
@@ -77,7 +77,7 @@ def test_text_that_is_damaged_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"", b"\xef\xbb\xbf", b"\n\n", b"\0\1\2" * 99, bytes(range(256))]
 )
-def test_what_is_no_table_of_text_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_text_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(content)
     for use in (read, list_layers):
@@ -87,9 +87,7 @@ def test_what_is_no_table_of_text_is_refused(tmp_path: Path, content: bytes) -> 
 
 @pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
-def test_blanks_around_names_are_no_part_of_them(
-    tmp_path: Path, separator: str, reader: str
-) -> None:
+def test_column_names_are_stripped(tmp_path: Path, separator: str, reader: str) -> None:
     path = tmp_path / "a.csv"
     lines = [["id ", " lon", "\u00a0lat "], ["7", " 2.5", "48.5 "]]
     path.write_text("\n".join(map(separator.join, lines)), encoding="utf-8")
@@ -111,7 +109,7 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("name", ["WKT", "geom", "geometry", "the_geom", " wkt "])
-def test_a_shape_may_be_well_known_text(tmp_path: Path, name: str) -> None:
+def test_geometry_in_well_known_text(tmp_path: Path, name: str) -> None:
     path = tmp_path / "a.csv"
     rows = "".join(f'{number};"{text}"\n' for number, text in enumerate(SHAPES))
     path.write_text(f"id;{name}\n{rows}99;here\n", encoding="utf-8")
@@ -122,7 +120,7 @@ def test_a_shape_may_be_well_known_text(tmp_path: Path, name: str) -> None:
     assert (info.geometry, info.rows, info.crs) == ("Unknown", 8, "EPSG:4326")
 
 
-def test_shapes_state_their_crs(tmp_path: Path) -> None:
+def test_crs_of_well_known_text(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(
         "the_geom\nSRID=2154;POINT(770000 6280000)\nSRID=4326;POINT(2 48)\nPOINT(1 2)\n",
@@ -160,7 +158,7 @@ NUMBERS: dict[str, float | None] = {
 
 
 @pytest.mark.parametrize("text", NUMBERS)
-def test_numbers_as_people_write_them(text: str) -> None:
+def test_decimal_reads_usual_notations(text: str) -> None:
     expected = NUMBERS[text]
     if expected is None:
         with pytest.raises(ValueError, match=f"{re.escape(text)}|convert"):
@@ -169,7 +167,7 @@ def test_numbers_as_people_write_them(text: str) -> None:
         assert decimal(text) == expected
 
 
-def test_a_comma_that_could_be_either_is_not_guessed(tmp_path: Path) -> None:
+def test_ambiguous_comma_is_an_error(tmp_path: Path) -> None:
     assert decimal("770,123") == 770.123
     assert decimal("2,3488", english=True) == 2.3488
     path = tmp_path / "a.csv"
@@ -180,7 +178,7 @@ def test_a_comma_that_could_be_either_is_not_guessed(tmp_path: Path) -> None:
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32))
-def test_a_number_is_itself_in_every_style(value: float) -> None:
+def test_decimal_reads_formatted_numbers(value: float) -> None:
     for text in (repr(value), repr(value).replace(".", ",")):
         assert decimal(text) == value
     rounded = round(value, 2)

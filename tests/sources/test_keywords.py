@@ -23,29 +23,29 @@ WORDS = {
 
 
 @pytest.mark.parametrize("name", WORDS)
-def test_a_class_goes_by_many_words(name: str) -> None:
+def test_word_for_a_class(name: str) -> None:
     for word in WORDS[name].split(", "):
         assert class_code(word, TAXONOMY) == TAXONOMY.by_name(name).code, word
 
 
 @pytest.mark.parametrize("word", ["?", "unknown", " Unknown "])
-def test_a_class_may_be_unknown(word: str) -> None:
+def test_word_for_the_unknown_class(word: str) -> None:
     assert class_code(word, TAXONOMY) == WILDCARD
 
 
-def test_every_class_goes_by_its_own_names() -> None:
+def test_names_of_classes_are_words() -> None:
     for item in TAXONOMY.classes:
         for word in (item.symbol, item.name, item.title):
             assert class_code(word, TAXONOMY) == item.code, word
 
 
-def test_a_taxonomy_of_ones_own_goes_first() -> None:
+def test_names_of_the_taxonomy_have_priority() -> None:
     own = Taxonomy((ObjectClass(7, "W", "lamp", "Wall lamp"), ObjectClass(3, "D", "light", "Pole")))
     assert [class_code(word, own) for word in ("lamp", "wall lamps", "pole")] == [7, 7, 3]
 
 
 @pytest.mark.parametrize(
-    ("word", "told"),
+    ("word", "message"),
     [
         ("lampe", "the nearest is 'lamp'"),
         ("treehouse", "B alignment tree"),
@@ -55,6 +55,6 @@ def test_a_taxonomy_of_ones_own_goes_first() -> None:
         ("b", "symbol 'b' is unknown; the nearest is 'B'"),
     ],
 )
-def test_other_words_are_refused_with_the_nearest(word: str, told: str) -> None:
-    with refused(UnknownNameError, told):
+def test_unknown_word_is_refused_with_the_nearest(word: str, message: str) -> None:
+    with refused(UnknownNameError, message):
         class_code(word, paper_taxonomy())

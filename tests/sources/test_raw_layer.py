@@ -44,7 +44,7 @@ UNDEFINED = (
 )
 
 
-def test_wkt_of_esri_becomes_the_code_that_it_means() -> None:
+def test_esri_wkt_becomes_the_epsg_code() -> None:
     crs, near = usable_crs(LAMBERT), usable_crs(SHIFTED)
     assert crs == CRS.from_epsg(2154)
     assert near == CRS.from_wkt(SHIFTED)  # which only resembles a code
@@ -56,11 +56,11 @@ def test_wkt_of_esri_becomes_the_code_that_it_means() -> None:
 @pytest.mark.parametrize(
     "wkt", ["", " ", "nonsense", PLANE, UNDEFINED, LAMBERT.replace("GCS_RGF_1993", "")]
 )
-def test_wkt_that_places_nothing(wkt: str) -> None:
+def test_wkt_without_a_place_on_earth_is_ignored(wkt: str) -> None:
     assert usable_crs(wkt) is None
 
 
-def test_only_degrees_have_limits() -> None:
+def test_limits_apply_only_to_degrees() -> None:
     xy = np.array([[180.0, 90.0], [-180.0, -90.0], [180.1, 0.0], [0.0, -90.1], [4e5, 6e6]])
     assert off_the_globe(xy, CRS.from_epsg(4326)).tolist() == [False, False, True, True, True]
     for limitless in (2154, 4807):  # in metres, and in gons
@@ -90,15 +90,15 @@ def test_whole_identifiers_have_no_decimals(number: int) -> None:
     assert ids.tolist() == [str(number)] * 5 + ["6", "7", "8"]
 
 
-def test_what_class_by_does_not_list_is_left_out_by_name() -> None:
+def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
     """Waste baskets do not become benches because nobody listed them."""
     by = ClassBy("kind", (("bench", "bench"), ("/stop.*/", "bus_stop")))
     kinds = [*["bin"] * 9, *["box", None] * 2, "bench", "stop 1", "\x1b[31m"]
     layer = apply(LayerSpec(name="things", class_name="", class_by=by), kind=kinds)
     assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
     assert (layer.filtered, layer.excluded) == (14, 0)
-    told = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
-    assert layer.notes == (f"left out, unlisted in class_by 'kind': {told}",)
+    values = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
+    assert layer.notes == (f"left out, unlisted in class_by 'kind': {values}",)
     spec = LayerSpec(name="things", class_name="bench", class_by=by)
     assert (
         apply(spec, kind=kinds)
@@ -114,13 +114,13 @@ def test_what_class_by_does_not_list_is_left_out_by_name() -> None:
     assert many.notes[0].endswith("'7' 1, and 12 others")
 
 
-def test_what_class_by_lists_is_never_a_comparison() -> None:
+def test_values_of_class_by_are_not_comparisons() -> None:
     by = ClassBy("height", (("<2 m", "bench"), ("none", "bus_stop")))
     layer = apply(LayerSpec(name="a", class_name="", class_by=by), height=["<2 m", "none", None])
     assert layer.table["class_name"].tolist() == ["bench", "bus_stop"]
 
 
-def test_what_is_left_out_is_counted_once_by_the_first_reason() -> None:
+def test_row_is_counted_by_the_first_reason() -> None:
     spec = LayerSpec(
         name="things",
         class_name="bench",
@@ -138,7 +138,7 @@ def test_what_is_left_out_is_counted_once_by_the_first_reason() -> None:
     assert layer.notes == ("left out by the catalogue's not: state 2, depth 1",)
 
 
-def test_a_pattern_that_is_none() -> None:
+def test_invalid_pattern_is_refused() -> None:
     spec = LayerSpec(name="things", class_name="bench", where=(("kind", ("/[/",)),))
     with refused(CatalogError, "layer 'things'", "/[/", "regular expression"):
         RowRules(spec, ["kind"], filters=True, where="layer 'things'")
@@ -173,7 +173,7 @@ ODD_WIDTHS = (True, 0, 0.05, -3, math.nan, math.inf, 201, "wide", "", None, "9'"
         (None, "primary", 9, 4.5),
     ],
 )
-def test_a_street_is_as_wide_as_its_field_or_else_its_class_says(
+def test_width_is_from_the_field_or_the_class(
     by: WidthBy | None, highway: str | None, width: object, half: float
 ) -> None:
     spec = street(width_by=by, width_field="width")
@@ -184,7 +184,7 @@ def test_a_street_is_as_wide_as_its_field_or_else_its_class_says(
 
 
 @given(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text())
-def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
+def test_implausible_width_is_unknown(value: Any) -> None:  # noqa: ANN401
     half = half_width(street(width_field="width"), width=value)
     assert math.isnan(half) or 0.05 <= half <= 100
 
@@ -198,7 +198,7 @@ def test_a_width_is_plausible_or_unknown(value: Any) -> None:  # noqa: ANN401
         ("opendatasoft", "streets.geojson"),
     ],
 )
-def test_every_reader_gives_the_widths(name: str, file: str) -> None:
+def test_every_reader_returns_widths(name: str, file: str) -> None:
     bare = street(geometry="line", tags=((("highway", ("*",)),),))
     unknown = replace(bare, width_field="width")
     spec = replace(unknown, width_by=BY_CLASS)
@@ -212,18 +212,18 @@ def test_every_reader_gives_the_widths(name: str, file: str) -> None:
 @pytest.mark.parametrize(
     ("name", "file"), [("vector_file", "streets.geojson"), ("osm_file", "streets.osm")]
 )
-def test_streets_keep_the_names_of_their_field(name: str, file: str) -> None:
+def test_every_reader_returns_names_of_streets(name: str, file: str) -> None:
     bare = street(geometry="line", tags=((("highway", ("*",)),),))
-    named, plain = (
+    with_names, plain = (
         reader(name)(DATA / file, [s])[0] for s in (replace(bare, name_field="highway"), bare)
     )
-    assert [bool(one) for one in named.table["name"]] == [True, True]
+    assert [bool(name) for name in with_names.table["name"]] == [True, True]
     assert "name" not in plain.table
     missing = table(replace(bare, name_field="name"), name=["Rue É", None, " "], highway=[""] * 3)
     assert missing["name"].tolist() == ["Rue É", "", ""]
 
 
-def test_a_portal_may_spell_the_fields_otherwise(tmp_path: Path) -> None:
+def test_portal_fields_may_have_other_spellings(tmp_path: Path) -> None:
     path = tmp_path / "voies.csv"
     path.write_text(
         'Largeur (m);TYPE VOIE;geo_shape\n;Rue;"{""type"": ""LineString"", '

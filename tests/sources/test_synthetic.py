@@ -67,8 +67,8 @@ def along_streets(layer: RawLayer, network: Network) -> pd.DataFrame:
         [part.groups() for part in parts if part], columns=["edge", "side", "number"]
     ).astype({"edge": int, "number": int})
     edge = frame["edge"].to_numpy()
-    kept = np.array([part is not None for part in parts], bool)
-    away = places(layer)[kept] - SPEC.centre - network.start[edge]
+    present = np.array([part is not None for part in parts], bool)
+    away = places(layer)[present] - SPEC.centre - network.start[edge]
     along = network.along[edge]
     across = away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]
     assert ((across > 0) == frame["side"].str.startswith("R")).all()
@@ -98,7 +98,7 @@ def surroundings() -> tuple[RawLayer, RawLayer]:
 
 @settings(max_examples=20, deadline=None)
 @given(spec=cities)
-def test_same_seed_same_city_within_its_square(spec: CitySpec) -> None:
+def test_seed_determines_the_city_inside_its_square(spec: CitySpec) -> None:
     layers = (*synthetic_city(spec), *synthetic_surroundings(spec))
     again = (*synthetic_city(spec), *synthetic_surroundings(spec))
     for layer, twin in zip(layers, again, strict=True):
@@ -116,7 +116,7 @@ def test_same_seed_same_city_within_its_square(spec: CitySpec) -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(spec=cities)
-def test_houses_leave_the_streets_free(spec: CitySpec) -> None:
+def test_houses_do_not_overlap_streets(spec: CitySpec) -> None:
     buildings, streets = synthetic_surroundings(spec)
     houses = Footprints(buildings.table.geometry.to_numpy())
     for layer in synthetic_city(spec):
@@ -131,7 +131,7 @@ def test_houses_leave_the_streets_free(spec: CitySpec) -> None:
     assert not houses.cover(anywhere[np.unique(point[within])]).any()
 
 
-def test_layers_are_the_classes_of_the_paper_in_no_real_place() -> None:
+def test_layers_are_the_classes_of_the_paper() -> None:
     spec = CitySpec(size=200.0, seed=7)
     layers, (buildings, streets) = synthetic_city(spec), synthetic_surroundings(spec)
     names = [item.name for item in paper_taxonomy().classes]
@@ -150,24 +150,24 @@ def test_layers_are_the_classes_of_the_paper_in_no_real_place() -> None:
     assert streets.table["half_width"].dtype == np.float64
 
 
-def test_other_seeds_are_other_cities() -> None:
+def test_other_seed_gives_another_city() -> None:
     cities = [synthetic_city(CitySpec(size=500.0, seed=seed)) for seed in range(4)]
     lights = [of_class(city, "street_light").table.geometry.to_wkb() for city in cities]
     assert all(not np.intersect1d(*pair).size for pair in itertools.combinations(lights, 2))
 
 
-def test_the_centre_moves_the_city_and_no_more() -> None:
+def test_centre_only_moves_the_city() -> None:
     here, there = CitySpec(size=400.0), CitySpec(size=400.0, centre=(300_000.0, 5_000_000.0))
-    one = (*synthetic_city(here), *synthetic_surroundings(here))
+    layers = (*synthetic_city(here), *synthetic_surroundings(here))
     other = (*synthetic_city(there), *synthetic_surroundings(there))
-    for layer, moved in zip(one, other, strict=True):
-        assert layer.table["source_id"].equals(moved.table["source_id"])
-        shift = places(moved) - places(layer)
+    for layer, shifted in zip(layers, other, strict=True):
+        assert layer.table["source_id"].equals(shifted.table["source_id"])
+        shift = places(shifted) - places(layer)
         np.testing.assert_allclose(shift, np.full_like(shift, (-200_000.0, -400_000.0)), atol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_small_city_has_about_the_shares_of_paris(seed: int) -> None:
+def test_small_city_has_about_the_shares_of_paris(seed: int) -> None:
     layers = synthetic_city(CitySpec(seed=seed))
     counts = {layer.spec.class_name: layer.counts.read for layer in layers}
     total = sum(counts.values())
@@ -178,7 +178,7 @@ def test_a_small_city_has_about_the_shares_of_paris(seed: int) -> None:
         assert abs(counts[name] - expected) < expected / 3 + 3 * math.sqrt(expected), name
 
 
-def test_the_faces_are_enclosed_by_the_edges(network: Network) -> None:
+def test_edges_enclose_the_faces(network: Network) -> None:
     lines = shapely.union_all(shapely.buffer(network.lines, 0.01))
     whole = network.faces[shapely.within(network.faces, shapely.box(-1000, -1000, 1000, 1000))]
     assert len(whole) > 200
@@ -186,7 +186,7 @@ def test_the_faces_are_enclosed_by_the_edges(network: Network) -> None:
     assert not shapely.intersects(shapely.point_on_surface(whole), lines).any()
 
 
-def test_avenues_lead_on(network: Network) -> None:
+def test_avenues_are_connected(network: Network) -> None:
     avenue = network.avenue
     assert 0.3 < network.length[avenue].sum() / network.length.sum() < 0.45
     assert network.half_width[avenue].min() > network.half_width[~avenue].max()
@@ -200,13 +200,13 @@ def test_avenues_lead_on(network: Network) -> None:
         assert (of_street.min() == of_street.max()).all()
 
 
-def test_lights_are_even_along_a_street(city: City, network: Network) -> None:
+def test_lights_are_regularly_spaced(city: City, network: Network) -> None:
     rows = rows_of(along_streets(of_class(city, "street_light"), network))
     assert len(rows) > 400
     rhythms = []
     for row in rows:
         gaps = (row["t"].diff() / row["number"].diff()).dropna().to_numpy()
-        assert np.ptp(gaps) < 4 * 0.3 + 0.05  # they stand up to 0.3 m off
+        assert np.ptp(gaps) < 4 * 0.3 + 0.05  # with an offset of up to 0.3 m
         rhythms.append(gaps.mean())
     assert min(rhythms) > 5.3
     assert max(rhythms) < 32.7
@@ -224,7 +224,7 @@ def test_trees_are_in_rows_with_gaps(city: City, network: Network) -> None:
     assert {"R", "L", "RR", "LL"} == set(trees["side"])
 
 
-def test_objects_stand_on_the_pavement(city: City, network: Network) -> None:
+def test_objects_are_on_the_pavement(city: City, network: Network) -> None:
     for layer in city:
         frame = along_streets(layer, network)
         edge = frame["edge"].to_numpy()
@@ -235,22 +235,22 @@ def test_objects_stand_on_the_pavement(city: City, network: Network) -> None:
         assert (frame["t"] < network.length[edge] - clear[:, 1]).all()
 
 
-def test_objects_name_the_street_they_stand_in(
+def test_ids_of_objects_name_their_street(
     city: City, surroundings: tuple[RawLayer, RawLayer]
 ) -> None:
     streets = surroundings[1].table.set_index("source_id")
     for layer in city:
         edges = layer.table["source_id"].str.extract(r"^(\d+)[LR]")[0]
-        known = edges.isin(streets.index)  # the others stand at the edge of the square
-        assert len(edges) < 20 or known.sum() > 0.95 * edges.notna().sum()
-        own = streets.loc[edges[known]]
-        points = layer.table.geometry[known].to_numpy()
+        inside = edges.isin(streets.index)  # the others are at the edge of the square
+        assert len(edges) < 20 or inside.sum() > 0.95 * edges.notna().sum()
+        own = streets.loc[edges[inside]]
+        points = layer.table.geometry[inside].to_numpy()
         away = shapely.distance(points, own.geometry.to_numpy())
         inside = away <= own["half_width"].to_numpy()
         assert inside.mean() > 0.99 or len(inside) == 0
 
 
-def test_signals_stand_at_corners_of_avenues(city: City, network: Network) -> None:
+def test_signals_are_at_corners_of_avenues(city: City, network: Network) -> None:
     signals = along_streets(of_class(city, "traffic_light"), network)
     meeting = np.bincount(network.junction[network.avenue].ravel())
     corner = network.junction[signals["edge"], signals["number"]]
@@ -283,7 +283,7 @@ def test_parks_have_trees_and_squares_lights_but_no_houses(
             assert not shapely.intersects(houses, hull).any()
 
 
-def test_houses_stand_side_by_side(surroundings: tuple[RawLayer, RawLayer]) -> None:
+def test_houses_do_not_overlap(surroundings: tuple[RawLayer, RawLayer]) -> None:
     houses = surroundings[0].table.geometry.to_numpy()
     assert len(houses) > 4000
     together = shapely.area(shapely.union_all(houses))
@@ -293,13 +293,13 @@ def test_houses_stand_side_by_side(surroundings: tuple[RawLayer, RawLayer]) -> N
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_smallest_city_is_a_city(seed: int) -> None:
+def test_smallest_city_has_objects(seed: int) -> None:
     spec = CitySpec(size=100.0, seed=seed)
     assert of_class(synthetic_city(spec), "street_light").counts.read > 0
     assert synthetic_surroundings(spec)[1].counts.read > 0
 
 
-def test_the_paris_like_city_has_the_counts_of_the_paper() -> None:
+def test_paris_like_city_has_the_counts_of_the_paper() -> None:
     layers = synthetic_city(PARIS_LIKE)
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
     streets = synthetic_streets(PARIS_LIKE).table
@@ -308,8 +308,8 @@ def test_the_paris_like_city_has_the_counts_of_the_paper() -> None:
     assert database.lengths.mean() == pytest.approx(14.0, abs=0.5)
     for item in paper_taxonomy().classes:
         slack = 0.05 if OCCURRENCES[item.name] > 30_000 else 0.15
-        held = database.occurrences[item.code]
-        assert held == pytest.approx(OCCURRENCES[item.name], rel=slack), item.name
+        occurrences = database.occurrences[item.code]
+        assert occurrences == pytest.approx(OCCURRENCES[item.name], rel=slack), item.name
     types, angles = database.type_sequences, database.angle_sequences
     assert len(types) / len(database) == pytest.approx(0.45, abs=0.04)
     assert len(angles) / len(database) == pytest.approx(0.656, abs=0.04)
@@ -330,6 +330,6 @@ def test_the_paris_like_city_has_the_counts_of_the_paper() -> None:
         ({"centre": (math.inf, 0.0)}, "centre of the city is"),
     ],
 )
-def test_impossible_cities(wrong: dict[str, Any], words: str) -> None:
+def test_invalid_city_is_refused(wrong: dict[str, Any], words: str) -> None:
     with refused(InputError, words):
         CitySpec(**wrong)

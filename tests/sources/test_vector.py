@@ -43,7 +43,7 @@ FORMATS = ("csv", "fgb", "geojson", "gpkg", "shp", "zip")
 
 @pytest.fixture(params=["pyogrio, then fiona", "fiona", "pyogrio"], autouse=True)
 def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Run every test as where fiona is installed, with fiona for all rows, and without it."""
+    """Run each test with pyogrio and fiona, with fiona for all rows, and without fiona."""
     engine: str = request.param
     if "fiona" in engine:
         pytest.importorskip("fiona", reason="there is no fiona for this Python")
@@ -124,9 +124,9 @@ def read(path: Path, **what: Any) -> RawLayer:  # noqa: ANN401 - any field of a 
 
 def counts(layer: RawLayer) -> tuple[int, int, int]:
     """Return how many rows were read, kept, and unreadable; the others are filtered."""
-    rows, kept = layer.counts, len(layer.table)
-    assert rows.read == kept + rows.filtered + rows.unreadable
-    return rows.read, kept, rows.unreadable
+    rows, count = layer.counts, len(layer.table)
+    assert rows.read == count + rows.filtered + rows.unreadable
+    return rows.read, count, rows.unreadable
 
 
 @pytest.fixture(scope="session")
@@ -134,7 +134,7 @@ def montpellier(geodata: Path) -> Publication:
     return lambda name: geodata / "montpellier" / f"VilleMTP_MTP_{name}"
 
 
-def test_published_coordinates_are_not_touched(montpellier: Publication) -> None:
+def test_published_coordinates_are_unchanged(montpellier: Publication) -> None:
     path = montpellier("Horodateurs_2011.zip")
     with zipfile.ZipFile(path) as archive:
         shp = archive.read("VilleMTP_MTP_Horodateurs_2011.shp")
@@ -143,7 +143,7 @@ def test_published_coordinates_are_not_touched(montpellier: Publication) -> None
     assert xy(read(path)) == [list(pair) for pair in stored]
 
 
-def test_published_polygons_and_lines_are_kept_as_they_are(montpellier: Publication) -> None:
+def test_published_polygons_and_lines_are_unchanged(montpellier: Publication) -> None:
     layer = read(montpellier("Batiments.zip"), geometry="polygon")
     assert (counts(layer), layer.notes) == ((3356, 3356, 0), ())
     assert set(layer.table.geom_type) <= {"Polygon", "MultiPolygon"}
@@ -151,7 +151,7 @@ def test_published_polygons_and_lines_are_kept_as_they_are(montpellier: Publicat
     assert layer.notes == ("7654 of 7654 rows are LineString, not point",)
 
 
-def test_published_geojson_that_is_not_in_degrees(montpellier: Publication) -> None:
+def test_published_geojson_in_metres(montpellier: Publication) -> None:
     path = montpellier("Signalisation.geojson")
     with refused(CrsError, "(767686.3955, 6279032.6454)", "state the crs"):
         read(path)
@@ -177,18 +177,18 @@ def cut(path: Path, size: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("suffix", "size", "kept", "error"),
+    ("suffix", "size", "count", "error"),
     [
         (".shp", 100 + 28 * 50, 50, "row 51: Error in fread()"),  # 50 whole records
         (".dbf", 10_000, 27, "row 28: fread(343) failed on DBF file"),
     ],
 )
 def test_truncated_shapefile_loses_only_its_end(
-    fountains: Path, tmp_path: Path, engine: str, *, suffix: str, size: int, kept: int, error: str
+    fountains: Path, tmp_path: Path, engine: str, *, suffix: str, size: int, count: int, error: str
 ) -> None:
     cut(fountains.with_suffix(suffix), size)
     layer = read(fountains, id_field="ID")
-    assert counts(layer) == (89, kept, 89 - kept)
+    assert counts(layer) == (89, count, 89 - count)
     assert len(layer.errors) == 10
     if suffix == ".shp":
         error = error if "fiona" in engine else "row 51: its geometry is damaged"
@@ -212,7 +212,7 @@ def test_corrupt_records_are_counted(fountains: Path, engine: str) -> None:
     assert layer.table.geometry.isna().sum() == 1
 
 
-def test_a_shapefile_that_does_not_state_its_encoding_is_latin(tmp_path: Path) -> None:
+def test_shapefile_without_encoding_is_latin(tmp_path: Path) -> None:
     table = frame([(1, 2), (3, 4)], catégorie=["allée", "square"])
     path = tmp_path / "things.shp"
     table.to_file(path, encoding="ISO-8859-1")
@@ -225,13 +225,13 @@ def test_a_shapefile_that_does_not_state_its_encoding_is_latin(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("suffix", "message"), [(".shp", "unreadable, or corrupt"), (".shx", "shx")]
 )
-def test_useless_shapefile(fountains: Path, suffix: str, message: str) -> None:
+def test_incomplete_shapefile_is_refused(fountains: Path, suffix: str, message: str) -> None:
     cut(fountains.with_suffix(suffix), 50)
     with refused(SourceError, message, "download it again"):
         read(fountains)
 
 
-def test_damaged_archives(montpellier: Publication, tmp_path: Path) -> None:
+def test_damaged_archive_is_refused(montpellier: Publication, tmp_path: Path) -> None:
     path = Path(shutil.copy(montpellier("FontainesPublic.zip"), tmp_path / "copy.zip"))
     content = path.read_bytes()
     cut(path, len(content) // 2)
@@ -253,7 +253,7 @@ things = st.lists(
 @given(rows=things)
 @example(rows=[(0.0, 0.0, "x")])
 @settings(max_examples=8)
-def test_round_trip(suffix: str, rows: list[tuple[float, float, str]]) -> None:
+def test_rows_of_every_format_are_read(suffix: str, rows: list[tuple[float, float, str]]) -> None:
     x, y, kinds = zip(*rows, strict=True)
     table = frame(zip(x, y, strict=True), ident=np.arange(len(rows)) + 100, kind=list(kinds))
     spec = spec_of(id_field="ident", where=(("kind", ("Bänk", "a, b; c")),), crs="EPSG:2154")
@@ -281,7 +281,7 @@ TYPES = {"class_name": TEXT, "source_id": TEXT, "geometry": "geometry"}
 
 @pytest.mark.parametrize("name", ["x#y?z! %20", "x%y;z", "x&y!z"])
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_names_that_a_url_would_cut(suffix: str, name: str, tmp_path: Path) -> None:
+def test_file_names_with_special_characters(suffix: str, name: str, tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.mkdir()
     path = write(frame([(1, 2)], n=[1]), plain, suffix)
@@ -294,7 +294,7 @@ def test_names_that_a_url_would_cut(suffix: str, name: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("suffix", ["fgb", "geojson", "gpkg", "shp"])
-def test_null_and_empty_geometries_are_no_errors(suffix: str, tmp_path: Path) -> None:
+def test_null_and_empty_geometries_are_not_errors(suffix: str, tmp_path: Path) -> None:
     table = frame([(1, 2), (3, 4), (5, 6), (7, 8)], n=[1, 2, 3, 4])
     table.loc[1, "geometry"] = None
     table.loc[2, "geometry"] = shapely.Point()
@@ -337,8 +337,8 @@ def test_other_geometries_are_noted() -> None:
     )
 
 
-def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> None:
-    path = DATA / "broken.geojson"  # of whose rows five are good: a point, and empty ones
+def test_invalid_geojson_geometries_are_distinguished_from_null(tmp_path: Path) -> None:
+    path = DATA / "broken.geojson"  # five rows are valid: a point, and empty geometries
     layer = read(path)
     assert counts(layer) == (13, 5, 8)
     assert [message.split(":")[0] for message in layer.errors] == [f"row {n}" for n in range(1, 9)]
@@ -346,11 +346,11 @@ def test_broken_geojson_geometries_are_told_from_null_ones(tmp_path: Path) -> No
     assert layer.errors[6].startswith("row 7: its LineString is not valid")
     archive = pack(tmp_path / "things.zip", path, inside="below/")
     assert read(archive).errors == layer.errors
-    alone = text_file(tmp_path, "things.geojson", json.dumps(point(3, 43)))  # without features
-    assert xy(read(alone)) == [[3.0, 43.0]]
+    feature = text_file(tmp_path, "things.geojson", json.dumps(point(3, 43)))  # without features
+    assert xy(read(feature)) == [[3.0, 43.0]]
 
 
-def test_rings_that_are_not_closed_are_closed_and_counted(tmp_path: Path) -> None:
+def test_open_rings_are_closed_and_counted(tmp_path: Path) -> None:
     corners = [[3.0, 43.0], [3.1, 43.0], [3.1, 43.1], [3.0, 43.1]]
     whole, hole = [*corners, corners[0]], [[3.04, 43.04], [3.06, 43.04], [3.06, 43.06]]
     shapes: dict[str, list[Any]] = {
@@ -372,7 +372,7 @@ def test_rings_that_are_not_closed_are_closed_and_counted(tmp_path: Path) -> Non
     assert (layer.counts.kept, layer.table.geometry[0].area) == (4, pytest.approx(0.01))
 
 
-def test_coordinates_that_are_nowhere_are_bad_rows(tmp_path: Path, engine: str) -> None:
+def test_coordinates_that_are_not_finite_are_errors(tmp_path: Path, engine: str) -> None:
     line = {"type": "LineString", "coordinates": [[1, 2], [math.nan, 3]]}
     bad = [point(math.nan, 43), point(3, math.inf), line, point(3, 430)]
     good = [point(3, 43), point(180, 90), point(-180, -90)]
@@ -392,15 +392,15 @@ def test_other_truncated_files(suffix: str, tmp_path: Path) -> None:
     cut(path, 2 * path.stat().st_size // 3)
     if suffix == "fgb":  # which loses only its end
         layer = read(path)
-        rows, kept, _ = counts(layer)
+        rows, count, _ = counts(layer)
         assert (rows, len(layer.errors)) == (2000, 10)
-        assert 0 < kept < 2000
+        assert 0 < count < 2000
     else:
         with refused(SourceError, f"{path.name} cannot be read (", "download it again"):
             read(path)
 
 
-def test_gdal_keeps_quiet(
+def test_gdal_prints_nothing(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
@@ -423,7 +423,7 @@ def test_gdal_keeps_quiet(
 
 
 @pytest.mark.parametrize("wish", [None, False])
-def test_the_crs_of_others_is_looked_for_as_they_wish(tmp_path: Path, wish: object) -> None:
+def test_gdal_option_of_the_user_is_restored(tmp_path: Path, wish: object) -> None:
     path = write(frame([(0, 0)], n=[1]), tmp_path, "shp")
     pyogrio.set_gdal_config_options({"USE_OSR_FIND_MATCHES": wish})
     try:
@@ -496,7 +496,7 @@ def test_csv_rows_without_numbers_are_errors(tmp_path: Path) -> None:
         ({"x_field": "place"}, CatalogError, ["only one of x_field and y_field"]),
     ],
 )
-def test_csv_needs_coordinates(
+def test_csv_without_coordinates_is_refused(
     tmp_path: Path, what: dict[str, str], error: type[Exception], words: list[str]
 ) -> None:
     path = text_file(tmp_path, "things.csv", "ident;place\n1;here\n")
@@ -507,7 +507,7 @@ def test_csv_needs_coordinates(
 
 @pytest.mark.parametrize("suffix", ["csv", "fgb", "gpkg", "shp"])
 @pytest.mark.filterwarnings("ignore:'crs' was not provided")
-def test_missing_crs_is_asked_for(suffix: str, tmp_path: Path) -> None:
+def test_missing_crs_is_refused(suffix: str, tmp_path: Path) -> None:
     table = frame([(765277, 6275109)], n=[1]).set_crs(None, allow_override=True)
     path = write(table, tmp_path, suffix)
     assert list_layers(path)[0].crs is None
@@ -536,7 +536,7 @@ DEGREES, PLANE = (3, 43), (765277, 6275109)
         (CRS84, DEGREES, "EPSG:2154", "EPSG:4326", (OTHER,)),
     ],
 )
-def test_geojson_is_in_degrees_unless_said_otherwise(  # noqa: PLR0917
+def test_crs_of_geojson(  # noqa: PLR0917
     tmp_path: Path,
     members: dict[str, object],
     place: tuple[float, float],
@@ -551,7 +551,7 @@ def test_geojson_is_in_degrees_unless_said_otherwise(  # noqa: PLR0917
     assert list_layers(path)[0].crs == ("EPSG:2154" if members is LAMBERT else "EPSG:4326")
 
 
-def test_geojson_whose_crs_is_none_or_wrong(tmp_path: Path) -> None:
+def test_geojson_with_a_null_or_wrong_crs(tmp_path: Path) -> None:
     for member in (None, crs_member("urn:nobody:knows")):
         path = geojson(tmp_path, point(*DEGREES), crs=member)
         with refused(CrsError, "does not say which CRS"):
@@ -572,17 +572,17 @@ def test_where_compares_values_exactly(suffix: str, tmp_path: Path) -> None:
     )
     path = write(table, tmp_path, suffix)
 
-    def kept(**accepted: Any) -> int:  # noqa: ANN401 - one value or several
+    def matching(**accepted: Any) -> int:  # noqa: ANN401 - one value or several
         where = [(k, v if isinstance(v, tuple) else (v,)) for k, v in accepted.items()]
         return counts(read(path, where=tuple(where), crs="EPSG:2154"))[1]
 
-    assert kept(kind=("tree", "Trees")) == 2
-    assert kept(size=1) == kept(size=1.0) == kept(size="1") == 2
-    assert kept(size=(1, 10)) == 3
-    assert kept(height=1.5) == kept(height="1.5") == 1
-    assert kept(height=1) == 2
-    assert kept(kind="Tree", size=1) == 2
-    assert kept(kind="tree", size=1) == kept(kind=1) == kept(size=True) == 0
+    assert matching(kind=("tree", "Trees")) == 2
+    assert matching(size=1) == matching(size=1.0) == matching(size="1") == 2
+    assert matching(size=(1, 10)) == 3
+    assert matching(height=1.5) == matching(height="1.5") == 1
+    assert matching(height=1) == 2
+    assert matching(kind="Tree", size=1) == 2
+    assert matching(kind="tree", size=1) == matching(kind=1) == matching(size=True) == 0
 
 
 @pytest.mark.parametrize(("value", "filtered"), [(True, 3), ("false", 3), (1, 4)])
@@ -602,7 +602,7 @@ def test_where_on_logical_and_missing_values(tmp_path: Path, value: Any, filtere
     ],
 )
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_missing_fields_are_named(suffix: str, what: dict[str, Any], tmp_path: Path) -> None:
+def test_missing_field_is_refused(suffix: str, what: dict[str, Any], tmp_path: Path) -> None:
     path = write(frame([(1, 2)], kind=["a"], size=[1]), tmp_path, suffix)
     (key,) = what
     spec = spec_of(crs="EPSG:2154", **what)
@@ -644,17 +644,17 @@ def test_layers_of_a_container(container: Path) -> None:
         read(container, layer="light")
 
 
-def test_tables_without_geometry_are_not_meant(container: Path, tmp_path: Path) -> None:
-    alone = tmp_path / "alone.gpkg"
-    frame([(1, 2)], n=[1]).to_file(alone, layer="trees")
-    for path in (alone, container):
+def test_tables_without_geometry_are_ignored(container: Path, tmp_path: Path) -> None:
+    single = tmp_path / "single.gpkg"
+    frame([(1, 2)], n=[1]).to_file(single, layer="trees")
+    for path in (single, container):
         pyogrio.write_dataframe(pd.DataFrame({"styleName": ["red"]}), path, layer="layer_styles")
-    assert read(alone).counts.read == 1
+    assert read(single).counts.read == 1
     with refused(SourceError, "contains 2 layers (trees, lights)"):
         read(container)
     with refused(SourceError, "has no geometry"):
-        read(alone, layer="layer_styles")
-    assert list_layers(alone)[1].geometry == "None"
+        read(single, layer="layer_styles")
+    assert list_layers(single)[1].geometry == "None"
 
 
 def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
@@ -671,7 +671,7 @@ def test_archive_with_folders_and_companions(tmp_path: Path) -> None:
         read(pack(tmp_path / "two.zip", *inner.iterdir()))
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_path_that_is_not_a_vector_file_is_refused(tmp_path: Path) -> None:
     text = text_file(tmp_path, "readme.txt", "x,y\n1,2\n")
     empty = tmp_path / "empty.gpkg"
     frame([(1, 2)], n=[1]).to_file(empty, SPATIAL_INDEX="NO")
@@ -694,21 +694,21 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", ["csv", "fgb", "geojson", "gpkg", "json", "shp"])
 @pytest.mark.parametrize("text", ["", '[{"a": 1}]'])
-def test_content_that_belies_its_name(suffix: str, text: str, tmp_path: Path) -> None:
+def test_content_of_another_format_is_refused(suffix: str, text: str, tmp_path: Path) -> None:
     path = text_file(tmp_path, f"things.{suffix}", text)
     with refused(SourceError, path.name):
         read(path, crs="EPSG:4326")
 
 
 @pytest.mark.parametrize("damage", [b"{", b'"\x01"', b"[" * 5000], ids=["more", "control", "deep"])
-def test_geojson_that_only_gdal_takes_for_json(damage: bytes, tmp_path: Path) -> None:
+def test_invalid_json_that_gdal_accepts_is_refused(damage: bytes, tmp_path: Path) -> None:
     path = write(frame([(0, 0)]), tmp_path, "geojson")
     path.write_bytes(path.read_bytes().rstrip().removesuffix(b"}") + b', "a": ' + damage)
     with refused(SourceError, path.name, "download it again"):
         read_layer(path, spec_of())
 
 
-def test_geopackage_with_names_that_are_no_text(tmp_path: Path) -> None:
+def test_geopackage_with_names_that_are_not_text(tmp_path: Path) -> None:
     path = write(frame([(0, 0)]), tmp_path, "gpkg")
     path.write_bytes(path.read_bytes().replace(b"CREATE TRIGGER", b"CREATE T\xffIGGER"))
     with refused(SourceError, f"{path.name} cannot be read (", "download it again"):

@@ -1,4 +1,4 @@
-"""Rows that fiona gives or refuses, one by one."""
+"""Rows that fiona reads or refuses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ by_fiona = pytest.importorskip("semsig_gis.sources.vector.by_fiona")
 
 
 class Source:
-    """A source of features, of which some raise, as GDAL may."""
+    """A source of features; an exception among them is raised, as GDAL may do."""
 
     def __init__(self, features: Iterable[Any]) -> None:
         self.features = iter(features)
@@ -34,7 +34,7 @@ GEOMETRY = fiona.Geometry(coordinates=(1.0, 0.0), type="Point")
 GOOD = fiona.Feature(geometry=GEOMETRY, id="1", properties=fiona.Properties())
 
 
-def test_features_that_raise_do_not_stop_the_rest() -> None:
+def test_features_after_an_error_are_read() -> None:
     bad = ValueError("unlucky")
     source = Source([bad, *[GOOD] * 3, bad, *[GOOD] * 3, bad])
     rows = by_fiona._rows(source, [], 9, [])
@@ -43,7 +43,7 @@ def test_features_that_raise_do_not_stop_the_rest() -> None:
 
 
 @pytest.mark.parametrize("size", [5, 5000])
-def test_reader_that_is_stuck_comes_to_an_end(size: int) -> None:
+def test_reader_stops_after_many_failures(size: int) -> None:
     features = itertools.chain([GOOD] * 3, itertools.repeat(OSError(5, "no more")))
     rows = by_fiona._rows(Source(features), [], size, [])
     assert rows.numbers == [1, 2, 3]

@@ -1,4 +1,4 @@
-// What several layers have is unpacked once.
+// Unpacked arrays, by their packed form: several layers may share one.
 semsig.unpacked = new WeakMap();
 semsig.arrays = async (packed) => {
   const kinds = {
@@ -10,8 +10,7 @@ semsig.arrays = async (packed) => {
     const response = new Response(stream);
     if (kind === "json") return response.json();
     if (kind !== "steps") return new kinds[kind](await response.arrayBuffer());
-    // The four bytes of all numbers one after the other; each number is what it is more than the
-    // one before.
+    // Four planes with the bytes of all numbers; the numbers are differences, to be summed up.
     const planes = new Uint8Array(await response.arrayBuffer());
     const values = new Int32Array(planes.length / 4);
     const size = values.length;
@@ -23,9 +22,9 @@ semsig.arrays = async (packed) => {
     return values;
   };
   const names = Object.keys(packed);
-  const once = (one) => {
-    if (!semsig.unpacked.has(one)) semsig.unpacked.set(one, read(one));
-    return semsig.unpacked.get(one);
+  const once = (entry) => {
+    if (!semsig.unpacked.has(entry)) semsig.unpacked.set(entry, read(entry));
+    return semsig.unpacked.get(entry);
   };
   const arrays = await Promise.all(names.map((name) => once(packed[name])));
   return Object.fromEntries(names.map((name, at) => [name, arrays[at]]));

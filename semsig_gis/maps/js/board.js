@@ -9,7 +9,7 @@ semsig.frame = (map, {origin, quantum}, zoom = map.getZoom()) => {
     top: (across / 2 - origin[1]) * pixels - corner.y,
   };
 };
-// A canvas that one function paints, at once and after every move.
+// A canvas that a function paints now and after every move of the map.
 semsig.board = (map, pane, paint) => {
   const board = L.canvas({pane, padding: 0.2});
   board._draw = () => {
@@ -29,7 +29,7 @@ semsig.board = (map, pane, paint) => {
   board.on("remove", () => map.off("semsig-colours", redraw));
   return {redraw, remove: () => board.remove(), canvas: board._container};
 };
-// A layer that is such a canvas.
+// A layer with such a canvas.
 semsig.boardLayer = (pane, name, paint) => {
   const layer = new L.Layer();
   let board = null;
@@ -44,7 +44,7 @@ semsig.boardLayer = (pane, name, paint) => {
   layer.redraw = () => { if (board) board.redraw(); };
   return layer;
 };
-// A sign as those of its pixels that are not clear: how far right and down, and colour.
+// The pixels of a sign that are not transparent: offsets to the right and down, and colours.
 semsig.sprite = (radius, draw) => {
   const half = Math.ceil(radius);
   const canvas = document.createElement("canvas");
@@ -60,13 +60,14 @@ semsig.sprite = (radius, draw) => {
     colour: Uint32Array.from(solid, (at) => colours[at]),
   };
 };
-// Half of one colour and half of another.
-semsig.halved = (one, other) => (((one ^ other) & 0xfefefefe) >>> 1) + (one & other) >>> 0;
-// Signs are copied pixel by pixel, many times faster than a canvas draws so many images: `fill` is
-// given the pixels to a point of the screen, and what stamps a sign at a place.
+// The mean of two colours.
+semsig.halved = (first, second) =>
+  (((first ^ second) & 0xfefefefe) >>> 1) + (first & second) >>> 0;
+// Draw many signs pixel by pixel, which is much faster than drawing images on a canvas. `fill` gets
+// the number of canvas pixels per screen pixel, and a function that copies a sign to a place.
 semsig.stamped = (ctx, min, max, fill) => {
   const {width, height} = ctx.canvas;
-  if (!width || !height) return;  // a page that is not shown has no size
+  if (!width || !height) return;  // a hidden page has no size
   const image = ctx.createImageData(width, height);
   const pixels = new Uint32Array(image.data.buffer);
   const dots = width / (max.x - min.x);
@@ -82,7 +83,7 @@ semsig.stamped = (ctx, min, max, fill) => {
   });
   ctx.putImageData(image, 0, 0);
 };
-// Boxes around so many points at a time, to leave out what is not in view.
+// Boxes around blocks of points, to skip blocks that are not in view.
 semsig.blocks = (x, y, starts) => {
   const boxes = new Int32Array(4 * (starts.length - 1));
   for (let block = 0; block + 1 < starts.length; block += 1) {

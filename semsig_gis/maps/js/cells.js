@@ -1,4 +1,4 @@
-// A place in a box, or beside it, by the values at the crossings of a lattice over it.
+// Interpolate the two values of a lattice over a box at x and y, or extrapolate outside the box.
 semsig.between = (lattice, [west, south, east, north], x, y) => {
   const lines = Math.sqrt(lattice.length / 2) - 1;
   const [[column, right], [row, up]] = [[x, west, east], [y, south, north]].map(
@@ -15,11 +15,12 @@ semsig.between = (lattice, [west, south, east, north], x, y) => {
     return low * (1 - up) + high * up;
   });
 };
-// The cells of a page, by their row numbers.
+// The cells of a page; a cell is its index in the packed arrays.
 semsig.City = class {
   constructor(data, grid) {
     Object.assign(this, {data, grid, count: data.rows.length});
   }
+  // Binary search for the first index from low to high for which a condition holds.
   static firstOf(low, high, holds) {
     while (low < high) {
       const middle = (low + high) >> 1;
@@ -29,13 +30,14 @@ semsig.City = class {
   }
   placeOf(cell) {
     const ends = this.data.columnEnds;
-    return [semsig.City.firstOf(0, ends.length, (one) => ends[one] > cell), this.data.rows[cell]];
+    const column = semsig.City.firstOf(0, ends.length, (index) => ends[index] > cell);
+    return [column, this.data.rows[cell]];
   }
   cellAt(column, row) {
     const {columnEnds: ends, rows} = this.data;
     if (column < 0 || column >= ends.length) return -1;
     const cell = semsig.City.firstOf(
-      column > 0 ? ends[column - 1] : 0, ends[column], (one) => rows[one] >= row);
+      column > 0 ? ends[column - 1] : 0, ends[column], (index) => rows[index] >= row);
     return cell < ends[column] && rows[cell] === row ? cell : -1;
   }
   latlng(column, row) {
@@ -50,16 +52,16 @@ semsig.City = class {
     const [column, row] = this.placeOf(cell);
     return String(BigInt(this.grid.firstColumn + column) * 100000000n + BigInt(row));
   }
-  // The nearest cell and how far away its middle is, in metres, as far as `reach`.
+  // The nearest cell within `reach` metres of a click, or -1, and the distance of its middle.
   nearest(map, clicked, reach) {
     const {step, origin, firstColumn, mercatorBox} = this.grid;
     const point = L.CRS.EPSG3857.project(clicked);
     const [x, y] = semsig.between(this.data.metres, mercatorBox, point.x, point.y);
     const column = Math.floor((x - origin[0]) / step) - firstColumn;
     const row = Math.floor((y - origin[1]) / step);
-    // From afar a cell is smaller than a finger.
-    const beside = map.containerPointToLatLng(map.latLngToContainerPoint(clicked).add([8, 0]));
-    const finger = Math.min(map.distance(clicked, beside), 20 * step);
+    // At low zoom a cell is smaller than a finger.
+    const other = map.containerPointToLatLng(map.latLngToContainerPoint(clicked).add([8, 0]));
+    const finger = Math.min(map.distance(clicked, other), 20 * step);
     const steps = Math.floor(Math.max(finger, reach) / step);
     let [best, least] = [-1, Infinity];
     for (let across = -steps; across <= steps; across += 1) {
@@ -71,8 +73,8 @@ semsig.City = class {
     }
     return [best, Math.sqrt(least) * step <= finger ? 0 : Math.sqrt(least) * step];
   }
-  // The cell of a number as it is told, or -1.
-  called(id) {
+  // The cell with an id, given as text, or -1.
+  cellOfId(id) {
     if (!/^-?\d{1,19}$/.test(id)) return -1;
     const [column, row] = semsig.columnAndRow(BigInt(id));
     return this.cellAt(column - this.grid.firstColumn, row);
@@ -90,7 +92,7 @@ semsig.City = class {
     return ["north", "north-east", "east", "south-east", "south", "south-west", "west",
       "north-west"][Math.round(Math.atan2(u - x, v - y) / Math.PI * 4 + 8) % 8];
   }
-  told(cell) {
+  coordinates(cell) {
     return this.middle(cell).map((part) => part.toFixed(5)).join(", ");
   }
   part(name, cell) {
@@ -101,7 +103,7 @@ semsig.City = class {
     return String.fromCharCode(
       ...this.data[`${name}.types`].subarray(...this.part(name, cell)));
   }
-  // The objects that a cell may see: class, degrees, metres.
+  // The objects around a cell, nearest first: class, degrees, metres, offset from its middle.
   around(name, cell) {
     const {[`${name}.x`]: x, [`${name}.y`]: y, [`${name}.classes`]: classes} = this.data;
     const [column, row] = this.placeOf(cell);
@@ -115,42 +117,45 @@ semsig.City = class {
       const degrees = (Math.atan2(right, up) / Math.PI * 180 + 360) % 360;
       near.push({symbol: String.fromCharCode(classes[at]), degrees, metres, right, up});
     }
-    return near.sort((one, other) => one.metres - other.metres);
+    return near.sort((first, second) => first.metres - second.metres);
   }
-  // What a cell sees: of each object the class, the degrees and, where it is found, the metres.
+  // The signature of a cell. Bearings are stored as levels; exact bearings and distances come from
+  // the object of the same class in the direction of the level, if there is one.
   signature(name, cell) {
     const levels = this.data[`${name}.levels`].subarray(...this.part(name, cell));
     const types = this.types(name, cell);
     const span = 360 / this.grid.levels;
     const near = types ? this.around(name, cell) : [];
     const metres = [];
-    // The same object may be there twice, a little off.
-    const taken = [];
-    const twice = (one) => taken.some((other) => other === one || (other.symbol === one.symbol
-      && Math.hypot(other.right - one.right, other.up - one.up) < 1.5));
+    // An object may occur twice, at slightly different places: use only one of them.
+    const used = [];
+    const twice = (object) => used.some((other) => other === object
+      || (other.symbol === object.symbol
+        && Math.hypot(other.right - object.right, other.up - object.up) < 1.5));
     const bearings = Array.from(levels, (level, at) => {
       const middle = (level + 0.5) * span;
       const off = ({degrees}) => Math.abs((degrees - middle + 540) % 360 - 180);
-      const fit = near.filter((one) =>
-        one.symbol === types[at] && !taken.includes(one) && off(one) <= span / 2 + 1);
-      const found = fit.find((one) => !twice(one)) || fit[0];
-      if (found) taken.push(found);
-      metres.push(found ? Math.round(found.metres) : null);
-      return Math.round(found ? found.degrees : middle) % 360;
+      const fit = near.filter((object) =>
+        object.symbol === types[at] && !used.includes(object) && off(object) <= span / 2 + 1);
+      const nearest = fit.find((object) => !twice(object)) || fit[0];
+      if (nearest) used.push(nearest);
+      metres.push(nearest ? Math.round(nearest.metres) : null);
+      return Math.round(nearest ? nearest.degrees : middle) % 360;
     });
     return [types, bearings, {metres, reach: this.grid.sight, place: this.middle(cell)}];
   }
-  // The cells that see most nearly the same classes, with how many objects differ, best first.
-  mostAlike(name, cell, count) {
+  // The cells with the most similar counts of classes, best first: cell, difference, distance.
+  mostSimilar(name, cell, count) {
+    // Count the objects of each class in each cell, once.
     if (!this.counts) {
       const {[`${name}.types`]: types, [`${name}.ends`]: ends} = this.data;
       const numbers = new Map();
       for (const type of types) if (!numbers.has(type)) numbers.set(type, numbers.size);
       this.counts = new Uint8Array(this.count * numbers.size);
       this.classes = numbers.size;
-      for (let one = 0, at = 0; one < this.count; one += 1) {
-        for (; at < ends[one]; at += 1) {
-          const place = one * this.classes + numbers.get(types[at]);
+      for (let target = 0, at = 0; target < this.count; target += 1) {
+        for (; at < ends[target]; at += 1) {
+          const place = target * this.classes + numbers.get(types[at]);
           if (this.counts[place] < 255) this.counts[place] += 1;
         }
       }
@@ -166,7 +171,7 @@ semsig.City = class {
       if (best.length === count && differ > best.at(-1)[1]) continue;
       const away = this.metres(cell, other);
       best.push([other, differ, away]);
-      best.sort((one, two) => one[1] - two[1] || one[2] - two[2]);
+      best.sort((first, second) => first[1] - second[1] || first[2] - second[2]);
       best.length = Math.min(best.length, count);
     }
     return best;
@@ -177,7 +182,7 @@ semsig.cells = (packed, grid, signs, names) => {
   const group = L.layerGroup();
   const ready = semsig.arrays(packed).then((data) => new semsig.City(data, grid));
   const buttons = (city, map, box, jumps) => {
-    // Below the title, so that they are in sight however much there is to tell.
+    // Below the title, so that they stay visible in a long panel.
     const lines = jumps.map(([label, goals]) => {
       const line = L.DomUtil.create("div", "semsig-jumps");
       if (label) semsig.text(line, "span", label);
@@ -200,16 +205,18 @@ semsig.cells = (packed, grid, signs, names) => {
     drawn = L.layerGroup();
     const [column, row] = city.placeOf(cell);
     const middle = city.middle(cell);
-    const look = {pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 3};
+    const look = {pane: "shadowPane", interactive: false, color: semsig.highlight, weight: 3};
     const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(
       ([across, along]) => city.latlng(column + across, row + along));
     drawn.addLayer(L.polygon(corners, {...look, fill: false}));
     const parts = names.map((name) => ({
-      rows: [], jumps: [], dots: [], alike: [], ...semsig.cellFacts[name](city, cell)}));
-    // What a cell is taken for goes before what only looks the same.
-    const alike = [];
-    for (const [other, why] of parts.toReversed().flatMap((part) => part.alike)) {
-      if (alike.length < 3 && !alike.some((one) => one[0] === other)) alike.push([other, why]);
+      rows: [], jumps: [], dots: [], lookalikes: [], ...semsig.cellFacts[name](city, cell)}));
+    // The lookalikes of the last part come first: likely confusions before equal signatures.
+    const lookalikes = [];
+    for (const [other, reason] of parts.toReversed().flatMap((part) => part.lookalikes)) {
+      if (lookalikes.length < 3 && !lookalikes.some((entry) => entry[0] === other)) {
+        lookalikes.push([other, reason]);
+      }
     }
     const sign = (other, options) => {
       const marker = L.circleMarker(city.middle(other), {
@@ -223,7 +230,7 @@ semsig.cells = (packed, grid, signs, names) => {
     for (const [other, colour] of parts.flatMap((part) => part.dots)) {
       sign(other, {radius: 4, fillColor: colour});
     }
-    alike.forEach(([other], at) => {
+    lookalikes.forEach(([other], at) => {
       drawn.addLayer(
         L.polyline([middle, city.middle(other)], {...look, weight: 2, dashArray: "5 5"}));
       const text = L.DomUtil.create("b", "");
@@ -234,16 +241,16 @@ semsig.cells = (packed, grid, signs, names) => {
     const rows = [
       ...(away ? [["Nearest cell", `${Math.round(away)} m from the click`]] : []),
       ...parts.flatMap((part) => part.rows), ["Cell", city.id(cell)],
-      ["Latitude, longitude", city.told(cell)]];
+      ["Latitude, longitude", city.coordinates(cell)]];
     const title = parts.map((part) => part.title).filter(Boolean).pop();
-    const others = alike.map(([other, why], at) => ({
+    const others = lookalikes.map(([other, reason], at) => ({
       label: `${at + 1}: ${city.far(cell, other)} to the ${city.towards(cell, other)}`,
-      line: `${why}; ${city.told(other)}`,
+      line: `${reason}; ${city.coordinates(other)}`,
       signature: () => city.signature("now", other),
       go: () => show(city, map, other),
     }));
     const kind = parts.map((part) => part.kind).find(Boolean);
-    const box = semsig.details(title, rows.map((one) => one[0]), rows.map((one) => one[1]), signs,
+    const box = semsig.details(title, rows.map((row) => row[0]), rows.map((row) => row[1]), signs,
       {others: others.length ? others : null, kind});
     buttons(city, map, box, parts.flatMap((part) => part.jumps));
     semsig.show(map, box, middle, {key: `cell:${city.id(cell)}`, corners, drawn});
@@ -251,17 +258,17 @@ semsig.cells = (packed, grid, signs, names) => {
   };
   const answer = (map) => async (event) => {
     const city = await ready;
-    const [cell, away] = city.nearest(map, event.latlng, grid.beside);
+    const [cell, away] = city.nearest(map, event.latlng, grid.tolerance);
     if (cell >= 0) show(city, map, cell, away);
     else {
-      semsig.tellPlace(map, event.latlng, "No cell here", [["Seen", "nothing from this place"]]);
+      semsig.showPlace(map, event.latlng, "No cell here", [["Seen", "nothing from this place"]]);
     }
     return true;
   };
   semsig.addOpener("cell", (map, id) => {
     if (!map.hasLayer(group)) return false;
     ready.then((city) => {
-      const cell = city.called(id);
+      const cell = city.cellOfId(id);
       if (cell >= 0) show(city, map, cell);
     });
     return true;
@@ -274,7 +281,7 @@ semsig.cells = (packed, grid, signs, names) => {
   };
   group.onRemove = (map) => {
     silence();
-    if (map.semsigPanel?.told?.layers.includes(drawn)) semsig.hide(map);
+    if (map.semsigPanel?.selection?.layers.includes(drawn)) semsig.hide(map);
     map.getContainer().classList.remove("semsig-cells");
     L.LayerGroup.prototype.onRemove.call(group, map);
   };

@@ -7,12 +7,12 @@ semsig.cellFacts.change = (city, cell) => {
   const count = {};
   for (const symbol of after[0]) count[symbol] = (count[symbol] || 0) + 1;
   for (const symbol of before[0]) count[symbol] = (count[symbol] || 0) - 1;
-  const differences = Object.entries(count).filter((one) => one[1] !== 0).map(
+  const differences = Object.entries(count).filter((entry) => entry[1] !== 0).map(
     ([symbol, more]) => `${more > 0 ? "+" : "\u2212"}${Math.abs(more)}\u00a0${symbol}`);
-  const shown = (signature) => (signature[0] ? signature : "nothing");
+  const valueOf = (signature) => (signature[0] ? signature : "nothing");
   return {title, kind: "dates", rows: [
-    ["Before", shown(before)],
-    ["Now", shown(after)],
-    ["Difference", differences.join(", ") || "of bearings or distances alone"],
+    ["Before", valueOf(before)],
+    ["Now", valueOf(after)],
+    ["Difference", differences.join(", ") || "only in bearings or distances"],
   ]};
 };

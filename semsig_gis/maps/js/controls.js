@@ -3,8 +3,8 @@ semsig.colours = (map) => {
   const control = L.control({position: "topleft"});
   control.onAdd = () => {
     const bar = L.DomUtil.create("div", "leaflet-bar semsig-bar");
-    // What is chosen is kept for the next time, where a page may keep something.
-    const remembered = (choice) => {
+    // The choice is stored for the next visit, if the page may use the local storage.
+    const stored = (choice) => {
       try {
         if (choice) localStorage.setItem("semsig-colours", choice);
         return localStorage.getItem("semsig-colours");
@@ -12,16 +12,16 @@ semsig.colours = (map) => {
         return choice;
       }
     };
-    let choice = remembered();
+    let choice = stored();
     const button = semsig.mapButton(bar, "semsig-colours", "", "", () => {
-      choice = remembered(semsig.isDark(map) ? "light" : "dark");
+      choice = stored(semsig.isDark(map) ? "light" : "dark");
       show();
       map.fire("semsig-state");
     });
     const show = () => {
       const is = choice ? choice === "dark" : dark.matches;
       map.getContainer().classList.toggle("semsig-dark", is);
-      // A sun or a moon, as a sign and not as a picture.
+      // A sun or a moon, as a text character instead of an emoji.
       button.textContent = is ? "\u2600\ufe0e" : "\u263e\ufe0e";
       button.title = is ? "Light colours" : "Dark colours";
       button.setAttribute("aria-label", button.title);
@@ -57,35 +57,35 @@ semsig.mapButton = (parent, name, sign, title, act) => {
   });
   return button;
 };
-// Hands a file to whoever sits at the browser.
+// Downloads a blob as a file.
 semsig.download = (name, blob) => {
   const link = document.createElement("a");
   Object.assign(link, {href: URL.createObjectURL(blob), download: name});
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 };
-// What the map is of, how it was made, and its name for who cannot see it.
+// The title of the map and its method, and its accessible name.
 semsig.title = (map) => {
   const container = map.getContainer();
   const texts = (selector) => [...new Set(
-    [...container.querySelectorAll(selector)].map((one) => one.textContent))];
-  const stories = texts(".semsig-legend > summary");
-  const title = document.title || stories[0] || "Map";
+    [...container.querySelectorAll(selector)].map((element) => element.textContent))];
+  const summaries = texts(".semsig-legend > summary");
+  const title = document.title || summaries[0] || "Map";
   const box = L.DomUtil.create("div", "semsig-title", container);
   semsig.text(box, "h1", title);
-  const more = [...stories.filter((one) => one !== title), ...texts(".semsig-method")];
+  const more = [...summaries.filter((text) => text !== title), ...texts(".semsig-method")];
   if (more.length) semsig.text(box, "p", more.join(" \u00b7 "));
   container.setAttribute("role", "main");
   container.setAttribute("aria-roledescription", "map");
   container.setAttribute("aria-label", title);
   container.setAttribute("aria-keyshortcuts", "c");
-  L.DomUtil.create("p", "semsig-said", container).setAttribute("role", "status");
+  L.DomUtil.create("p", "semsig-status", container).setAttribute("role", "status");
   L.DomEvent.on(container, "keydown", (event) => {
     const {key, target, ctrlKey, metaKey, altKey} = event;
     if (key === "c" && !(ctrlKey || metaKey || altKey) && !target.matches("input")) semsig.copy(map);
   });
 };
-// What is switched off is not explained.
+// Hide the parts of legends that explain layers which are off.
 semsig.explain = (map, control) => {
   const plain = (name) => name.replace(/( \([\d,]+\))?(, \d+)?$/, "");
   const show = () => {
@@ -99,11 +99,11 @@ semsig.explain = (map, control) => {
   show();
 };
 semsig.isDark = (map) => map.getContainer().classList.contains("semsig-dark");
-// On light and on dark, what sets a sign off from what is below it.
+// Colour of outlines of signs on a light and on a dark map.
 semsig.outline = (map) => (semsig.isDark(map) ? "#e9e9e6" : "#222");
-// Where boxes would cover half the map, they are folded.
+// On small screens the boxes are folded, because they would cover half the map.
 semsig.small = window.matchMedia("(max-width: 800px), (max-height: 499px)");
-// What the boxes at the left and right cover, as far as so many pixels remain beside them.
+// Width in pixels that the boxes cover at the left and at the right, if `least` pixels remain.
 semsig.margins = (map, least) => {
   if (semsig.small.matches) return [10, 10];
   let room = map.getSize().x - 20;
@@ -119,25 +119,25 @@ semsig.folding = (map, layers) => {
   const box = map.getContainer();
   const fit = () => box.classList.toggle("semsig-small", semsig.small.matches);
   semsig.small.addEventListener("change", ({matches}) => {
-    // Leaflet asks only when the control is made whether it opens by itself.
+    // Leaflet reads this option only when it creates the control.
     layers.options.collapsed = matches;
     map.off("click", layers.collapse, layers);
     layers.remove().addTo(map);
-    if (matches) box.querySelectorAll(".semsig-legend").forEach((one) => { one.open = false; });
+    if (matches) for (const legend of box.querySelectorAll(".semsig-legend")) legend.open = false;
     fit();
   });
   fit();
 };
-semsig.furnish = (map, layers, area, credits) => {
+semsig.addControls = (map, layers, area, credits) => {
   for (const credit of map.attributionControl ? credits : []) {
-    // By itself, so that signs of direction in it turn no other text.
+    // In an element of its own, so that its text direction does not change other text.
     const text = L.DomUtil.create("bdi", "");
     text.textContent = credit;
     map.attributionControl.addAttribution(text.outerHTML);
   }
   map.semsigArea = area;
   semsig.panel(map);
-  semsig.answers(map, 2, (event) => semsig.tellPlace(map, event.latlng));
+  semsig.answers(map, 2, (event) => semsig.showPlace(map, event.latlng));
   semsig.colours(map);
   semsig.pictureButtons(map);
   semsig.search(map, area);
@@ -153,5 +153,5 @@ semsig.furnish = (map, layers, area, credits) => {
   }
   semsig.rememberLayers(map, layers);
   semsig.rememberPlace(map);
-  semsig.rememberTold(map);
+  semsig.rememberSelection(map);
 };

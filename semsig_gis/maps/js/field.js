@@ -1,6 +1,6 @@
-// What became of the queries around every place, as colours; hatched where too few speak.
+// The share of failed queries around every place, as colours; hatched where there are few queries.
 semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
-  const step = 2;  // pixels of the screen to one of the field
+  const step = 2;  // screen pixels per pixel of the field
   const paints = colours.map((colour) =>
     Number.parseInt(`ff${colour.slice(5)}${colour.slice(3, 5)}${colour.slice(1, 3)}`, 16));
   const hatch = document.createElement("canvas");
@@ -13,14 +13,14 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
   }
   lines.stroke();
   let data = null;
-  // Between the pixels of the field around: the first of two, and the share of the second.
+  // For interpolation: the first of two neighbouring pixels, and the weight of the second.
   const crossing = (place, count) => {
     const first = Math.min(Math.max(Math.floor(place), 0), count - 2);
     return [first, Math.min(Math.max(place - first, 0), 1)];
   };
   const paint = (map) => (ctx, min, max) => {
     if (data === null) return;
-    // To pixels of the field, of which the middle of the first, in the north-west, is at 0.
+    // Convert to pixels of the field; 0 is the middle of the first, north-western pixel.
     const {scale, left, top} = semsig.frame(map, {origin: [box[0], box[3]], quantum: 1});
     const [wide, high] = [(box[2] - box[0]) / width, (box[3] - box[1]) / height];
     const [from, to] = [L.point(left, top), L.point(
@@ -34,7 +34,7 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
     const [sure, unsure] = layers.map((image) => new Uint32Array(image.data.buffer));
     const columns = Array.from({length: size[0]}, (_, right) =>
       crossing(((west + right + 0.5) * step - left) / scale / wide - 0.5, width));
-    const {values, speaking} = data;
+    const {values, weights: queryWeights} = data;
     for (let down = 0; down < size[1]; down += 1) {
       const [row, below] = crossing(
         ((north + down + 0.5) * step - top) / scale / high - 0.5, height);
@@ -43,18 +43,18 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
         const at = row * width + column[0];
         const weights = [(1 - column[1]) * (1 - below), column[1] * (1 - below),
           (1 - column[1]) * below, column[1] * below];
-        let [sum, told, said] = [0, 0, 0];
+        let [sum, weight, queries] = [0, 0, 0];
         for (let corner = 0; corner < 4; corner += 1) {
           const pixel = at + (corner & 1) + (corner >> 1) * width;
-          if (!values[pixel]) continue;  // nothing is known
+          if (!values[pixel]) continue;  // no value here
           sum += weights[corner] * values[pixel];
-          told += weights[corner];
-          said += weights[corner] * speaking[pixel];
+          weight += weights[corner];
+          queries += weights[corner] * queryWeights[pixel];
         }
-        if (told < 0.5) continue;
+        if (weight < 0.5) continue;
         let colour = paints.length - 1;
-        while (sum < breaks[colour] * told) colour -= 1;
-        (said >= enough ? sure : unsure)[down * size[0] + right] = paints[colour];
+        while (sum < breaks[colour] * weight) colour -= 1;
+        (queries >= enough ? sure : unsure)[down * size[0] + right] = paints[colour];
       }
     }
     const draw = (image) => {
@@ -63,6 +63,7 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
       picture.getContext("2d").putImageData(image, 0, 0);
       ctx.drawImage(picture, west * step, north * step, size[0] * step, size[1] * step);
     };
+    // Draw the uncertain part first and cut the hatching out of it, then the certain part.
     ctx.imageSmoothingEnabled = false;
     draw(layers[1]);
     ctx.globalCompositeOperation = "destination-out";
@@ -78,10 +79,10 @@ semsig.field = (packed, {box, width, height, breaks, colours, enough}) => {
   });
   return layer;
 };
-// A sign of a shape, given as a path around (0, 0) for a circle of radius 1.
+// A circle marker with another shape: an SVG path around (0, 0), in units of the radius.
 semsig.Sign = L.CircleMarker.extend({
   _updateBounds() {
-    const out = 1.25 * this._radius + this._clickTolerance() + 1;  // corners, and their outline
+    const out = 1.25 * this._radius + this._clickTolerance() + 1;  // corners and their outline
     this._pxBounds = L.bounds(this._point.subtract([out, out]), this._point.add([out, out]));
   },
   _updatePath() {

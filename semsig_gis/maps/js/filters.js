@@ -1,9 +1,9 @@
-// Edges of errors for the axis of a histogram, ten to a power of ten (Renard's series), in metres:
-// from 0 to beyond the largest.
+// Bin edges in metres for a histogram of errors: 0, then ten per power of ten (Renard series) up to
+// the largest error, and infinity if there are infinite errors.
 semsig.errorEdges = (errors) => {
   const finite = errors.filter((error) => Number.isFinite(error) && error > 0);
   const [low, high] = [Math.min, Math.max].map(
-    (pick) => finite.reduce((one, other) => pick(one, other), 10));
+    (pick) => finite.reduce((first, second) => pick(first, second), 10));
   const series = [1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8];
   const edges = [0];
   for (let power = low < 10 ? 1 : 10; ; power *= 10) {
@@ -17,10 +17,10 @@ semsig.metres = (metres) => {
   if (metres === Infinity) return "not localized";
   return metres < 1000 ? `${metres} m` : `${metres / 1000} km`;
 };
-// Two sliders on one line, for the least and the most of something.
+// A slider with two handles, for the smallest and the largest value of a range.
 semsig.rangeSlider = (parent, label, last, textOf, changed) => {
   const line = L.DomUtil.create("div", "semsig-range", parent);
-  const told = L.DomUtil.create("span", "semsig-range-told", line);
+  const text = L.DomUtil.create("span", "semsig-range-text", line);
   const track = L.DomUtil.create("div", "semsig-track", line);
   const sliders = [`${label}, least`, `${label}, most`].map((name, at) => {
     const slider = L.DomUtil.create("input", "", track);
@@ -29,21 +29,21 @@ semsig.rangeSlider = (parent, label, last, textOf, changed) => {
     return slider;
   });
   const range = {low: 0, high: last, last};
-  const tell = () => {
+  const showRange = () => {
     sliders.forEach((slider, at) => {
       slider.value = at ? range.high : range.low;
       slider.setAttribute("aria-valuetext", textOf(Number(slider.value), at));
     });
-    // At the right end both lie on each other, and the lower one must be free to leave.
+    // Handles at the same place: the lower one is on top in the right half, so that both can move.
     sliders[0].style.zIndex = range.low > last / 2 ? 1 : 0;
     track.style.setProperty("--low", range.low / last);
     track.style.setProperty("--high", range.high / last);
-    told.textContent = range.low === 0 && range.high === last
+    text.textContent = range.low === 0 && range.high === last
       ? `${label}: any` : `${label}: ${textOf(range.low, 0)} to ${textOf(range.high, 1)}`;
   };
   range.set = (low, high) => {
     [range.low, range.high] = [Math.max(0, Math.min(low, high)), Math.min(last, Math.max(low, high))];
-    tell();
+    showRange();
   };
   sliders.forEach((slider, at) => {
     L.DomEvent.on(slider, "input", () => {
@@ -53,10 +53,10 @@ semsig.rangeSlider = (parent, label, last, textOf, changed) => {
       changed();
     });
   });
-  tell();
+  showRange();
   return range;
 };
-// How many queries have which error, on an axis of `edges`: pale all, dark those that are chosen.
+// A histogram of errors: pale bars of all queries, dark bars of the selected ones by outcome.
 semsig.histogram = (parent, edges, outcomes, brushed) => {
   const [width, height, foot] = [270, 70, 16];
   const step = width / (edges.length - 1);
@@ -72,7 +72,7 @@ semsig.histogram = (parent, edges, outcomes, brushed) => {
   drawing.setAttribute("class", "semsig-histogram");
   drawing.setAttribute("role", "img");
   drawing.setAttribute("aria-label", "Queries by their expected error, on a logarithmic axis");
-  const beside = ["semsig-brush", "semsig-brush"].map((kind) =>
+  const shades = ["semsig-brush", "semsig-brush"].map((kind) =>
     draw("rect", {class: kind, y: 0, height, x: 0, width: 0}));
   const pale = draw("path", {class: "semsig-all"});
   const bars = outcomes.map(({colour}) => draw("path", {fill: colour}));
@@ -103,70 +103,71 @@ semsig.histogram = (parent, edges, outcomes, brushed) => {
   L.DomEvent.on(drawing, "pointerup pointercancel", () => { from = null; });
   const pathOf = (counts, below, most) => counts.reduce((path, count, bin) => {
     if (!count) return path;
-    // One query among many is seen, too.
+    // A minimum height, so that a single query is visible.
     const high = Math.max(1.5, count / most * height);
     const foot = height - below[bin] / most * height;
     return `${path}M${bin * step + 0.5},${foot.toFixed(1)}v${-high.toFixed(1)}h${
       (step - 1).toFixed(2)}v${high.toFixed(1)}z`;
   }, "");
-  return (all, chosen, low, high) => {
+  return (all, selection, low, high) => {
     const most = Math.max(1, ...all);
     const none = all.map(() => 0);
     pale.setAttribute("d", pathOf(all, none, most));
     let below = none;
-    for (const [at, counts] of chosen.entries()) {
+    for (const [at, counts] of selection.entries()) {
       bars[at].setAttribute("d", pathOf(counts, below, most));
       below = below.map((count, bin) => count + counts[bin]);
     }
-    beside[0].setAttribute("width", low * step);
-    beside[1].setAttribute("x", high * step);
-    beside[1].setAttribute("width", width - high * step);
+    shades[0].setAttribute("width", low * step);
+    shades[1].setAttribute("x", high * step);
+    shades[1].setAttribute("width", width - high * step);
   };
 };
-// What of the selection a file holds, by the names of its columns.
+// Columns of the files of selected queries: functions of the index of a query.
 semsig.queryColumns = ({data, about, placeOf}) => ({
-  query: (one) => one + 1,
-  outcome: (one) => about.outcomes[data.outcome[one]].name,
-  error_m: (one) => (Number.isFinite(data.error[one]) ? data.error[one] : null),
-  [about.chance.column]: (one) => data.chance[one] / 100,
-  objects_seen: (one) => data.length[one],
-  types: (one) => data.types[one],
-  query_types: (one) => data.asked[one],
-  cell_id: (one) => data.cells[one],
-  best_cell_id: (one) => data.bestCells[one],
-  longitude: (one) => placeOf(one)[1],
-  latitude: (one) => placeOf(one)[0],
+  query: (query) => query + 1,
+  outcome: (query) => about.outcomes[data.outcome[query]].name,
+  error_m: (query) => (Number.isFinite(data.error[query]) ? data.error[query] : null),
+  [about.chance.column]: (query) => data.chance[query] / 100,
+  objects_seen: (query) => data.length[query],
+  types: (query) => data.types[query],
+  query_types: (query) => data.asked[query],
+  cell_id: (query) => data.cells[query],
+  best_cell_id: (query) => data.bestCells[query],
+  longitude: (query) => placeOf(query)[1],
+  latitude: (query) => placeOf(query)[0],
 });
 semsig.files = {
   csv(columns, rows) {
-    // No text may be taken for a formula.
+    // A quote before characters that a spreadsheet would read as the start of a formula.
     const field = (value) => (typeof value !== "string" ? String(value ?? "")
       : `"${value.replaceAll('"', '""').replace(/^[=+\-@'\t\r]/, "'$&")}"`);
-    const lines = rows.map((one) => Object.values(columns).map((of) => field(of(one))).join(","));
+    const lines = rows.map(
+      (query) => Object.values(columns).map((of) => field(of(query))).join(","));
     return ["text/csv", [Object.keys(columns).join(","), ...lines, ""].join("\r\n")];
   },
   geojson({longitude, latitude, ...columns}, rows) {
-    const features = rows.map((one) => ({
+    const features = rows.map((query) => ({
       type: "Feature",
-      geometry: {type: "Point", coordinates: [longitude(one), latitude(one)]},
+      geometry: {type: "Point", coordinates: [longitude(query), latitude(query)]},
       properties: Object.fromEntries(
-        Object.entries(columns).map(([name, of]) => [name, of(one)])),
+        Object.entries(columns).map(([name, of]) => [name, of(query)])),
     }));
     return ["application/geo+json", JSON.stringify({type: "FeatureCollection", features})];
   },
 };
-// A box to choose which queries are drawn: by outcome, error, objects seen, class and chance.
+// A box to select the queries that are drawn: by outcome, error, objects seen, class and chance.
 semsig.filters = async (map, key) => {
   const box = L.DomUtil.create("details", "semsig-filters");
-  const told = L.DomUtil.create("summary", "", box);
-  told.setAttribute("aria-live", "polite");
+  const summary = L.DomUtil.create("summary", "", box);
+  summary.setAttribute("aria-live", "polite");
   box.open = !semsig.small.matches && !document.querySelector(".semsig-filters[open]");
   L.DomEvent.disableClickPropagation(box);
   L.DomEvent.disableScrollPropagation(box);
   const control = L.control({position: "topright"});
   control.onAdd = () => box;
   control.addTo(map);
-  const set = await semsig.held[key].ready;
+  const set = await semsig.layerSets[key].ready;
   const {data, about, layers} = set;
   const {outcomes} = about;
   const number = (value) => value.toLocaleString("en");
@@ -175,7 +176,7 @@ semsig.filters = async (map, key) => {
   const bins = Uint8Array.from(data.error, (error) =>
     Math.max(0, edges.findIndex((edge) => error <= edge) - 1));
   const lengths = Math.max(1, ...data.length);
-  const drawn = semsig.histogram(box, edges, outcomes, (low, high) => {
+  const drawHistogram = semsig.histogram(box, edges, outcomes, (low, high) => {
     error.set(low, high);
     changed();
   });
@@ -199,7 +200,7 @@ semsig.filters = async (map, key) => {
     });
     return input;
   });
-  const seen = semsig.rangeSlider(box, "Objects seen", lengths, String, () => changed());
+  const lengthRange = semsig.rangeSlider(box, "Objects seen", lengths, String, () => changed());
   const chance = semsig.rangeSlider(
     box, about.chance.label, 20, (at) => `${5 * at} %`, () => changed());
   const label = L.DomUtil.create("label", "semsig-class", box);
@@ -214,11 +215,11 @@ semsig.filters = async (map, key) => {
   L.DomEvent.on(select, "change", () => changed());
   const foot = L.DomUtil.create("div", "semsig-download", box);
   const button = (text, title, act) => {
-    const one = semsig.text(foot, "button", text);
-    Object.assign(one, {type: "button", title});
-    L.DomEvent.on(one, "click", act);
+    const element = semsig.text(foot, "button", text);
+    Object.assign(element, {type: "button", title});
+    L.DomEvent.on(element, "click", act);
   };
-  const ranges = {error, seen, chance};
+  const ranges = {error, seen: lengthRange, chance};
   button("All", "Select all queries", () => {
     for (const range of Object.values(ranges)) range.set(0, range.last);
     select.value = "";
@@ -234,26 +235,28 @@ semsig.filters = async (map, key) => {
   const inside = ({low, high, last}, value) =>
     (low === 0 || value >= low) && (high === last || value <= high);
   const show = () => {
-    const [all, chosen] = [[null], outcomes].map(
+    const [all, counts] = [[null], outcomes].map(
       (parts) => parts.map(() => new Array(edges.length - 1).fill(0)));
     const selected = outcomes.map(() => 0);
     const on = outcomes.map((_, at) => map.hasLayer(layers[at]));
     const symbol = select.value;
-    for (let one = 0; one < count; one += 1) {
-      const [bin, outcome] = [bins[one], data.outcome[one]];
-      const others = inside(seen, data.length[one]) && inside(chance, data.chance[one] / 5)
-        && (symbol === "" || data.types[one].includes(symbol));
-      set.chosen[one] = others && bin >= error.low && bin < error.high ? 1 : 0;
+    for (let query = 0; query < count; query += 1) {
+      const [bin, outcome] = [bins[query], data.outcome[query]];
+      // The histogram shows the queries that pass the other filters.
+      const others = inside(lengthRange, data.length[query])
+        && inside(chance, data.chance[query] / 5)
+        && (symbol === "" || data.types[query].includes(symbol));
+      set.selected[query] = others && bin >= error.low && bin < error.high ? 1 : 0;
       all[0][bin] += 1;
       if (!others || !on[outcome]) continue;
-      chosen[outcome][bin] += 1;
-      selected[outcome] += set.chosen[one];
+      counts[outcome][bin] += 1;
+      selected[outcome] += set.selected[query];
     }
     boxes.forEach((input, at) => { input.checked = on[at]; });
-    drawn(all[0], chosen, error.low, error.high);
-    const sum = selected.reduce((one, other) => one + other);
+    drawHistogram(all[0], counts, error.low, error.high);
+    const sum = selected.reduce((first, second) => first + second);
     const failed = selected[outcomes.findIndex(({name}) => name === "failed")];
-    told.textContent = `${sum < count ? `${number(sum)} of ` : ""}${number(count)} queries, ${
+    summary.textContent = `${sum < count ? `${number(sum)} of ` : ""}${number(count)} queries, ${
       number(failed)} failed`;
     set.redraw();
     map.fire("semsig-selection", {key, count: sum, failed});
@@ -264,7 +267,7 @@ semsig.filters = async (map, key) => {
   };
   map.on("layeradd layerremove", ({layer}) => { if (layers.includes(layer)) show(); });
   show();
-  // As `error:50~1000,class:D`; an end that is left out is free.
+  // The state in the address, such as `error:50~1000,class:D`; a missing end is not limited.
   const units = {error: (at) => edges[at], seen: (at) => at, chance: (at) => 5 * at};
   const read = () => {
     const parts = Object.entries(ranges).filter(([, {low, high, last}]) => low || high < last).map(
@@ -278,7 +281,7 @@ semsig.filters = async (map, key) => {
     for (const [name, range] of Object.entries(ranges)) {
       const [low, high] = (parts[name] || "").split("~").map((end) => {
         const at = [...new Array(range.last + 1).keys()].find(
-          (one) => end && units[name](one) === Number(end));
+          (index) => end && units[name](index) === Number(end));
         return at;
       });
       range.set(low ?? 0, high ?? range.last);

@@ -1,17 +1,17 @@
-// Streets and buildings, on the images of cells and below all else.
+// Streets and buildings, above the images of cells and below all other layers.
 semsig.ground = (packed, about) => {
   const chunk = 64;
   const kinds = {};
   let layer = null;
-  // Streets by their names: a line runs on from each of its points.
+  // Adds the streets to the search; returns a function that shows the street of a name.
   const nameStreets = (data) => {
     const plain = data.names.map(semsig.plain);
     const placeOf = (at) => L.CRS.EPSG3857.unproject(L.point(
       about.origin[0] + data.x[at] * about.quantum, about.origin[1] + data.y[at] * about.quantum));
     const linesOf = (street) => {
       const lines = [];
-      data.called.forEach((one, shape) => {
-        if (one !== street) return;
+      data.called.forEach((name, shape) => {
+        if (name !== street) return;
         const line = [];
         for (let at = data.firsts[shape]; at < data.firsts[shape + 1]; at += 1) {
           line.push(placeOf(at));
@@ -23,19 +23,20 @@ semsig.ground = (packed, about) => {
     const show = (map, street) => {
       const lines = linesOf(street);
       const bounds = L.latLngBounds(lines.flat());
-      const longest = lines.reduce((one, other) => (other.length > one.length ? other : one));
+      const longest = lines.reduce((best, line) => (line.length > best.length ? line : best));
       const place = longest[longest.length >> 1];
       map.fitBounds(bounds, {maxZoom: 17, animate: false});
       const at = [place.lat, place.lng];
       const area = map.semsigArea;
       const facts = semsig.whereabouts(area, at, area && semsig.xy(area, at));
-      const box = semsig.details(data.names[street], facts.map((one) => one[0]),
-        facts.map((one) => one[1]), {});
+      const box = semsig.details(data.names[street], facts.map((fact) => fact[0]),
+        facts.map((fact) => fact[1]), {});
       semsig.show(map, box, place, {
         corners: [bounds.getSouthWest(), bounds.getNorthEast()],
         key: `street:${data.names[street]}`,
         drawn: L.polyline(lines, {
-          pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 6, opacity: 0.7}),
+          pane: "shadowPane", interactive: false, color: semsig.highlight, weight: 6,
+          opacity: 0.7}),
       });
     };
     semsig.finders.push((words, limit) => semsig.matches(plain, words, limit).map(
@@ -63,12 +64,13 @@ semsig.ground = (packed, about) => {
       return data;
     });
     if (!arrays.names) continue;
-    const named = ready.then(nameStreets);
+    const streets = ready.then(nameStreets);
     semsig.addOpener("street", (map, name) => {
-      named.then((tell) => tell(map, name));
+      streets.then((showStreet) => showStreet(map, name));
       return true;
     });
   }
+  // Draws lines or polygons that are in view; blocks of shapes out of view are skipped as a whole.
   const draw = (ctx, data, frame, min, max, closed) => {
     const {scale, left, top} = frame;
     const outside = (boxes, at) => boxes[at + 2] * scale + left < min.x
@@ -83,6 +85,7 @@ semsig.ground = (packed, about) => {
         if (outside(data.shapes, box)) continue;
         const wide = (data.shapes[box + 2] - data.shapes[box]) * scale;
         const high = (data.shapes[box + 3] - data.shapes[box + 1]) * scale;
+        // Tiny buildings become rectangles, points closer than a pixel are skipped.
         if (closed && wide < 2 && high < 2) {
           ctx.rect(data.shapes[box] * scale + left, top - data.shapes[box + 3] * scale,
             Math.max(wide, 0.6), Math.max(high, 0.6));

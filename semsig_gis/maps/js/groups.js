@@ -8,31 +8,31 @@ semsig.cellFacts.groups = (city, cell) => {
     }
     return true;
   };
-  const alike = [];
-  const twins = [];
+  const sameTypes = [];
+  const sameLevels = [];
   let start = 0;
   for (let other = 0; other < city.count; other += 1) {
     const end = ends[other];
     if (end - start === to - from && equal(types, start)) {
-      alike.push(other);
-      if (equal(levels, start)) twins.push(other);
+      sameTypes.push(other);
+      if (equal(levels, start)) sameLevels.push(other);
     }
     start = end;
   }
   const byDistance = (cells) => cells.filter((other) => other !== cell)
     .map((other) => [city.metres(cell, other), other])
-    .sort((one, two) => one[0] - two[0]).map((one) => one[1]);
+    .sort((first, second) => first[0] - second[0]).map((entry) => entry[1]);
   const jumps = (label, cells) => {
     const at = cells.indexOf(cell);
-    const beside = (step) => cells[(at + step + cells.length) % cells.length];
+    const neighbour = (step) => cells[(at + step + cells.length) % cells.length];
     const number = (value) => value.toLocaleString("en");
     return [
       [`${label}: ${number(at + 1)} of ${number(cells.length)}`,
-        [["\u2039", beside(-1), "previous, from the west"],
-          ["\u203a", beside(1), "next, from the west"]]],
+        [["\u2039", neighbour(-1), "previous, from the west"],
+          ["\u203a", neighbour(1), "next, from the west"]]],
     ];
   };
-  // The nearest ones, and some from everywhere.
+  // The nearest cells, and an even sample of the others.
   const drawn = (sorted) => sorted.filter(
     (_, at) => at < grid.near || at % Math.ceil(sorted.length / grid.dots) === 0);
   const facts = {
@@ -40,28 +40,28 @@ semsig.cellFacts.groups = (city, cell) => {
     rows: [["It sees", city.signature("now", cell)]],
     jumps: [],
     dots: [],
-    alike: [],
+    lookalikes: [],
     kind: "cells",
   };
   for (const [label, cells, colour] of [
-    ["Same types", alike, grid.colours[0]],
-    ["Types and angle levels", twins, grid.colours[1]],
-  ].slice(0, alike.length)) {
+    ["Same types", sameTypes, grid.colours[0]],
+    ["Types and angle levels", sameLevels, grid.colours[1]],
+  ].slice(0, sameTypes.length)) {
     if (cells.length === 1) {
       facts.rows.push([label, "no other cell"]);
     } else {
       const sorted = byDistance(cells);
       facts.jumps.push(...jumps(label, cells));
       const same = label.toLowerCase();
-      facts.alike.unshift(
+      facts.lookalikes.unshift(
         [sorted[0], `${same}, the nearest`],
         ...sorted.slice(1).slice(-1).map((other) => [other, `${same}, the farthest`]),
         ...sorted.slice(1, -1).slice(0, 1).map((other) => [other, `${same}, the next`]));
-      facts.dots.push(...drawn(sorted).reverse().map((one) => [one, colour]));
+      facts.dots.push(...drawn(sorted).reverse().map((other) => [other, colour]));
     }
   }
-  if (facts.alike.length < 3) {
-    facts.alike.push(...city.mostAlike("now", cell, 6).map(
+  if (facts.lookalikes.length < 3) {
+    facts.lookalikes.push(...city.mostSimilar("now", cell, 6).map(
       ([other, count]) => [other, count === 0 ? "the same objects, in another order"
         : count === 1 ? "1 object more or less" : `${count} objects more or less`]));
   }

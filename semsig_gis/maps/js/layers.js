@@ -1,13 +1,13 @@
 window.semsig = {
-  // Fields that say what a thing is called; the search knows it by them, too.
+  // Fields with names of an object; the search finds it by their values.
   naming: new Set(["Class", "Class before", "Seen as", "Street object", "Identifier"]),
-  layers: 0,  // of points, so far
-  pointed: "#7733ff",  // colour of what is pointed at, on whatever it lies
+  layers: 0,  // number of point layers
+  highlight: "#7733ff",  // colour of the selected object, visible on all backgrounds
   points(fields, titles, records, shape) {
     const group = L.featureGroup();
     const markers = [];
     const layer = semsig.layers++;
-    // By its number, where it has one.
+    // Key of a record in the address: its kind and number, or its position in this layer.
     const keyOf = (at) => {
       const [, kind, number] = /^(\w+) (\d[\d,]*)/.exec(records[at][3]) || [];
       return kind ? `${kind.toLowerCase()}:${number.replaceAll(",", "")}` : `sign:${layer}/${at}`;
@@ -39,7 +39,7 @@ window.semsig = {
       outline();
     });
     group.on("remove", () => group._map.off("semsig-colours", outline));
-    const tell = (map, at) => {
+    const showRecord = (map, at) => {
       semsig.reveal(map, group, markers[at].getLatLng());
       markers[at].fire("click");
     };
@@ -57,24 +57,24 @@ window.semsig = {
     const hint = (values) => [...new Set(named.map((at) => values[at]))].filter(Boolean).join(", ");
     let names = null;
     semsig.finders.push((words, limit) => {
-      // What has a number is called by it alone, too.
+      // The number in a name is a name too.
       names = names || records.map(([, , , name, values]) => semsig.plain(
         [name, /\d[\d,]*/.exec(name), ...named.map((at) => values[at])].join("\n")));
       return semsig.matches(names, words, limit).map(({rank, at}) => ({
         rank,
         name: records[at][3],
         hint: hint(records[at][4]),
-        show: (map) => tell(map, at),
+        show: (map) => showRecord(map, at),
       }));
     });
     return group;
   },
-  // What joins a sign to the places found for it, the best first.
+  // Lines and circles that connect a sign with its estimated places, the best first.
   hint(place, places) {
-    const look = {pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 2};
+    const look = {pane: "shadowPane", interactive: false, color: semsig.highlight, weight: 2};
     return L.layerGroup([
       L.polyline([place, places[0]], {...look, dashArray: "5 5"}),
-      ...places.map((one, at) => L.circleMarker(one, {
+      ...places.map((other, at) => L.circleMarker(other, {
         ...look, radius: at ? 5 : 8, weight: at ? 1 : 2, fill: false,
       })),
     ]);
@@ -84,13 +84,13 @@ window.semsig = {
       pane: "shadowPane", interactive: false, weight: 1, opacity: 0.6, ...look,
     })));
   },
-  // One of the layers may be in several groups: the first is below in each.
+  // A layer may be in several groups; the first layer of a group lies below the others.
   together(...layers) {
     const group = L.layerGroup(layers);
     group.setZIndex = () => group;
     return group;
   },
-  // The layer control in groups. Cells have one colour at a time, or none.
+  // The layer control in groups; only one layer of the group "cells" is on at a time.
   layerGroups(map, control, titles, groups) {
     const rankOf = ({name}) => [...Object.keys(titles), undefined].indexOf(groups[name]);
     const nothing = {layer: L.layerGroup(), name: "Nothing"};
@@ -101,7 +101,7 @@ window.semsig = {
       if (!colours.some(({layer}) => map.hasLayer(layer))) map.addLayer(nothing.layer);
       colours.push(nothing);
     }
-    control._layers.sort((one, other) => rankOf(one) - rankOf(other));
+    control._layers.sort((first, second) => rankOf(first) - rankOf(second));
     control._addItem = (item) => {
       const label = L.Control.Layers.prototype._addItem.call(control, item);
       const group = groups[item.name];
@@ -122,8 +122,8 @@ window.semsig = {
       return label;
     };
     map.on("overlayadd", ({layer}) => {
-      if (!colours.some((one) => one.layer === layer)) return;
-      for (const one of colours) if (one.layer !== layer) map.removeLayer(one.layer);
+      if (!colours.some((entry) => entry.layer === layer)) return;
+      for (const entry of colours) if (entry.layer !== layer) map.removeLayer(entry.layer);
     });
     control.remove().addTo(map);
   },
@@ -139,14 +139,14 @@ window.semsig = {
   legend(map, text, view, zoom) {
     const box = L.DomUtil.create("details", "semsig-legend");
     box.open = !semsig.small.matches && !document.querySelector(".semsig-legend[open]");
-    box.setAttribute("name", "semsig-legend");  // one is open at a time
+    box.setAttribute("name", "semsig-legend");  // only one legend is open at a time
     box.innerHTML = text;
     L.DomEvent.disableClickPropagation(box);
     L.DomEvent.disableScrollPropagation(box);
     const control = L.control({position: "bottomleft"});
     control.onAdd = () => box;
     control.addTo(map);
-    // Cells have edges from near, and melt into each other from afar.
+    // At high zoom cells are drawn with sharp edges, else interpolated.
     const close = () => map.getContainer().classList.toggle("semsig-close", map.getZoom() > 16);
     map.on("zoomend", close);
     close();

@@ -13,10 +13,11 @@ semsig.cellFacts.lookalikes = (city, cell) => {
     ["Looks like", "about " + like.toLocaleString("en") + (like === 1 ? " cell (" : " cells (")
       + bits.toFixed(1) + " bits are left)"],
   ];
-  const alike = [];
+  const lookalikes = [];
   for (let at = cell * grid.places; at < (cell + 1) * grid.places; at += 1) {
     const other = data.lookalikes[at];
-    if (other >= 0) alike.push([other, `taken for it: ${percent(data.lookalikeChances[at])}`]);
+    const chance = percent(data.lookalikeChances[at]);
+    if (other >= 0) lookalikes.push([other, `mistaken for it: ${chance}`]);
   }
   const helpers = [];
   for (let at = cell * grid.helpers; at < (cell + 1) * grid.helpers; at += 1) {
@@ -24,5 +25,5 @@ semsig.cellFacts.lookalikes = (city, cell) => {
     if (gain >= 1) helpers.push(`${grid.classes[data.helpers[at]]} +${Math.round(gain)} %`);
   }
   if (helpers.length) rows.push(["Helped by", helpers.join(", ")]);
-  return {title: "A query from here", rows, alike};
+  return {title: "A query from here", rows, lookalikes};
 };

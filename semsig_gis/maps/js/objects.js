@@ -1,27 +1,28 @@
-semsig.held = {};
-// Street objects of all classes on one canvas; `classLayer` switches a class on and off.
+// Layers of street objects or queries by the key of their data.
+semsig.layerSets = {};
+// Street objects of all classes on one canvas; `classLayer` returns the layer of one class.
 semsig.streetObjects = (key, packed, about) => {
   const {classes, sources, fields} = about;
-  const shown = new Set();
+  const visible = new Set();
   const chunk = 256;
   let data = null;
   let board = null;
   let layers = [];
-  let silence = null;
+  let stopAnswering = null;
   const sprites = {};
   const ready = semsig.arrays(packed).then((arrays) => {
     data = arrays;
-    for (const one of classes) {
+    for (const item of classes) {
       const starts = [];
-      for (let at = one.start; at < one.end; at += chunk) starts.push(at);
-      starts.push(one.end);
-      one.starts = starts;
-      one.boxes = semsig.blocks(data.x, data.y, starts);
+      for (let at = item.start; at < item.end; at += chunk) starts.push(at);
+      starts.push(item.end);
+      item.starts = starts;
+      item.boxes = semsig.blocks(data.x, data.y, starts);
     }
     data.names = data.ids.map(semsig.plain);
     if (board) board.redraw();
   });
-  // What is near enough to be told apart has its shape, and from nearer its letter.
+  // Radius of signs by zoom; large signs show the shape of the class, the largest its letter.
   const sizes = [[12, 1], [13.5, 1.5], [15, 2.2], [16.5, 4], [17.5, 6], [19, 8], [Infinity, 10]];
   const sizeAt = (zoom) => sizes.find(([below]) => zoom < below)[1];
   const spriteOf = (number, size, dark, dots) => {
@@ -47,17 +48,17 @@ semsig.streetObjects = (key, packed, about) => {
     });
     return sprites[name];
   };
-  // Calls back for the objects of a class that are in a box of pixels.
+  // Calls a function with each object of a class in a box of pixels.
   const within = (frame, {starts, boxes}, min, max, call) => {
     const {scale, left, top} = frame;
     for (let block = 0; block + 1 < starts.length; block += 1) {
       const at = 4 * block;
       if (boxes[at + 2] * scale + left < min.x || boxes[at] * scale + left > max.x
         || top - boxes[at + 1] * scale < min.y || top - boxes[at + 3] * scale > max.y) continue;
-      for (let one = starts[block]; one < starts[block + 1]; one += 1) {
-        const x = data.x[one] * scale + left;
-        const y = top - data.y[one] * scale;
-        if (x >= min.x && x <= max.x && y >= min.y && y <= max.y) call(x, y, one);
+      for (let object = starts[block]; object < starts[block + 1]; object += 1) {
+        const x = data.x[object] * scale + left;
+        const y = top - data.y[object] * scale;
+        if (x >= min.x && x <= max.x && y >= min.y && y <= max.y) call(x, y, object);
       }
     }
   };
@@ -66,44 +67,45 @@ semsig.streetObjects = (key, packed, about) => {
     semsig.stamped(ctx, min, max, (dots, stamp) => {
       const size = sizeAt(map.getZoom());
       for (const number of about.order) {
-        if (!shown.has(number)) continue;
+        if (!visible.has(number)) continue;
         const sprite = spriteOf(number, size, semsig.isDark(map), dots);
         const frame = semsig.frame(map, about);
         within(frame, classes[number], min, max, (x, y) => stamp(sprite, x, y));
       }
     });
   };
-  const placeOf = (one) => L.CRS.EPSG3857.unproject(L.point(
-    about.origin[0] + data.x[one] * about.quantum, about.origin[1] + data.y[one] * about.quantum));
-  const classOf = (one) => classes.findIndex(({start, end}) => start <= one && one < end);
-  // The number of the layer, if there are several, and of the object.
-  const keyOf = (one) => `${key.replace("objects", "")}/${one}`;
-  const tell = (map, one) => {
-    const {title, symbol} = classes[classOf(one)];
-    const place = placeOf(one);
+  const placeOf = (object) => L.CRS.EPSG3857.unproject(L.point(
+    about.origin[0] + data.x[object] * about.quantum,
+    about.origin[1] + data.y[object] * about.quantum));
+  const classOf = (object) => classes.findIndex(({start, end}) => start <= object && object < end);
+  // The key in the address: number of the layer, if there are several, and index of the object.
+  const keyOf = (object) => `${key.replace("objects", "")}/${object}`;
+  const showObject = (map, object) => {
+    const {title, symbol} = classes[classOf(object)];
+    const place = placeOf(object);
     const values = [
-      `${symbol} ${title}`, sources[data.source[one]], data.ids[one],
-      data.count[one] > 1 ? `${data.count[one]} rows of its source` : null,
-      data.merged[one] || null,
+      `${symbol} ${title}`, sources[data.source[object]], data.ids[object],
+      data.count[object] > 1 ? `${data.count[object]} rows of its source` : null,
+      data.merged[object] || null,
       `${place.lat.toFixed(6)}, ${place.lng.toFixed(6)}`,
     ];
     const mark = L.circleMarker(place, {pane: "shadowPane", interactive: false, fill: false,
-      radius: 13, color: semsig.pointed, weight: 3});
+      radius: 13, color: semsig.highlight, weight: 3});
     semsig.show(map, semsig.details(title, fields, values, {}), place, {
-      key: `object:${keyOf(one)}`, drawn: mark,
+      key: `object:${keyOf(object)}`, drawn: mark,
     });
   };
   semsig.addOpener("object", (map, rest) => {
-    const [layer, one] = rest.split("/");
-    const number = Number(one);
-    const known = `objects${layer}` === key && classOf(number) >= 0;
-    if (known) {
+    const [layer, object] = rest.split("/");
+    const number = Number(object);
+    const exists = `objects${layer}` === key && classOf(number) >= 0;
+    if (exists) {
       ready.then(() => {
         map.addLayer(layers[classOf(number)]);
-        tell(map, number);
+        showObject(map, number);
       });
     }
-    return known;
+    return exists;
   });
   const answer = (map) => (event) => {
     if (data === null) return false;
@@ -111,31 +113,31 @@ semsig.streetObjects = (key, packed, about) => {
     const frame = semsig.frame(map, about);
     const reach = Math.max(10, sizeAt(map.getZoom()));
     let [best, least] = [-1, reach ** 2];
-    for (const number of shown) {
+    for (const number of visible) {
       within(frame, classes[number], point.subtract([reach, reach]), point.add([reach, reach]),
-        (x, y, one) => {
+        (x, y, object) => {
           const away = (x - point.x) ** 2 + (y - point.y) ** 2;
-          if (away <= least) [best, least] = [one, away];
+          if (away <= least) [best, least] = [object, away];
         });
     }
-    if (best >= 0) tell(map, best);
+    if (best >= 0) showObject(map, best);
     return best >= 0;
   };
   const layerOf = (number) => {
     const layer = new L.Layer();
     layer.onAdd = (map) => {
-      if (!shown.size) {
+      if (!visible.size) {
         board = semsig.board(map, "overlayPane", paint(map));
-        silence = semsig.answers(map, 0, answer(map));
+        stopAnswering = semsig.answers(map, 0, answer(map));
       }
-      shown.add(number);
+      visible.add(number);
       board.redraw();
     };
     layer.onRemove = () => {
-      shown.delete(number);
+      visible.delete(number);
       board.redraw();
-      if (!shown.size) {
-        silence();
+      if (!visible.size) {
+        stopAnswering();
         board.remove();
       }
     };
@@ -145,7 +147,7 @@ semsig.streetObjects = (key, packed, about) => {
     if (data === null) return [];
     const titles = semsig.matches(classes.map(({title}) => semsig.plain(title)), words, limit);
     const byTitle = titles.map(({rank, at: number}) => ({
-      rank: rank - 0.5,  // before what is of this class
+      rank: rank - 0.5,  // before the objects of this class
       name: classes[number].title,
       hint: `all ${(classes[number].end - classes[number].start).toLocaleString("en")}`,
       show: (map) => {
@@ -160,21 +162,21 @@ semsig.streetObjects = (key, packed, about) => {
         map.fitBounds(L.latLngBounds([[0, 1, Math.min], [2, 3, Math.max]].map(
           ([x, y, pick]) => L.CRS.EPSG3857.unproject(L.point(
             origin[0] + edge(x, pick), origin[1] + edge(y, pick))))), {maxZoom: 18});
-        if (end - start === 1) tell(map, start);
+        if (end - start === 1) showObject(map, start);
       },
     }));
-    const byId = semsig.matches(data.names, words, limit).map(({rank, at: one}) => ({
+    const byId = semsig.matches(data.names, words, limit).map(({rank, at: object}) => ({
       rank,
-      name: data.ids[one],
-      hint: `${classes[classOf(one)].title}, ${sources[data.source[one]]}`,
+      name: data.ids[object],
+      hint: `${classes[classOf(object)].title}, ${sources[data.source[object]]}`,
       show: (map) => {
-        semsig.reveal(map, layers[classOf(one)], placeOf(one));
-        tell(map, one);
+        semsig.reveal(map, layers[classOf(object)], placeOf(object));
+        showObject(map, object);
       },
     }));
     return [...byTitle, ...byId];
   });
   layers = classes.map((_, number) => layerOf(number));
-  semsig.held[key] = layers;
+  semsig.layerSets[key] = layers;
 };
-semsig.classLayer = (key, number) => semsig.held[key][number];
+semsig.classLayer = (key, number) => semsig.layerSets[key][number];

@@ -3,13 +3,13 @@ semsig.text = (parent, tag, text) => {
   part.textContent = text;
   return part;
 };
-// Whether the keyboard was used last, and not a mouse or a finger.
+// Whether the last input came from the keyboard, not from a mouse or a finger.
 semsig.keyed = false;
 for (const kind of ["keydown", "pointerdown"]) {
   document.addEventListener(kind, () => { semsig.keyed = kind === "keydown"; }, true);
 }
-// The panel of a map, beside it or, on a narrow screen, below it. Closed, it stays as an empty
-// element, so that what comes into it is read out.
+// The panel of a map, at its right side or, on a narrow screen, below it. A closed panel stays in
+// the page as an empty element, so that screen readers read its new content.
 semsig.panel = (map) => {
   if (map.semsigPanel) return map.semsigPanel;
   const container = map.getContainer();
@@ -18,13 +18,13 @@ semsig.panel = (map) => {
     {role: "region", "aria-label": "About this place", "aria-live": "polite",
       tabindex: "-1"})) panel.setAttribute(name, value);
   L.DomEvent.disableClickPropagation(panel);
-  // Leaflet asks what is around a button, which may be gone by then.
+  // Leaflet looks up the parents of a clicked button, which may be removed by then.
   L.DomEvent.on(panel, "click", L.DomEvent.stopPropagation);
   L.DomEvent.disableScrollPropagation(panel);
   L.DomEvent.on(container, "keydown", (event) => {
     if (event.key === "Escape" && !event.target.matches("input")) semsig.hide(map);
   });
-  map.semsigPanel = {panel, told: null};
+  map.semsigPanel = {panel, selection: null};
   map.on("resize", () => semsig.uncover(map));
   return map.semsigPanel;
 };
@@ -35,7 +35,7 @@ semsig.panelHead = (map, panel, title) => {
   semsig.mapButton(head, "semsig-copy", "", what, () => semsig.copy(map))
     .append(semsig.icon("M7 7h10v10h-10zM4 13h-1v-10h10v1"));
   semsig.mapButton(head, "semsig-hide", "", "Close", () => semsig.hide(map));
-  // A swipe: down where the panel is below the map, to the right where it is beside it.
+  // A swipe closes the panel: down if it is below the map, else to the right.
   let from = null;
   const moved = (event) => Math.max(0, semsig.isSheet(map, panel)
     ? event.clientY - from.clientY : event.clientX - from.clientX);
@@ -59,15 +59,15 @@ semsig.panelHead = (map, panel, title) => {
   return head;
 };
 semsig.isSheet = (map, panel) => panel.offsetWidth >= map.getSize().x;
-// Moves the map so that what is told of is seen beside the panel and, where there is room, beside
+// Moves the map so that the selected object is not covered by the panel nor, if there is room, by
 // the other boxes.
 semsig.uncover = (map) => {
-  const {panel, told} = map.semsigPanel;
-  if (told === null) return;
+  const {panel, selection} = map.semsigPanel;
+  if (selection === null) return;
   const size = map.getSize();
   const low = L.point(10, 10);
   const high = size.subtract([10, 10]);
-  map.getContainer().style.setProperty("--told", `${panel.offsetHeight}px`);
+  map.getContainer().style.setProperty("--panel-height", `${panel.offsetHeight}px`);
   if (semsig.isSheet(map, panel)) {
     high.y -= panel.offsetHeight;
     const tops = [...map.getContainer().querySelectorAll(".leaflet-top")];
@@ -78,10 +78,10 @@ semsig.uncover = (map) => {
     low.x = left;
     high.x = size.x - panel.offsetWidth - right;
   }
-  const whole = L.bounds([told.place, ...(told.corners || [])].map(
-    (one) => map.latLngToContainerPoint(one)));
+  const whole = L.bounds([selection.place, ...(selection.corners || [])].map(
+    (corner) => map.latLngToContainerPoint(corner)));
   const room = high.subtract(low);
-  const middle = map.latLngToContainerPoint(told.place);
+  const middle = map.latLngToContainerPoint(selection.place);
   const {min, max} = ["x", "y"].every((axis) => whole.getSize()[axis] <= room[axis] - 60)
     ? whole : L.bounds([middle]);
   const shift = (axis) => Math.min(0, min[axis] - low[axis] - 30)
@@ -90,59 +90,60 @@ semsig.uncover = (map) => {
   const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
   if (offset.x || offset.y) map.panBy(offset, {animate: !still});
 };
-// Tells of a place: `corners` shall be in view, too; `drawn` is on the map meanwhile; by its `key`
-// it is told of again.
+// Opens the panel for a place. `corners` should be in view as well, `drawn` stays on the map while
+// the panel is open, and `key` restores the panel from the address.
 semsig.show = (map, box, place, {corners, key = null, drawn} = {}) => {
-  const held = semsig.panel(map);
-  const inside = held.panel.contains(document.activeElement);
-  for (const layer of held.told?.layers ?? []) layer.remove();
+  const state = semsig.panel(map);
+  const inside = state.panel.contains(document.activeElement);
+  for (const layer of state.selection?.layers ?? []) layer.remove();
   const lights = box.querySelector(".semsig-scenes")?.semsigLights(map);
   const layers = [drawn, lights].filter(Boolean);
-  held.told = {place: L.latLng(place), corners, key, layers};
+  state.selection = {place: L.latLng(place), corners, key, layers};
   for (const layer of layers) layer.addTo(map);
   const title = box.querySelector("h2");
-  held.panel.replaceChildren(semsig.panelHead(map, held.panel, title), box);
-  map.getContainer().classList.add("semsig-told");
-  if (inside || semsig.keyed) held.panel.focus({preventScroll: true});
+  state.panel.replaceChildren(semsig.panelHead(map, state.panel, title), box);
+  map.getContainer().classList.add("semsig-panel-open");
+  if (inside || semsig.keyed) state.panel.focus({preventScroll: true});
   semsig.uncover(map);
-  map.fire("semsig-told", {key, place: held.told.place});
+  map.fire("semsig-panel", {key, place: state.selection.place});
 };
 semsig.hide = (map) => {
-  const held = semsig.panel(map);
-  if (held.told === null) return;
-  const inside = held.panel.contains(document.activeElement);
-  for (const layer of held.told.layers) layer.remove();
-  held.told = null;
-  held.panel.replaceChildren();
-  map.getContainer().classList.remove("semsig-told");
+  const state = semsig.panel(map);
+  if (state.selection === null) return;
+  const inside = state.panel.contains(document.activeElement);
+  for (const layer of state.selection.layers) layer.remove();
+  state.selection = null;
+  state.panel.replaceChildren();
+  map.getContainer().classList.remove("semsig-panel-open");
   if (inside) map.getContainer().focus({preventScroll: true});
-  map.fire("semsig-told", {key: null, place: null});
+  map.fire("semsig-panel", {key: null, place: null});
 };
-// What tells again of things of a kind, beside what does so already.
+// Adds an opener for keys of a kind; it is tried before the openers of other layers.
 semsig.addOpener = (kind, open) => {
   const others = semsig.openers[kind];
   semsig.openers[kind] = (map, rest) => open(map, rest) || Boolean(others?.(map, rest));
 };
-// Who may answer a click on the map: things, cells, places, by rank, the newest of a rank first.
+// Adds a handler of clicks on the map. Handlers are tried by rank (objects, cells, places), the
+// newest of a rank first, until one returns true.
 semsig.answers = (map, rank, answer) => {
   if (!map.semsigAnswers) {
     map.semsigAnswers = [];
     map.on("click", async (event) => {
-      for (const one of [...map.semsigAnswers]) if (await one.answer(event)) return;
+      for (const entry of [...map.semsigAnswers]) if (await entry.answer(event)) return;
     });
   }
-  const one = {rank, answer};
-  map.semsigAnswers.unshift(one);
+  const entry = {rank, answer};
+  map.semsigAnswers.unshift(entry);
   map.semsigAnswers.sort((first, second) => first.rank - second.rank);
-  return () => { map.semsigAnswers = map.semsigAnswers.filter((other) => other !== one); };
+  return () => { map.semsigAnswers = map.semsigAnswers.filter((other) => other !== entry); };
 };
-// A box that tells of a thing. Signatures among the values are drawn, the first beside one of the
-// others, or beside what `others` has; `signs` has the classes by symbol and the verdicts.
+// A box with the fields of an object. Signatures among the values are drawn: the first next to one
+// of the others, or of `others`. `signs` has the signs of classes by symbol and of verdicts.
 semsig.details = (name, fields, values, signs, {others, kind} = {}) => {
   const box = L.DomUtil.create("div", "semsig-details");
   semsig.text(box, "h2", name);
-  const facts = fields.map((label, at) => [label, values[at]]).filter((one) => one[1] !== null);
-  const signatures = facts.filter((one) => Array.isArray(one[1]));
+  const facts = fields.map((label, at) => [label, values[at]]).filter((fact) => fact[1] !== null);
+  const signatures = facts.filter((fact) => Array.isArray(fact[1]));
   const seen = signatures.filter(([, [, bearings]]) => bearings?.length).map(
     ([label, signature]) => ({label, signature}));
   if (seen.length) {
@@ -172,23 +173,23 @@ semsig.details = (name, fields, values, signs, {others, kind} = {}) => {
     semsig.text(cell, "div", entries.join(look?.metres || look?.outside?.length ? ", " : " "));
   }
   if (symbols.size) {
-    const known = [...symbols].sort().map(
+    const titles = [...symbols].sort().map(
       (symbol) => `${symbol} ${(signs.classes?.[symbol] || semsig.anySign).title}`);
-    fact("Classes", known.join(", "));
+    fact("Classes", titles.join(", "));
   }
   return box;
 };
-// What there is to say where nothing is known.
-semsig.tellPlace = (map, latlng, name = "A place on the map", facts = []) => {
+// Opens the panel for a place without an object or cell.
+semsig.showPlace = (map, latlng, name = "A place on the map", facts = []) => {
   const place = [latlng.lat, latlng.lng];
   const area = map.semsigArea;
-  const known = semsig.whereabouts(area, place, area && semsig.xy(area, place));
-  const rows = [...facts, ...known];
+  const coordinates = semsig.whereabouts(area, place, area && semsig.xy(area, place));
+  const rows = [...facts, ...coordinates];
   const mark = L.circleMarker(place, {
-    pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 3, fill: false,
+    pane: "shadowPane", interactive: false, color: semsig.highlight, weight: 3, fill: false,
     radius: 10,
   });
-  const box = semsig.details(name, rows.map((one) => one[0]), rows.map((one) => one[1]), {});
+  const box = semsig.details(name, rows.map((row) => row[0]), rows.map((row) => row[1]), {});
   semsig.show(map, box, place, {
     key: `place:${place.map((part) => part.toFixed(6)).join(",")}`, drawn: mark,
   });
@@ -197,5 +198,5 @@ semsig.tellPlace = (map, latlng, name = "A place on the map", facts = []) => {
 semsig.addOpener("place", (map, rest) => {
   const place = rest.split(",").map(Number);
   return place.length === 2 && place.every(Number.isFinite)
-    && semsig.tellPlace(map, L.latLng(place));
+    && semsig.showPlace(map, L.latLng(place));
 });

@@ -1,20 +1,21 @@
-// The places of the map, as they are copied.
+// Copy the coordinates of the selected place, or of the middle of the map, to the clipboard.
 semsig.copy = (map) => {
-  const {lat, lng} = map.semsigPanel?.told?.place || map.getCenter();
+  const {lat, lng} = map.semsigPanel?.selection?.place || map.getCenter();
   const text = `${lat.toFixed(6)}, ${lng.toFixed(6)}`;
   return navigator.clipboard.writeText(text).then(
-    () => semsig.say(map, `Copied: ${text}`), () => semsig.say(map, `Copy by hand: ${text}`));
+    () => semsig.showStatus(map, `Copied: ${text}`),
+    () => semsig.showStatus(map, `Copy by hand: ${text}`));
 };
-// A line for people that goes by itself, and is read out.
-semsig.say = (map, text) => {
-  const box = map.getContainer().querySelector(".semsig-said");
+// Shows a message for five seconds; screen readers read it.
+semsig.showStatus = (map, text) => {
+  const box = map.getContainer().querySelector(".semsig-status");
   box.textContent = text;
-  clearTimeout(map.semsigSaid);
-  map.semsigSaid = setTimeout(() => box.replaceChildren(), 5000);
+  clearTimeout(map.semsigStatusTimer);
+  map.semsigStatusTimer = setTimeout(() => box.replaceChildren(), 5000);
 };
-// What stands around the map on a picture or on paper: title, legend, scale, credits.
+// The boxes that a picture or a printed page includes: title, legend, scale, credits.
 semsig.about = ".semsig-title, .semsig-legend, .leaflet-control-scale, .leaflet-control-attribution";
-// Draws the elements of some classes as the page shows them.
+// Draws these boxes on a canvas as the page shows them, through an SVG image of their HTML.
 semsig.drawBoxes = async (ctx, map) => {
   const container = map.getContainer();
   const frame = container.getBoundingClientRect();
@@ -44,8 +45,7 @@ semsig.drawBoxes = async (ctx, map) => {
   await image.decode();
   ctx.drawImage(image, 0, 0);
 };
-// The map as it is seen, with what stands around it, as a canvas; online tiles, which a page must
-// not read, are left out.
+// The visible map with these boxes as a canvas, without online tiles, which a page may not read.
 semsig.picture = async (map) => {
   const container = map.getContainer();
   const frame = container.getBoundingClientRect();
@@ -57,7 +57,7 @@ semsig.picture = async (map) => {
   ctx.fillStyle = getComputedStyle(container).backgroundColor;
   ctx.fillRect(0, 0, frame.width, frame.height);
   const panes = [...container.querySelectorAll(".leaflet-map-pane > .leaflet-pane")]
-    .sort((one, other) => getComputedStyle(one).zIndex - getComputedStyle(other).zIndex);
+    .sort((first, second) => getComputedStyle(first).zIndex - getComputedStyle(second).zIndex);
   for (const part of panes.flatMap((pane) => [...pane.querySelectorAll(
     "img:not(.leaflet-tile), canvas, .semsig-number")])) {
     const {left, top, width, height} = part.getBoundingClientRect();
@@ -86,18 +86,18 @@ semsig.savePicture = async (map) => {
   const blob = await new Promise((done) => { canvas.toBlob(done); });
   const name = `${(document.title.match(/[\p{L}\p{N}]+/gu) || ["map"]).join("-")}.png`;
   semsig.download(name, blob);
-  semsig.say(map, `Saved: ${name}`);
+  semsig.showStatus(map, `Saved: ${name}`);
 };
-// On a page of paper the map is as large as that, and light.
+// Print the map with light colours in the size of the paper.
 semsig.print = async (map) => {
   const container = map.getContainer();
   const dark = semsig.isDark(map);
   const legends = [...container.querySelectorAll(".semsig-legend")];
-  const open = legends.map((one) => one.open);
+  const open = legends.map((legend) => legend.open);
   const set = (is) => {
     container.classList.toggle("semsig-paper", is);
     container.classList.toggle("semsig-dark", dark && !is);
-    legends.forEach((one, at) => { one.open = is ? at === 0 : open[at]; });
+    legends.forEach((legend, at) => { legend.open = is ? at === 0 : open[at]; });
     map.fire("semsig-colours");
     map.invalidateSize({animate: false});
   };
@@ -109,7 +109,7 @@ semsig.print = async (map) => {
   set(false);
   map.setView([lat, lng], map.getZoom(), {animate: false});
 };
-// Beside light and dark.
+// Buttons next to that of light and dark colours.
 semsig.pictureButtons = (map) => {
   for (const [name, sign, title, act] of [
     ["semsig-save", "M10 3v9M6 8l4 4 4-4M3 13v4h14v-4", "Save this view as a picture",

@@ -1,35 +1,35 @@
-// The queries of an evaluation on one canvas, and lines to their best places on another;
-// `queryLayer` switches an outcome, or the lines, on and off. By `key` they are known to the page.
+// The queries of an evaluation on a canvas, and lines to their best places on another; `queryLayer`
+// returns the layer of an outcome or of the lines, by the `key` of the evaluation.
 semsig.queries = (map, key, packed, about) => {
   const {outcomes, fields, signs} = about;
   const on = new Set();
   const sprites = {};
-  const set = {about, data: null, layers: [], chosen: null};
+  const set = {about, data: null, layers: [], selected: null};
   let board = null;
-  let silence = null;
+  let stopAnswering = null;
   const frame = () => semsig.frame(map, {origin: [0, 0], quantum: 1});
-  const isOn = (one) => on.has(set.data.outcome[one]) && set.chosen[one] === 1;
+  const isOn = (query) => on.has(set.data.outcome[query]) && set.selected[query] === 1;
   set.ready = semsig.arrays(packed).then((data) => {
     const metres = (name) => {
       const [x, y] = [0, 1].map(() => new Float64Array(data.outcome.length));
-      for (let one = 0; one < x.length; one += 1) {
-        const place = set.placeOf(one, name);
-        ({x: x[one], y: y[one]} = L.CRS.EPSG3857.project(L.latLng(place)));
+      for (let query = 0; query < x.length; query += 1) {
+        const place = set.placeOf(query, name);
+        ({x: x[query], y: y[query]} = L.CRS.EPSG3857.project(L.latLng(place)));
       }
       return [x, y];
     };
     set.data = data;
     [data.x, data.y] = metres("places");
     [data.bestX, data.bestY] = metres("best");
-    set.chosen = new Uint8Array(data.outcome.length).fill(1);
+    set.selected = new Uint8Array(data.outcome.length).fill(1);
     set.redraw();
     return set;
   });
-  set.placeOf = (one, name = "places") =>
-    [2 * one, 2 * one + 1].map((at) => set.data[name][at] / 1e6);
-  // The numbers of the queries that are selected, from 0: those that are drawn.
+  set.placeOf = (query, name = "places") =>
+    [2 * query, 2 * query + 1].map((at) => set.data[name][at] / 1e6);
+  // Indices of the queries that are drawn.
   set.selection = () => [...set.data.outcome.keys()].filter(isOn);
-  // From afar smaller, lest they hide what they lie on; many more so.
+  // Smaller at low zoom, and if there are many queries, so that they do not hide the map.
   const radiusAt = (zoom) => (about.count <= 2000
     ? 5 * Math.min(1, Math.max(0.5, (zoom - 9) / 5)) : zoom >= 16 ? 5 : zoom >= 14 ? 3.5 : 2.5);
   const spriteOf = (outcome, radius, dots) => {
@@ -53,11 +53,11 @@ semsig.queries = (map, key, packed, about) => {
       const {scale, left, top} = frame();
       const radius = radiusAt(map.getZoom());
       const stamps = outcomes.map((_, at) => spriteOf(at, radius, dots));
-      // The rarer last, so that they lie on top.
+      // The rarer outcome last, so that it lies on top.
       for (const kind of about.order) {
-        for (let one = 0; one < x.length; one += 1) {
-          if (outcome[one] !== kind || !isOn(one)) continue;
-          stamp(stamps[kind], x[one] * scale + left, top - y[one] * scale);
+        for (let query = 0; query < x.length; query += 1) {
+          if (outcome[query] !== kind || !isOn(query)) continue;
+          stamp(stamps[kind], x[query] * scale + left, top - y[query] * scale);
         }
       }
     });
@@ -69,10 +69,10 @@ semsig.queries = (map, key, packed, about) => {
     ctx.globalAlpha = 0.6;
     for (const [at, {colour}] of outcomes.entries()) {
       ctx.beginPath();
-      for (let one = 0; one < x.length; one += 1) {
-        if (outcome[one] !== at || !located[one] || !isOn(one)) continue;
-        ctx.moveTo(x[one] * scale + left, top - y[one] * scale);
-        ctx.lineTo(bestX[one] * scale + left, top - bestY[one] * scale);
+      for (let query = 0; query < x.length; query += 1) {
+        if (outcome[query] !== at || !located[query] || !isOn(query)) continue;
+        ctx.moveTo(x[query] * scale + left, top - y[query] * scale);
+        ctx.lineTo(bestX[query] * scale + left, top - bestY[query] * scale);
       }
       ctx.strokeStyle = colour;
       ctx.stroke();
@@ -83,18 +83,19 @@ semsig.queries = (map, key, packed, about) => {
     if (board) board.redraw();
     lines.redraw();
   };
-  const nameOf = (one) =>
-    `Query ${(one + 1).toLocaleString("en")}: ${outcomes[set.data.outcome[one]].name}`;
-  const tell = (one) => {
-    const place = set.placeOf(one);
+  const nameOf = (query) =>
+    `Query ${(query + 1).toLocaleString("en")}: ${outcomes[set.data.outcome[query]].name}`;
+  const showQuery = (query) => {
+    const place = set.placeOf(query);
     const drawn = L.layerGroup([L.circleMarker(place, {
-      pane: "shadowPane", interactive: false, color: semsig.pointed, fill: false,
+      pane: "shadowPane", interactive: false, color: semsig.highlight, fill: false,
       radius: 11, weight: 3,
     })]);
-    const found = set.data.located[one] ? [set.placeOf(one, "best"), ...set.data.next[one]] : [];
-    if (found.length) drawn.addLayer(semsig.hint(place, found));
-    semsig.show(map, semsig.details(nameOf(one), fields, set.data.details[one], signs), place, {
-      key: `query:${one + 1}`, corners: found, drawn,
+    const places = set.data.located[query]
+      ? [set.placeOf(query, "best"), ...set.data.next[query]] : [];
+    if (places.length) drawn.addLayer(semsig.hint(place, places));
+    semsig.show(map, semsig.details(nameOf(query), fields, set.data.details[query], signs), place, {
+      key: `query:${query + 1}`, corners: places, drawn,
     });
   };
   const answer = ({latlng}) => {
@@ -103,32 +104,33 @@ semsig.queries = (map, key, packed, about) => {
     const point = map.latLngToLayerPoint(latlng);
     const {scale, left, top} = frame();
     let [best, least] = [-1, 10 ** 2];
-    for (let one = 0; one < x.length; one += 1) {
-      const away = (x[one] * scale + left - point.x) ** 2 + (top - y[one] * scale - point.y) ** 2;
-      if (away <= least && isOn(one)) [best, least] = [one, away];
+    for (let query = 0; query < x.length; query += 1) {
+      const [right, down] = [x[query] * scale + left - point.x, top - y[query] * scale - point.y];
+      const away = right ** 2 + down ** 2;
+      if (away <= least && isOn(query)) [best, least] = [query, away];
     }
-    if (best >= 0) tell(best);
+    if (best >= 0) showQuery(best);
     return best >= 0;
   };
   semsig.addOpener("query", (_, rest) => {
-    const one = Number(rest) - 1;
-    if (!(Number.isInteger(one) && one >= 0 && one < about.count)) return false;
-    if (set.data) tell(one);
-    else set.ready.then(() => tell(one));
+    const query = Number(rest) - 1;
+    if (!(Number.isInteger(query) && query >= 0 && query < about.count)) return false;
+    if (set.data) showQuery(query);
+    else set.ready.then(() => showQuery(query));
     return true;
   });
   semsig.finders.push((words, limit) => {
     if (set.data === null) return [];
-    // What has a number is called by it alone, too.
+    // The number of a query is a name too.
     set.names = set.names || [...set.data.outcome.keys()].map(
-      (one) => semsig.plain(`${nameOf(one)}\n${one + 1}`));
+      (query) => semsig.plain(`${nameOf(query)}\n${query + 1}`));
     return semsig.matches(set.names, words, limit).map(({rank, at}) => ({
       rank,
       name: nameOf(at),
       hint: "",
       show: () => {
         semsig.reveal(map, set.layers[set.data.outcome[at]], set.placeOf(at));
-        tell(at);
+        showQuery(at);
       },
     }));
   });
@@ -137,7 +139,7 @@ semsig.queries = (map, key, packed, about) => {
     layer.onAdd = () => {
       if (!on.size) {
         board = semsig.board(map, "markerPane", paint);
-        silence = semsig.answers(map, 0, answer);
+        stopAnswering = semsig.answers(map, 0, answer);
       }
       on.add(number);
       set.redraw();
@@ -146,14 +148,14 @@ semsig.queries = (map, key, packed, about) => {
       on.delete(number);
       set.redraw();
       if (on.size) return;
-      silence();
+      stopAnswering();
       board.remove();
       board = null;
     };
     return layer;
   };
   set.layers = [...outcomes.map((_, number) => layerOf(number)), lines];
-  semsig.held[key] = set;
+  semsig.layerSets[key] = set;
   semsig.filters(map, key);
 };
-semsig.queryLayer = (key, number) => semsig.held[key].layers[number];
+semsig.queryLayer = (key, number) => semsig.layerSets[key].layers[number];

@@ -1,8 +1,9 @@
-semsig.finders = [];  // of each layer with named things: what is called so, with how to show it
+// Search functions of the layers: each returns the objects with a name that matches.
+semsig.finders = [];
 semsig.plain = (text) => String(text).normalize("NFD").replace(/\p{M}/gu, "").toLowerCase()
   .replace(/(\d),(?=\d{3})/g, "$1").trim();
-// Which of the names hold the words, best first: one of their lines is the words (rank 0), has
-// them as whole words (1) or within others (2).
+// Indices of the names that contain the words, by rank: 0 if the words are a line of the name, 1 if
+// they are whole words of it, 2 if they are parts of words.
 semsig.matches = (names, words, limit) => {
   const quoted = words.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&");
   const line = new RegExp(`^${quoted}$`, "mu");
@@ -15,13 +16,13 @@ semsig.matches = (names, words, limit) => {
   });
   return ranked.flat().slice(0, limit);
 };
-// The layer that is switched on and off with a part of it.
+// The layer of the layer control that a part belongs to.
 semsig.whole = (layer) => (layer.semsigWhole ? semsig.whole(layer.semsigWhole) : layer);
 semsig.reveal = (map, layer, place) => {
   map.addLayer(semsig.whole(layer));
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
 };
-// Latitude and longitude of a place in the coordinate system of the data.
+// Convert x and y of the data to latitude and longitude, by a polynomial.
 semsig.latlng = ({middle, half, terms}, x, y) => {
   const [u, v] = [(x - middle[0]) / half, (y - middle[1]) / half];
   return terms.reduce(([latitude, longitude], [i, j, north, east]) => {
@@ -29,7 +30,7 @@ semsig.latlng = ({middle, half, terms}, x, y) => {
     return [latitude + north * power, longitude + east * power];
   }, [0, 0]);
 };
-// The way back, by Newton's steps.
+// Convert latitude and longitude to x and y of the data, by Newton's method.
 semsig.xy = (area, place) => {
   const reach = area.half / 1000;
   let [x, y] = area.middle;
@@ -51,7 +52,7 @@ semsig.whereabouts = (area, place, xy) => {
 };
 semsig.point = (map, name, place, facts, corners) => {
   const look = {
-    pane: "shadowPane", interactive: false, color: semsig.pointed, weight: 3, fill: false,
+    pane: "shadowPane", interactive: false, color: semsig.highlight, weight: 3, fill: false,
   };
   const mark = corners ? L.polygon(corners, look) : L.circleMarker(place, {...look, radius: 10});
   map.setView(place, Math.max(map.getZoom(), 18), {animate: false});
@@ -61,7 +62,7 @@ semsig.point = (map, name, place, facts, corners) => {
 };
 semsig.within = ({columns, rows}, cell) =>
   [columns, rows].every(([low, high], at) => low <= cell[at] && cell[at] <= high);
-// The number of the cell around a place, where the map knows cells there.
+// The number of the cell around a place, if the map has cells there.
 semsig.cellAround = (area, xy) => {
   if (!area?.grid) return [];
   const {step, origin} = area.grid;
@@ -88,7 +89,7 @@ semsig.cellsCalled = (typed, area) => {
   const show = (map) => {
     const place = semsig.latlng(area, ...middle);
     semsig.point(map, name, place, semsig.whereabouts(area, place, middle), latlngs);
-    // A layer that knows the cell tells of it instead.
+    // A layer of cells replaces this by its own description of the cell.
     semsig.openers.cell?.(map, String(number));
   };
   return [{rank: 0, name, hint: "", show}];
@@ -141,50 +142,50 @@ semsig.search = (map, area) => {
   ]) for (const [name, value] of Object.entries(values)) part.setAttribute(name, value);
   let offers = [];
   let active = -1;
-  const tell = (text) => {
+  const showMessage = (text) => {
     message.textContent = text;
     message.hidden = !text;
   };
-  const choose = (one) => {
-    active = one;
+  const choose = (index) => {
+    active = index;
     for (const [at, item] of [...list.children].entries()) {
-      item.setAttribute("aria-selected", at === one);
+      item.setAttribute("aria-selected", at === index);
     }
-    if (one >= 0) input.setAttribute("aria-activedescendant", list.children[one].id);
+    if (index >= 0) input.setAttribute("aria-activedescendant", list.children[index].id);
     else input.removeAttribute("aria-activedescendant");
-    if (one >= 0) list.children[one].scrollIntoView({block: "nearest"});
+    if (index >= 0) list.children[index].scrollIntoView({block: "nearest"});
   };
   const close = () => {
     list.hidden = true;
     input.setAttribute("aria-expanded", "false");
     choose(-1);
   };
-  const take = (one) => {
+  const take = (offer) => {
     close();
-    tell("");
-    input.value = one.name;
+    showMessage("");
+    input.value = offer.name;
     input.blur();
-    map.getContainer().focus({preventScroll: true});  // so that Escape closes what is shown
-    one.show(map);
+    map.getContainer().focus({preventScroll: true});  // so that Escape closes the panel
+    offer.show(map);
   };
   const look = () => {
     const text = input.value.trim();
     const words = semsig.plain(text);
-    tell("");
+    showMessage("");
     offers = [];
     if (words) {
       offers = [...semsig.cellsCalled(text, area), ...semsig.placesAt(text, area)];
       for (const finder of semsig.finders) offers.push(...finder(words, most));
-      offers = offers.sort((one, other) => one.rank - other.rank).slice(0, most);
+      offers = offers.sort((first, second) => first.rank - second.rank).slice(0, most);
     }
-    list.replaceChildren(...offers.map((one, at) => {
+    list.replaceChildren(...offers.map((offer, at) => {
       const item = L.DomUtil.create("li", "");
       item.id = `${list.id}-${at}`;
       item.setAttribute("role", "option");
-      semsig.text(item, "span", one.name);
-      if (one.hint) semsig.text(item, "small", one.hint);
+      semsig.text(item, "span", offer.name);
+      if (offer.hint) semsig.text(item, "small", offer.hint);
       L.DomEvent.on(item, "mousedown", L.DomEvent.preventDefault);
-      L.DomEvent.on(item, "click", () => take(one));
+      L.DomEvent.on(item, "click", () => take(offer));
       return item;
     }));
     list.hidden = !offers.length;
@@ -205,7 +206,7 @@ semsig.search = (map, area) => {
     L.DomEvent.preventDefault(event);
     if (list.hidden) look();
     if (offers.length) take(offers[Math.max(active, 0)]);
-    else if (input.value.trim()) tell("Nothing on this map has that name, number or place.");
+    else if (input.value.trim()) showMessage("Nothing on this map has that name, number or place.");
   });
   L.DomEvent.disableClickPropagation(box);
   L.DomEvent.disableScrollPropagation(box);

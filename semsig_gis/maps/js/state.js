@@ -1,5 +1,5 @@
-// What is seen of a map, in the address of its page, so that a link shows it again: for each part
-// that is remembered a short text, as `place=43.61000,3.88000,15&told=cell:123`.
+// The state of a map in the address of its page, so that a link restores it: a short text for each
+// part, such as `place=43.61000,3.88000,15&told=cell:123`.
 semsig.state = {
   read() {
     return new URLSearchParams(location.hash.slice(1));
@@ -10,8 +10,8 @@ semsig.state = {
     if (address !== location.href) history.replaceState(history.state, "", address);
   },
 };
-// `read` returns the text of a part, or null; `write` shows what a text tells. What changes a part
-// fires "semsig-state".
+// Adds a part of the state: `read` returns its text or null, `write` restores it from a text. Every
+// change of a part fires "semsig-state".
 semsig.remember = (map, key, read, write) => {
   if (location.protocol === "about:") return;  // the frame of a notebook has no address
   if (!map.semsigParts) {
@@ -38,17 +38,18 @@ semsig.remember = (map, key, read, write) => {
   const text = semsig.state.read().get(key);
   if (text !== null) write(text);
 };
-// How what is told is shown again, by the kind of its key.
+// Functions that open the panel for a key, by the kind of the key (the part before ":").
 semsig.openers = {};
-semsig.rememberTold = (map) => {
-  let told = null;
-  map.on("semsig-told", ({key}) => {
-    told = key;
+// Remembers the object in the panel. The part is called "told" so that older links still work.
+semsig.rememberSelection = (map) => {
+  let selection = null;
+  map.on("semsig-panel", ({key}) => {
+    selection = key;
     map.fire("semsig-state");
   });
-  semsig.remember(map, "told", () => told, (text) => {
+  semsig.remember(map, "told", () => selection, (text) => {
     const [kind, ...rest] = text.split(":");
-    if (text !== told && Object.hasOwn(semsig.openers, kind)) {
+    if (text !== selection && Object.hasOwn(semsig.openers, kind)) {
       semsig.openers[kind](map, rest.join(":"));
     }
   });
@@ -58,35 +59,35 @@ semsig.rememberPlace = (map) => {
     const {lat, lng} = map.getCenter();
     return `${lat.toFixed(5)},${lng.toFixed(5)},${Number(map.getZoom().toFixed(2))}`;
   };
-  let shown = read();
-  semsig.remember(map, "place", () => shown, (text) => {
+  let view = read();
+  semsig.remember(map, "place", () => view, (text) => {
     const [latitude, longitude, zoom] = text.split(",").map(Number);
     if (![latitude, longitude, zoom].every(Number.isFinite)) return;
     map.setView([latitude, longitude], zoom, {animate: false});
-    shown = read();
+    view = read();
   });
   map.on("moveend", () => {
-    shown = read();
+    view = read();
     map.fire("semsig-state");
   });
 };
-// The layers that are not as they were at first: those that are on, and after a "~" that are off.
+// The layers that were switched: names of those switched on, and with a "~" of those switched off.
 semsig.rememberLayers = (map, control) => {
-  const named = control._layers.filter((one) => one.overlay).map(({layer, name}) => {
+  const layers = control._layers.filter((entry) => entry.overlay).map(({layer, name}) => {
     const text = new DOMParser().parseFromString(name, "text/html");
     for (const sign of text.querySelectorAll("svg")) sign.remove();
     const words = text.body.textContent.replace(/\s*\([\d,]+\)/, "").match(/[\p{L}\p{N}]+/gu);
     return {layer, name: (words || []).join("-"), first: map.hasLayer(layer)};
   });
-  const read = () => named.filter(({layer, first}) => map.hasLayer(layer) !== first)
+  const read = () => layers.filter(({layer, first}) => map.hasLayer(layer) !== first)
     .map(({name, first}) => (first ? `~${name}` : name)).join(",") || null;
   semsig.remember(map, "layers", read, (text) => {
     const changed = new Set(text.split(","));
-    const on = named.filter(({name, first}) =>
+    const on = layers.filter(({name, first}) =>
       (changed.has(first ? `~${name}` : name) ? !first : first));
-    // Layers may share a part, so that what goes, goes first.
-    for (const one of named) if (!on.includes(one)) map.removeLayer(one.layer);
-    for (const one of on) map.addLayer(one.layer);
+    // Layers may share a part, so remove layers before others are added.
+    for (const entry of layers) if (!on.includes(entry)) map.removeLayer(entry.layer);
+    for (const entry of on) map.addLayer(entry.layer);
   });
   map.on("overlayadd overlayremove", () => map.fire("semsig-state"));
 };

@@ -1,4 +1,4 @@
-// The answer: in words, on the map, as wheels, and what speaks for and against each candidate.
+// The answer: as a sentence, on the map, as wheels, and the reasons for and against candidates.
 semsig.rounded = (count) => {
   const unit = 10 ** Math.max(Math.floor(Math.log10(Math.max(count, 1))) - 1, 0);
   return (Math.round(count / unit) * unit).toLocaleString("en");
@@ -10,22 +10,22 @@ semsig.percent = (share) => {
   if (share > 0.995) return "more than 99\u00a0%";
   return share < 0.01 ? "less than 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
 };
-// What the answer says, in a sentence.
+// The answer as a sentence.
 semsig.sentence = ({answer, scenes}) => {
   if (!scenes.length) return "Nothing was seen yet: add a photo, a compass, or simulate a view.";
   if (answer?.error) return answer.error;
   if (!answer?.estimate) return "Nothing is marked yet: click what you see.";
   const {given, mass, radius, estimate, places_left: left} = answer;
-  const told = given
+  const text = given
     ? `Within ${radius} m of ${semsig.coordinates(estimate.place)} with a chance of `
       + `${semsig.percent(mass)}.`
     : `Cannot tell yet: ${left < 1.5 ? "one place is" : `about ${semsig.rounded(left)} places are`}`
       + ` left, and within ${radius} m of the best the chance is ${semsig.percent(mass)}.`;
-  if (!answer.truth) return told;
+  if (!answer.truth) return text;
   const {found, metres, rank} = answer.truth;
   const verdict = given ? (found ? "Found" : "Wrong") : "Not found";
   const ranked = rank === null ? "" : `, whose cell has rank ${rank.toLocaleString("en")}`;
-  return `${verdict}: the best place is ${semsig.away(metres)} from the true one${ranked}. ${told}`;
+  return `${verdict}: the best place is ${semsig.away(metres)} from the true one${ranked}. ${text}`;
 };
 semsig.Answer = class {
   constructor(session, map) {
@@ -35,15 +35,15 @@ semsig.Answer = class {
   async show() {
     const {session, map} = this;
     const {answer, truth, city, answeredAt} = session;
-    const asked = answer?.estimate ? answer : null;
+    const shown = answer?.estimate ? answer : null;
     const box = document.getElementById("answer");
-    box.className = !asked ? "" : asked.given ? "given" : "open";
+    box.className = !shown ? "" : shown.given ? "given" : "open";
     document.getElementById("sentence").textContent = semsig.sentence(session);
-    document.getElementById("notes").textContent = (asked?.notes || []).join(" ");
-    this.showRegions(asked);
+    document.getElementById("notes").textContent = (shown?.notes || []).join(" ");
+    this.showRegions(shown);
     this.choose(0);
-    if (asked) {
-      const {image, bounds} = asked.region;
+    if (shown) {
+      const {image, bounds} = shown.region;
       const region = L.imageOverlay(image, bounds, {
         pane: "tilePane", opacity: 0.85, className: "semsig-flip"});
       await new Promise((done) => {
@@ -52,19 +52,19 @@ semsig.Answer = class {
       this.region?.remove();
       this.region = region;
       if (session.answer !== answer) return;
-      this.look(asked, truth);
+      this.look(shown, truth);
     } else this.region = this.region?.remove() && null;
     await new Promise((done) => { requestAnimationFrame(done); });
-    if (asked && answeredAt) {
+    if (shown && answeredAt) {
       performance.measure(session.first ? "semsig-answer" : "semsig-closer",
         {start: answeredAt, end: performance.now()});
     }
-    if (!asked?.quick) document.body.dataset.answered = answeredAt || 0;
-    if (asked) box.dataset.city = city.name;
+    if (!shown?.quick) document.body.dataset.answered = answeredAt || 0;
+    if (shown) box.dataset.city = city.name;
   }
-  // The map goes where the answer is, unless that is in sight.
+  // Moves the map to the answer unless it is in view.
   look({given, estimate, candidates, region}, truth) {
-    const places = given ? [estimate.place] : candidates.map((one) => one.place);
+    const places = given ? [estimate.place] : candidates.map((candidate) => candidate.place);
     if (truth) places.push(truth);
     const bounds = L.latLngBounds(places);
     const near = given ? L.latLngBounds(candidates[0].rays.map((ray) => ray.to)) : null;
@@ -92,7 +92,7 @@ semsig.Answer = class {
     this.showReasons();
     this.showWheels();
   }
-  // The scene and the mark of a ray, if it is of one that is there still.
+  // The scene and the mark of a ray, if the mark still exists.
   marked({mark}) {
     if (!mark) return [];
     const view = this.session.views[mark[0]];
@@ -117,26 +117,26 @@ semsig.Answer = class {
       const chosen = mark && mark === session.mark;
       if (chosen) look.weight = 6;
       L.polyline([ray.from, ray.to], {color: colour, ...look, interactive: false}).addTo(drawn);
-      const one = session.city.classes.find(({name}) => name === ray.class) || semsig.unnamed;
+      const item = session.city.classes.find(({name}) => name === ray.class) || semsig.unnamed;
       const html = L.DomUtil.create("div", `at ${ray.verdict}${chosen ? " chosen" : ""}`);
-      html.append(semsig.sign(one));
+      html.append(semsig.sign(item));
       L.marker(ray.to, {
         icon: L.divIcon({html, className: "", iconSize: [22, 22]}), keyboard: false,
       }).bindTooltip(`${ray.title}: ${text}`).addTo(drawn)
         .on("click", () => { if (mark) session.show(scene, mark); });
     }
-    for (const [at, one] of [...candidates.entries()].reverse()) {
+    for (const [at, candidate] of [...candidates.entries()].reverse()) {
       const chosen = at === session.chosen;
       const html = L.DomUtil.create("b", chosen ? "rank chosen" : "rank");
-      html.textContent = one.rank;
-      L.marker(one.place, {
+      html.textContent = candidate.rank;
+      L.marker(candidate.place, {
         icon: L.divIcon({html, className: "", iconSize: [26, 26]}), zIndexOffset: 1000 - at,
-        title: `Candidate ${one.rank}`, alt: `Candidate ${one.rank}`,
+        title: `Candidate ${candidate.rank}`, alt: `Candidate ${candidate.rank}`,
       }).on("click", () => this.choose(at)).addTo(drawn);
     }
-    for (const scene of session.scenes.filter((one) => one.place)) {
-      L.circleMarker(scene.place, {radius: 9, color: dark, weight: 3, dashArray: "3 4", fill: false})
-        .bindTooltip(`where the file of ${scene.name} has it`).addTo(drawn);
+    for (const photo of session.scenes.filter((scene) => scene.place)) {
+      L.circleMarker(photo.place, {radius: 9, color: dark, weight: 3, dashArray: "3 4", fill: false})
+        .bindTooltip(`place in the file of ${photo.name}`).addTo(drawn);
     }
     if (session.near) {
       const [lat, lng, radius] = session.near;
@@ -145,24 +145,24 @@ semsig.Answer = class {
     }
     if (session.truth) {
       L.circleMarker(session.truth, {
-        radius: 15, color: semsig.pointed, weight: 4, fill: false, interactive: false,
+        radius: 15, color: semsig.highlight, weight: 4, fill: false, interactive: false,
       }).bindTooltip("the true place", {permanent: true, direction: "bottom", offset: [0, 14]})
         .addTo(drawn);
     }
   }
   showCandidates() {
     const line = document.getElementById("candidates");
-    line.replaceChildren(...(this.session.answer?.candidates || []).map((one, at) => {
+    line.replaceChildren(...(this.session.answer?.candidates || []).map((candidate, at) => {
       const button = L.DomUtil.create("button", "");
       button.type = "button";
-      semsig.text(button, "b", one.rank);
-      button.append(` ${one.chance < 0.01 ? "<1" : Math.round(100 * one.chance)} %`);
-      button.title = semsig.coordinates(one.place);
+      semsig.text(button, "b", candidate.rank);
+      button.append(` ${candidate.chance < 0.01 ? "<1" : Math.round(100 * candidate.chance)} %`);
+      button.title = semsig.coordinates(candidate.place);
       button.setAttribute("aria-pressed", String(at === this.session.chosen));
       button.addEventListener("click", () => {
         this.choose(at);
         document.querySelectorAll("#candidates button")[at].focus();
-        this.map.setView(one.place, Math.max(this.map.getZoom(), 18), {animate: false});
+        this.map.setView(candidate.place, Math.max(this.map.getZoom(), 18), {animate: false});
       });
       return button;
     }));
@@ -185,8 +185,8 @@ semsig.Answer = class {
       }
     }
   }
-  // What was seen, turned as the candidate has it, beside what stands there: each ray of the answer
-  // is a mark, a street object, or both.
+  // The marks, turned by the heading of the candidate, next to the street objects around it: each
+  // ray of the answer is a mark, a street object, or both.
   showWheels() {
     const {session, candidate} = this;
     const {scene, city} = session;
@@ -198,7 +198,7 @@ semsig.Answer = class {
     const photo = Math.max(session.views[at].photos?.indexOf(scene) ?? 0, 0);
     const seen = candidate.rays.filter(({mark}) => mark?.[0] === at && mark[1] === photo);
     const there = candidate.rays.filter(({distance}) => distance !== null);
-    const marked = session.views[at].photos?.filter((one) => one.marks.length);
+    const marked = session.views[at].photos?.filter((item) => item.marks.length);
     const own = marked ? marked.indexOf(scene) : 0;
     const look = (view.photos || [view])[own];
     if (!seen.length || !look) return;  // marks have changed since the answer
@@ -209,35 +209,35 @@ semsig.Answer = class {
     const hidden = ({bearing}) => sectors.length
       && !sectors.some(([from, to]) => (bearing - from + 720) % 360 <= to - from);
     const outside = [...there.keys()].filter(
-      (one) => !seen.includes(there[one]) && hidden(there[one]));
+      (index) => !seen.includes(there[index]) && hidden(there[index]));
     const signature = (rays, [kind, degrees, metres], more = {}) => [
       rays.map((ray) => semsig.classNamed(session, ray[kind]).symbol).join(""),
       rays.map((ray) => Math.round(ray[degrees] + 360) % 360),
       {reach: city.reach, sectors, ...more,
         metres: rays.map((ray) => (ray[metres] === null ? null : Math.round(ray[metres])))}];
-    const told = [
+    const comparison = [
       seen.map((ray) => ({partner: there.indexOf(ray), verdict: ray.verdict})),
-      there.map((ray, one) => ({
-        partner: seen.indexOf(ray), verdict: outside.includes(one) ? "outside" : ray.verdict}))];
+      there.map((ray, index) => ({
+        partner: seen.indexOf(ray), verdict: outside.includes(index) ? "outside" : ray.verdict}))];
     const wheels = [
       semsig.wheel("Marked", signature(seen, ["seen_class", "seen_bearing", "seen_range"]),
-        city.signs, told[0]),
+        city.signs, comparison[0]),
       semsig.wheel(`At candidate ${candidate.rank}`,
-        signature(there, ["class", "bearing", "distance"], {outside}), city.signs, told[1])];
+        signature(there, ["class", "bearing", "distance"], {outside}), city.signs, comparison[1])];
     box.append(...wheels);
-    this.light(wheels, told);
+    this.connect(wheels, comparison);
   }
-  // What is pointed at in a wheel stands out in both.
-  light(wheels, told) {
+  // Highlights an object and its partner in both wheels while the mouse or the focus is on it.
+  connect(wheels, comparison) {
     const objects = wheels.map((wheel) => [...wheel.querySelectorAll(".object")]);
     for (const [side, own] of objects.entries()) {
-      for (const [one, object] of own.entries()) {
-        const pair = [object, objects[1 - side][told[side][one].partner]];
-        const lit = (is) => () => {
+      for (const [index, object] of own.entries()) {
+        const pair = [object, objects[1 - side][comparison[side][index].partner]];
+        const light = (is) => () => {
           for (const other of pair) other?.classList.toggle("lit", is);
         };
-        L.DomEvent.on(object, "mouseenter focus", lit(true));
-        L.DomEvent.on(object, "mouseleave blur", lit(false));
+        L.DomEvent.on(object, "mouseenter focus", light(true));
+        L.DomEvent.on(object, "mouseleave blur", light(false));
       }
     }
   }

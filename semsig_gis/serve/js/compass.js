@@ -1,4 +1,4 @@
-// A view composed by hand: what stands in which direction, and about how far away.
+// A view composed by hand: objects with their direction and rough distance.
 semsig.compass = (session, view) => {
   const {reach} = session.city;
   const stage = L.DomUtil.create("div", "stage compass");
@@ -6,7 +6,7 @@ semsig.compass = (session, view) => {
   drawing.setAttribute("viewBox", "-120 -120 240 240");
   drawing.setAttribute("aria-hidden", "true");
   stage.append(drawing);
-  const rim = 90;  // what stands at the rim and outside is at a distance that is not known
+  const rim = 90;  // objects at the rim and outside have an unknown distance
   const draw = (name, values, text) => semsig.svg(drawing, name, values, text);
   const turned = (bearing, out) => {
     const angle = bearing * Math.PI / 180;
@@ -32,7 +32,7 @@ semsig.compass = (session, view) => {
     const [x, y] = turned(entry.bearing, outOf(entry));
     draw("line", {x1: 0, y1: 0, x2: x, y2: y, class: "ray"});
   }
-  // Where on the compass: a bearing and, inside the rim, a distance.
+  // The bearing and, inside the rim, the distance of a place on the compass.
   const read = (event) => {
     const edge = semsig.edge();
     const x = (event.clientX - edge.left) / edge.width * 240 - 120;
@@ -69,7 +69,7 @@ semsig.compass = (session, view) => {
   });
   return stage;
 };
-// What was looked at, and whether north is known.
+// The visible sector, and whether north is known.
 semsig.compassTurn = (session, view) => {
   const box = L.DomUtil.create("fieldset", "camera");
   semsig.text(box, "legend", "Looked at");

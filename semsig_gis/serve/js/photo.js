@@ -1,18 +1,18 @@
 // A photo, its camera, and the marks on it.
-semsig.sign = (one) => {
+semsig.sign = (item) => {
   const drawing = semsig.svg(null, "svg", {
     class: "semsig-sign", viewBox: "-1.3 -1.3 2.6 2.6", "aria-hidden": true});
-  semsig.drawSign(drawing, one, one.symbol);
+  semsig.drawSign(drawing, item, item.symbol);
   return drawing;
 };
-// What is marked without a name.
+// The class of marks without a name.
 semsig.unnamed = {...semsig.anySign, name: "?", symbol: "?", title: "Something unnamed"};
 semsig.classNamed = (session, name) =>
-  session.city.classes.find((one) => one.name === name) || semsig.unnamed;
-// A range is in metres, or near, middle or far; null where it is not known.
+  session.city.classes.find((item) => item.name === name) || semsig.unnamed;
+// A range as text: it is in metres, or near, middle or far; null if it is unknown.
 semsig.metres = (range) => (
   typeof range === "number" ? `${Math.round(range)} m` : range === "middle" ? "midway" : range ?? "");
-// A mark that is moved by dragging or by keys: `step(sideways, outwards)` in shares of the scene.
+// The button of a mark, which is moved by dragging (`drag`) or by arrow keys (`nudge`).
 semsig.mark = (session, entry, {drag, nudge}) => {
   const {title} = semsig.classNamed(session, entry.class);
   const button = L.DomUtil.create("button", "mark");
@@ -55,7 +55,7 @@ semsig.mark = (session, entry, {drag, nudge}) => {
   });
   return button;
 };
-// A range that grows or shrinks by so many steps, from the middle where none is known.
+// A range enlarged by a number of steps of 10 %; an unknown range starts from the middle.
 semsig.ranged = ({city: {reach}}, range, steps) => {
   const thirds = {near: 1 / 6, far: 5 / 6};
   const metres = typeof range === "number" ? range : reach * (thirds[range] ?? 1 / 2);
@@ -63,7 +63,7 @@ semsig.ranged = ({city: {reach}}, range, steps) => {
 };
 semsig.middleOf = ({box, x, y}) => (box ? [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2] : [x, y]);
 semsig.images = new WeakMap();
-// The stage that is shown now: each change draws it anew.
+// The box of the current stage; each change draws a new one.
 semsig.edge = () => document.querySelector("#picture .stage").getBoundingClientRect();
 semsig.photo = (session, photo) => {
   const stage = L.DomUtil.create("div", "stage");
@@ -71,7 +71,7 @@ semsig.photo = (session, photo) => {
   stage.style.aspectRatio = `${width} / ${height}`;
   stage.style.setProperty("--wide", width / height);
   if (photo.url) {
-    // Kept, so that it does not blink with every change.
+    // Reused, so that it does not blink with every change.
     const image = semsig.images.get(photo) || new Image();
     if (!image.src) {
       Object.assign(image, {src: photo.url, alt: `The photo ${photo.name}`, draggable: false});
@@ -80,18 +80,18 @@ semsig.photo = (session, photo) => {
     stage.append(image);
   } else {
     semsig.text(stage, "p", `A session does not contain its photos: drop ${photo.name} here to see `
-      + "it again. The marks count all the same.");
+      + "it again. Its marks are used without it too.");
   }
   const place = (element, [left, top, right, bottom]) => Object.assign(element.style, {
     left: `${100 * left / width}%`, top: `${100 * top / height}%`,
     width: `${100 * (right - left) / width}%`, height: `${100 * (bottom - top) / height}%`,
   });
   const shift = (entry, from, right) => {
-    const kept = (x) => Math.min(Math.max(x, 0), width);
+    const clamp = (x) => Math.min(Math.max(x, 0), width);
     if (from.box) {
       const by = Math.min(Math.max(right, -from.box[0]), width - from.box[2]);
       entry.box = [from.box[0] + by, from.box[1], from.box[2] + by, from.box[3]];
-    } else entry.x = kept(from.x + right);
+    } else entry.x = clamp(from.x + right);
   };
   for (const entry of photo.marks) {
     if (entry.box) {
@@ -99,7 +99,7 @@ semsig.photo = (session, photo) => {
       frame.style.borderColor = semsig.classNamed(session, entry.class).colour;
       place(frame, entry.box);
     }
-    // Up and down is the distance: what is farther stands higher in a photo.
+    // Up and down changes the distance: farther objects are higher in a photo.
     let sideways = null;
     const button = semsig.mark(session, entry, {
       drag: (from, right, down) => {
@@ -123,14 +123,14 @@ semsig.photo = (session, photo) => {
     if (event.button || !event.isPrimary) return;
     event.preventDefault();
     const edge = semsig.edge();
-    const at = (one) => [
-      Math.min(Math.max((one.clientX - edge.left) / edge.width, 0), 1) * width,
-      Math.min(Math.max((one.clientY - edge.top) / edge.height, 0), 1) * height,
+    const at = (event) => [
+      Math.min(Math.max((event.clientX - edge.left) / edge.width, 0), 1) * width,
+      Math.min(Math.max((event.clientY - edge.top) / edge.height, 0), 1) * height,
     ];
     const from = at(event);
     const frame = L.DomUtil.create("div", "frame", stage);
-    const boxTo = (one) => {
-      const to = at(one);
+    const boxTo = (event) => {
+      const to = at(event);
       return [0, 1].map((part) => Math.min(from[part], to[part])).concat(
         [0, 1].map((part) => Math.max(from[part], to[part])));
     };
@@ -165,27 +165,27 @@ semsig.readPhotos = async (session, files, {on = false} = {}) => {
         + `most ${most} MB.`);
     }
     const path = `photo?name=${encodeURIComponent(file.name)}`;
-    const told = await (await semsig.api(path, file)).json();
+    const info = await (await semsig.api(path, file)).json();
     const url = URL.createObjectURL(file);
-    // A photo that a session refers to is known again by its bytes.
-    const known = session.scenes.find((one) => one.sha256 === told.sha256);
-    if (known) {
-      known.url = url;
-      session.show(known);
+    // A photo of an opened session is recognized by its checksum.
+    const scene = session.scenes.find((photo) => photo.sha256 === info.sha256);
+    if (scene) {
+      scene.url = url;
+      session.show(scene);
       continue;
     }
-    const wide = told.projection !== "pinhole";
-    session.add({...told, url, told: {fov: told.fov, heading: told.heading},
-      fov: told.fov ?? (wide ? 360 : 65), heading_error: told.heading_error ?? null, marks: []},
+    const wide = info.projection !== "pinhole";
+    session.add({...info, url, fromFile: {fov: info.fov, heading: info.heading},
+      fov: info.fov ?? (wide ? 360 : 65), heading_error: info.heading_error ?? null, marks: []},
     {on: next});
-    if (told.place && session.scenes.length === 1) semsig.map.setView(told.place, 17);
+    if (info.place && session.scenes.length === 1) semsig.map.setView(info.place, 17);
     next = false;
   }
 };
-// What is known of the camera, to be set where the photo does not say.
+// The settings of the camera, with values from the photo where it has them.
 semsig.camera = (session, photo) => {
   const box = L.DomUtil.create("fieldset", "camera");
-  semsig.text(box, "legend", photo.told?.fov ? "Camera, as the photo says" : "Camera");
+  semsig.text(box, "legend", photo.fromFile?.fov ? "Camera, as the photo says" : "Camera");
   const line = (text) => {
     const label = L.DomUtil.create("label", "", box);
     semsig.text(label, "span", text);
@@ -205,29 +205,29 @@ semsig.camera = (session, photo) => {
     const output = L.DomUtil.create("output", "", label);
     Object.assign(input, {type: "range", min: low, max: high, step: 1, id: name,
       value: photo[name] ?? 0});
-    const tell = () => { output.textContent = `${Math.round(input.value)}${unit}`; };
+    const showValue = () => { output.textContent = `${Math.round(input.value)}${unit}`; };
     input.addEventListener("input", () => {
       photo[name] = Number(input.value);
-      tell();
+      showValue();
       session.changed();
     });
-    tell();
+    showValue();
     return input;
   };
   slider(line("Field of view"), "fov", photo.projection === "pinhole" ? [20, 140] : [30, 360], "°");
-  const known = photo.heading !== null;
+  const hasHeading = photo.heading !== null;
   semsig.select(line("Looks"), {"": "anywhere (heading unknown)", known: "towards about"},
-    known ? "known" : "", (value) => {
-      photo.heading = value ? photo.told?.heading ?? 0 : null;
+    hasHeading ? "known" : "", (value) => {
+      photo.heading = value ? photo.fromFile?.heading ?? 0 : null;
       photo.heading_error = value ? photo.heading_error ?? 10 : null;
       session.show(photo, session.mark);
       session.changed();
     }).id = "heading-known";
-  if (known) {
+  if (hasHeading) {
     slider(line("Heading"), "heading", [0, 359], "°");
-    slider(line("Give or take"), "heading_error", [1, 90], "°");
+    slider(line("Standard deviation"), "heading_error", [1, 90], "°");
   }
-  // What is known of the place counts where the first photo was taken.
+  // A known place is that of the first photo.
   if (photo.place && session.viewOf(photo) === session.views[0]) {
     const near = session.isNear(photo);
     const label = L.DomUtil.create("label", "", box);
@@ -238,7 +238,7 @@ semsig.camera = (session, photo) => {
       session.near = tick.checked ? [...photo.place, metres] : null;
       session.changed();
     };
-    const error = semsig.number(line("give or take (metres)"), near ? session.near[2] : 50,
+    const error = semsig.number(line("standard deviation (metres)"), near ? session.near[2] : 50,
       [1, 10000], use);
     error.id = "near-metres";
     tick.addEventListener("change", () => use(Number(error.value)));

@@ -1,4 +1,4 @@
-// What was seen, and the answer to it: the state of the workbench, and its talk with the server.
+// The state of the workbench: views, their answer, and the requests to the server.
 semsig.api = async (path, body, signal) => {
   const token = new URLSearchParams(location.search).get("token");
   const plain = body === undefined || body instanceof Blob;
@@ -14,8 +14,8 @@ semsig.api = async (path, body, signal) => {
     throw new Error("The server does not answer; is semsig serve still running?");
   }
   if (response.ok) return response;
-  const told = await response.json().catch(() => ({}));
-  throw Object.assign(new Error(told.error || `The server says ${response.status}.`),
+  const {error} = await response.json().catch(() => ({}));
+  throw Object.assign(new Error(error || `The server answered with status ${response.status}.`),
     {status: response.status});
 };
 semsig.Session = class extends EventTarget {
@@ -25,7 +25,7 @@ semsig.Session = class extends EventTarget {
       page: crypto.randomUUID(), closer: null});
     this.clear();
   }
-  // A view is of one place: of photos, or a compass. A scene is one of either.
+  // A view is from one place and has photos or a compass; a scene is a photo or a compass.
   clear() {
     Object.assign(this, {
       views: [], scene: null, mark: null, answer: null, truth: null, chosen: 0, changedAt: 0,
@@ -43,10 +43,10 @@ semsig.Session = class extends EventTarget {
   show(scene, mark = null) {
     const moved = scene && this.scene && this.viewOf(scene) !== this.viewOf(this.scene);
     Object.assign(this, {scene, mark});
-    this.tell("scene");
+    this.notify("scene");
     if (moved) this.askAgain();
   }
-  // A scene joins the place of the last one, unless it is a compass or some steps on.
+  // A photo is added to the last place, unless it is some steps on; a compass is a new place.
   add(scene, {on = false} = {}) {
     const last = this.views.at(-1);
     const step = this.views.length ? {bearing: 0, metres: 20} : null;
@@ -66,15 +66,15 @@ semsig.Session = class extends EventTarget {
     this.show(this.scenes.at(-1) ?? null);
     this.changed();
   }
-  // Whether the first place is taken to be near that of a photo.
+  // Whether the place of a photo is used for the first place.
   isNear({place}) {
-    return Boolean(place && this.near) && place.every((part, one) => part === this.near[one]);
+    return Boolean(place && this.near) && place.every((part, at) => part === this.near[at]);
   }
-  tell(what) {
+  notify(what) {
     this.dispatchEvent(new Event(what));
   }
   changed() {
-    this.tell("change");
+    this.notify("change");
     this.askAgain();
   }
   askAgain() {
@@ -83,28 +83,28 @@ semsig.Session = class extends EventTarget {
     this.ask();
   }
   body() {
-    const kept = ({url, notes, told, ...photo}) => photo;
+    const withoutFile = ({url, notes, fromFile, ...photo}) => photo;
     const views = this.views.map(
-      (view) => (view.photos ? {...view, photos: view.photos.map(kept)} : view));
-    // The answer is where the scene is that is shown.
+      (view) => (view.photos ? {...view, photos: view.photos.map(withoutFile)} : view));
+    // The answer is about the place of the current scene.
     const view = this.scene ? views.findIndex((_, at) => this.views[at] === this.viewOf(this.scene))
       : null;
     return {
       views, view, top: 10, seen_from: this.seenFrom, noise: this.noise, truth: this.truth,
       absent: this.absent, near: this.near};
   }
-  // One request at a time; what changes meanwhile is asked next, so that the last one wins. Only
-  // an answer from close to, which takes long, is given up for it, by the server as well.
+  // One request at a time; changes during a request are sent next, so that the last state wins. A
+  // request for a full answer, which is slow, is cancelled by a change, on the server as well.
   async ask() {
     if (this.asking) return;
     this.asking = true;
     const box = document.getElementById("answer");
     box.ariaBusy = "true";
-    let asked = null;
-    while (asked !== this.changedAt || this.answer?.quick) {
-      // First by cells alone, then, unless something changed meanwhile, from close to.
-      const quick = asked !== this.changedAt;
-      asked = this.changedAt;
+    let requestedAt = null;
+    while (requestedAt !== this.changedAt || this.answer?.quick) {
+      // First a quick answer by cells, then, unless something changed meanwhile, the full answer.
+      const quick = requestedAt !== this.changedAt;
+      requestedAt = this.changedAt;
       const question = this.views;
       this.closer = quick ? null : new AbortController();
       let answer = {};
@@ -114,13 +114,13 @@ semsig.Session = class extends EventTarget {
           answer = await (await semsig.api("answer", body, this.closer?.signal)).json();
         }
       } catch (error) {
-        if (this.closer?.signal.aborted) asked = null;
+        if (this.closer?.signal.aborted) requestedAt = null;
         answer = {error: error.message};
       }
-      if (this.views !== question || asked === null) continue;
+      if (this.views !== question || requestedAt === null) continue;
       this.closer = null;
-      Object.assign(this, {answer, chosen: 0, answeredAt: asked, first: quick});
-      this.tell("answer");
+      Object.assign(this, {answer, chosen: 0, answeredAt: requestedAt, first: quick});
+      this.notify("answer");
     }
     box.ariaBusy = null;
     this.asking = false;
@@ -132,7 +132,7 @@ semsig.Session = class extends EventTarget {
       answer: this.answer,
     };
   }
-  // Take what a file holds, of which the photos are elsewhere.
+  // Restores a session from a file, which does not contain the photos.
   restore(saved) {
     const whole = (view) => (view?.photos || [view]).every(
       (scene) => Array.isArray(scene?.marks || scene?.compass));

@@ -1,4 +1,4 @@
-// The page: palette, scenes, editor, and what the buttons do.
+// The page: palette, scenes, editor, and the actions of the buttons.
 semsig.element = (id) => document.getElementById(id);
 semsig.notice = (text) => {
   const box = semsig.element("notice");
@@ -10,12 +10,12 @@ semsig.notice = (text) => {
   Object.assign(close, {type: "button", textContent: "Close"});
   close.addEventListener("click", () => semsig.notice(""));
 };
-// Errors of what people do are told on the page.
-semsig.trying = (call) => async (...given) => {
+// Wraps an action: its errors are shown on the page.
+semsig.trying = (call) => async (...values) => {
   semsig.notice("");
   document.body.setAttribute("aria-busy", "true");
   try {
-    await call(...given);
+    await call(...values);
   } catch (error) {
     semsig.notice(error.message);
   }
@@ -26,7 +26,7 @@ semsig.rename = (session, name) => {
   if (session.mark) {
     session.mark.class = name;
     session.changed();
-  } else session.tell("change");
+  } else session.notify("change");
 };
 semsig.button = (parent, text, call, label) => {
   const button = L.DomUtil.create("button", "", parent);
@@ -35,22 +35,22 @@ semsig.button = (parent, text, call, label) => {
   button.addEventListener("click", call);
   return button;
 };
-// The classes of the city, those first that tell most.
+// The classes of the city, the most informative first.
 semsig.palette = (session) => {
   const box = semsig.element("palette");
   const seen = session.city.classes.filter(({share}) => share > 0);
-  box.replaceChildren(...[...seen, semsig.unnamed].map((one) => {
+  box.replaceChildren(...[...seen, semsig.unnamed].map((item) => {
     const button = L.DomUtil.create("button", "class");
     button.type = "button";
-    button.append(semsig.sign(one));
-    semsig.text(button, "span", one.title);
-    button.setAttribute("aria-keyshortcuts", one.symbol);
-    button.title = `Key ${one.symbol}`;
-    button.dataset.name = one.name;
-    // It is what the next mark is, and the last one if that has no name yet.
+    button.append(semsig.sign(item));
+    semsig.text(button, "span", item.title);
+    button.setAttribute("aria-keyshortcuts", item.symbol);
+    button.title = `Key ${item.symbol}`;
+    button.dataset.name = item.name;
+    // Sets the class of the next mark, and of the current mark if it has none.
     button.addEventListener("click", () => {
       if (session.mark?.class !== "?") session.mark = null;
-      semsig.rename(session, one.name);
+      semsig.rename(session, item.name);
     });
     return button;
   }));
@@ -69,11 +69,11 @@ semsig.showScenes = (session) => {
     const group = L.DomUtil.create("span", "view", box);
     if (session.views.length > 1) semsig.text(group, "small", `Place ${place + 1}`);
     for (const scene of view.photos || [view]) {
-      const one = scene.marks ? scene.name : session.truth ? "Simulated view" : "Compass";
-      const tab = semsig.button(group, one, () => session.show(scene));
+      const name = scene.marks ? scene.name : session.truth ? "Simulated view" : "Compass";
+      const tab = semsig.button(group, name, () => session.show(scene));
       tab.className = "tab";
       tab.setAttribute("aria-pressed", String(scene === session.scene));
-      semsig.button(group, "\u00d7", () => session.remove(scene), `Remove ${one}`);
+      semsig.button(group, "\u00d7", () => session.remove(scene), `Remove ${name}`);
     }
   });
   const chooser = (id, text, call) => {
@@ -103,12 +103,12 @@ semsig.showScenes = (session) => {
 };
 semsig.readBoxes = async (session, files) => {
   const photos = session.scenes.filter((scene) => scene.marks);
-  const told = ({name, width, height, fov, heading, projection}) => (
+  const cameraOf = ({name, width, height, fov, heading, projection}) => (
     {name, width, height, fov, heading, projection});
-  const labels = files.find(({name}) => name === "classes.txt");  // of YOLO, beside its boxes
+  const labels = files.find(({name}) => name === "classes.txt");  // labels of YOLO boxes
   const classes = await labels?.text();
-  for (const file of files.filter((one) => one !== labels)) {
-    const body = {text: await file.text(), name: file.name, photos: photos.map(told), classes};
+  for (const file of files.filter((other) => other !== labels)) {
+    const body = {text: await file.text(), name: file.name, photos: photos.map(cameraOf), classes};
     const read = await (await semsig.api("boxes", body)).json();
     for (const photo of photos) {
       for (const {box, class: name} of read.photos[photo.name] || []) {
@@ -153,7 +153,7 @@ semsig.showMarks = (session) => {
   semsig.button(line, "+ Mark in the middle", () => semsig.addMark(
     session, scene.marks ? {x: scene.width / 2, y: scene.height / 2} : {bearing: 0})).id = "add-mark";
 };
-// The mark that is chosen: its class, and how far away it is.
+// The selected mark: its class and its distance.
 semsig.showEditor = (session) => {
   const box = semsig.element("editor");
   const {mark, city: {reach}} = session;
@@ -164,11 +164,11 @@ semsig.showEditor = (session) => {
     semsig.text(line, "span", text);
     return line;
   };
-  const titles = [...session.city.classes, semsig.unnamed].map((one) => [one.name, one.title]);
+  const titles = [...session.city.classes, semsig.unnamed].map((item) => [item.name, item.title]);
   semsig.select(label("It is"), Object.fromEntries(titles), mark.class,
     (value) => semsig.rename(session, value)).id = "class";
   const choices = {
-    "": mark.box ? "as its box tells" : "unknown", near: `near, up to ${Math.round(reach / 3)} m`,
+    "": mark.box ? "from its box" : "unknown", near: `near, up to ${Math.round(reach / 3)} m`,
     middle: "midway", far: `far, up to ${Math.round(reach)} m`};
   if (typeof mark.range === "number") choices[mark.range] = `about ${semsig.metres(mark.range)}`;
   semsig.select(label("Distance"), choices, mark.range ?? "", (value) => {
@@ -203,7 +203,7 @@ semsig.showCamera = (session) => {
   }
   box.append((scene.marks ? semsig.camera : semsig.compassTurn)(session, scene));
 };
-// What to look for next: what would tell most, of what is left.
+// Questions about what to look for next, the most informative first.
 semsig.suggest = (session) => {
   const line = semsig.element("question");
   let waiting = null;
@@ -212,9 +212,9 @@ semsig.suggest = (session) => {
     clearTimeout(waiting);
     const {answer} = session;
     line.replaceChildren();
-    // What was looked for counts where the first photo was taken.
+    // An absent class is about the place of the first view.
     const first = session.scene && session.viewOf(session.scene) === session.views[0];
-    const tell = (absent) => {
+    const setAbsent = (absent) => {
       session.absent = absent;
       session.changed();
     };
@@ -222,28 +222,28 @@ semsig.suggest = (session) => {
     for (const name of session.absent) {
       const {title} = session.city.classes.find((item) => item.name === name);
       semsig.button(listed, `No ${title.toLowerCase()} \u00d7`,
-        () => tell(session.absent.filter((other) => other !== name)),
+        () => setAbsent(session.absent.filter((other) => other !== name)),
         `Forget that no ${title.toLowerCase()} is there`);
     }
     if (!answer?.estimate || answer.quick) return;
-    // After a pause, so that the next answer need not wait.
+    // After a pause, so that the next answer does not have to wait.
     waiting = setTimeout(async () => {
       let offers = [];
       try {
         offers = await (await semsig.api("suggest", session.body())).json();
       } catch {
-        return;  // the answer says what is wrong
+        return;  // the answer shows the error
       }
-      const ask = ([one, ...others]) => {
+      const ask = ([offer, ...others]) => {
         line.replaceChildren(listed);
-        if (!one || session.answer !== answer) return;
-        semsig.text(line, "b", one.question);
+        if (!offer || session.answer !== answer) return;
+        semsig.text(line, "b", offer.question);
         semsig.button(line, "Yes, I mark it", () => {
           session.mark = null;
-          semsig.rename(session, one.class);
+          semsig.rename(session, offer.class);
           semsig.showScene(session);
         });
-        if (first) semsig.button(line, "No", () => tell([...session.absent, one.class]));
+        if (first) semsig.button(line, "No", () => setAbsent([...session.absent, offer.class]));
         if (others.length) semsig.button(line, "Ask another", () => ask(others));
       };
       ask(offers);
@@ -260,12 +260,12 @@ semsig.simulate = (session, map) => {
     map.getContainer().classList.toggle("simulating", on());
   });
   const spoil = semsig.element("spoil");
-  spoil.append(new Option("nothing", ""),
+  spoil.append(new Option("no errors", ""),
     ...session.city.noise.map((name) => new Option(`${name} noise`, name)));
   const draw = semsig.trying(async () => {
     if (!place) throw new Error("Click a place on the map first: a view from there is simulated.");
     if (session.views.length && !session.truth
-      && !window.confirm("A simulated view takes the place of what is marked now. Go on?")) return;
+      && !window.confirm("A simulated view replaces the current marks. Continue?")) return;
     const turn = Number(semsig.element("turn").value);
     const fov = turn === 360 ? null : turn;
     const {view, truth} = await (await semsig.api("simulate", {
@@ -280,8 +280,8 @@ semsig.simulate = (session, map) => {
     place = event.latlng;
     draw();
   });
-  for (const one of ["turn", "spoil"].map(semsig.element)) {
-    one.addEventListener("change", () => { if (place) draw(); });
+  for (const element of ["turn", "spoil"].map(semsig.element)) {
+    element.addEventListener("change", () => { if (place) draw(); });
   }
   semsig.element("again").addEventListener("click", () => {
     seed += 1;
@@ -319,7 +319,7 @@ semsig.files = (session) => {
   }));
   element("command").addEventListener("click", trying(async () => {
     const command = session.answer?.command;
-    if (!command) throw new Error("There is no answer yet, so there is no command that gives it.");
+    if (!command) throw new Error("There is no answer yet, so there is no command for it.");
     const dialog = element("line");
     dialog.querySelector("textarea").value = command;
     dialog.showModal();
@@ -365,25 +365,25 @@ semsig.cityMap = (city) => {
     map.attributionControl.addAttribution(text.outerHTML);
   }
   new ResizeObserver(() => map.invalidateSize({pan: false})).observe(map.getContainer());
-  // All of the page is as light or dark as its map.
+  // The whole page has light or dark colours like its map.
   map.on("semsig-colours", () => document.body.classList.toggle("dark", semsig.isDark(map)));
   semsig.colours(map);
   return map;
 };
-// The streets, where they are known, and the search of maps.
+// Adds the streets, if there are any, and the search of maps.
 semsig.showGround = async (map) => {
-  const told = await (await semsig.api("ground")).json();
-  map.semsigArea = told.area;
-  semsig.search(map, told.area);
-  if (told.ground) semsig.ground(...told.ground).addTo(map);
+  const streets = await (await semsig.api("ground")).json();
+  map.semsigArea = streets.area;
+  semsig.search(map, streets.area);
+  if (streets.ground) semsig.ground(...streets.ground).addTo(map);
 };
-// There is no panel here: what is found is pointed at, and named, until the map is clicked.
+// The workbench has no panel: a search result is marked with its name until the map is clicked.
 semsig.show = (map, box, place, {drawn}) => {
-  semsig.found?.remove();
-  semsig.found = L.layerGroup([drawn, L.tooltip(place, {
+  semsig.marker?.remove();
+  semsig.marker = L.layerGroup([drawn, L.tooltip(place, {
     content: box.querySelector("h2"), permanent: true, direction: "top", offset: [0, -10]})])
     .addTo(map);
-  map.once("click", () => semsig.found.remove());
+  map.once("click", () => semsig.marker.remove());
 };
 semsig.start = semsig.trying(async () => {
   const city = await (await semsig.api("city")).json();
@@ -394,9 +394,9 @@ semsig.start = semsig.trying(async () => {
   semsig.element("about").textContent = city.licences.join(" · ");
   semsig.palette(session);
   const noise = semsig.element("noise");
-  const noticed = {"by-hand": "a person, who leaves some out", generic: "any detector"};
+  const observers = {"by-hand": "a person, who misses some", generic: "any detector"};
   noise.append(...city.noise.map(
-    (name) => new Option(noticed[name] ?? `a detector with ${name} noise`, name)));
+    (name) => new Option(observers[name] ?? `a detector with ${name} noise`, name)));
   session.noise = noise.value;
   noise.addEventListener("change", () => {
     session.noise = noise.value;
@@ -420,7 +420,7 @@ semsig.start = semsig.trying(async () => {
   semsig.files(session);
   semsig.keys(session);
   session.show(null);
-  session.tell("answer");
+  session.notify("answer");
   Object.assign(semsig, {session, map});
   await semsig.showGround(map);
 });

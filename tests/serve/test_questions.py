@@ -15,12 +15,12 @@ from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from pyproj import Transformer
 from sentences import refused
-from workbench import bomb
+from workbench import decompression_bomb
 
 from semsig_gis.core import InputError
 from semsig_gis.database import visible_objects_at
 from semsig_gis.observation import Camera, View
-from semsig_gis.serve import Question, Workbench, city_ground
+from semsig_gis.serve import Question, Workbench, city_streets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,7 +51,7 @@ def latlon(bench: Workbench, cell: int) -> list[float]:
 
 
 def photo(bench: Workbench, cell: int, middle: float, **known: Any) -> dict[str, Any]:  # noqa: ANN401
-    """Return a photo that was taken in the middle of a cell, with all that it shows marked."""
+    """Return a photo from the middle of a cell with marks on all visible objects."""
     assert bench.store is not None
     spec, place = bench.database.spec, bench.database.xy[cell : cell + 1]
     seen = visible_objects_at(
@@ -71,7 +71,7 @@ def photo(bench: Workbench, cell: int, middle: float, **known: Any) -> dict[str,
     return {**SIDE, "fov": FOV, "heading": middle, "heading_error": None, "marks": marks, **known}
 
 
-def test_the_page_is_told_of_the_city(page: Page) -> None:
+def test_city_request_returns_facts_about_the_city(page: Page) -> None:
     city, database = page.ask("/api/city"), page.bench.database
     assert (city["name"], city["cells"], city["radius"]) == ("town", len(database), 30.0)
     assert city["noise"][0] == "by-hand"
@@ -81,32 +81,32 @@ def test_the_page_is_told_of_the_city(page: Page) -> None:
     codes = [item["code"] for item in city["classes"]]
     assert sorted(codes) == database.present_codes.tolist()
     off = [abs(item["share"] - 0.5) for item in city["classes"]]
-    assert off == sorted(off)  # what tells most first
+    assert off == sorted(off)  # the most informative first
 
 
-def picture(form: str = "JPEG", **told: dict[int, Any]) -> bytes:
+def picture(form: str = "JPEG", **sections: dict[int, Any]) -> bytes:
     exif = Image.Exif()
-    exif.update(told.get("image", {}))
-    exif.get_ifd(IFD.Exif).update(told.get("exif", {}))
-    exif.get_ifd(IFD.GPSInfo).update(told.get("gps", {}))
+    exif.update(sections.get("image", {}))
+    exif.get_ifd(IFD.Exif).update(sections.get("exif", {}))
+    exif.get_ifd(IFD.GPSInfo).update(sections.get("gps", {}))
     content = io.BytesIO()
     Image.new("RGB", (400, 300)).save(content, form, exif=exif)
     return content.getvalue()
 
 
-def test_the_page_is_told_of_streets_where_there_are_some(page: Page, bench: Workbench) -> None:
-    told = page.ask("/api/ground")
-    assert told["area"]["crs"] == "EPSG:32631"
-    assert list(told["ground"][0]) == ["streets"]
-    assert city_ground(bench.database, None)["ground"] is None
+def test_ground_request_returns_streets(page: Page, bench: Workbench) -> None:
+    streets = page.ask("/api/ground")
+    assert streets["area"]["crs"] == "EPSG:32631"
+    assert list(streets["ground"][0]) == ["streets"]
+    assert city_streets(bench.database, None)["ground"] is None
     store = bench.store
     assert store is not None
     assert store.streets is not None
     away = store.streets.set_geometry(store.streets.translate(9000.0))
-    assert city_ground(bench.database, replace(store, streets=away))["ground"] is None
+    assert city_streets(bench.database, replace(store, streets=away))["ground"] is None
 
 
-def test_a_photo_tells_of_its_camera(page: Page) -> None:
+def test_photo_request_reads_camera_from_exif(page: Page) -> None:
     content = picture(
         image={Base.Orientation: 6},
         exif={Base.FocalLengthIn35mmFilm: 26},
@@ -120,20 +120,20 @@ def test_a_photo_tells_of_its_camera(page: Page) -> None:
         },
     )
     code, _, answer = page.send("/api/photo?name=a%20%3Cb%3E.jpg", content)
-    told = json.loads(answer)
-    assert (code, told["name"], told["width"], told["height"]) == (200, "a <b>.jpg", 300, 400)
-    assert told["place"] == [48.5, 3.0]
-    assert 50 < told["fov"] < 56
-    assert abs(told["heading"] - 90.0) < 3.0  # of grid north
-    assert (told["heading_error"], len(told["sha256"])) == (10.0, 64)
+    info = json.loads(answer)
+    assert (code, info["name"], info["width"], info["height"]) == (200, "a <b>.jpg", 300, 400)
+    assert info["place"] == [48.5, 3.0]
+    assert 50 < info["fov"] < 56
+    assert abs(info["heading"] - 90.0) < 3.0  # of grid north
+    assert (info["heading_error"], len(info["sha256"])) == (10.0, 64)
 
 
-def test_a_panorama_is_known_by_its_form(page: Page) -> None:
+def test_panorama_is_recognized_by_its_ratio(page: Page) -> None:
     content = io.BytesIO()
     Image.new("L", (400, 200)).save(content, "PNG")
-    told = json.loads(page.send("/api/photo?name=p.png", content.getvalue())[2])
-    assert (told["projection"], told["fov"], told["heading"]) == ("equirectangular", 360.0, None)
-    assert len(told["notes"]) == 1
+    info = json.loads(page.send("/api/photo?name=p.png", content.getvalue())[2])
+    assert (info["projection"], info["fov"], info["heading"]) == ("equirectangular", 360.0, None)
+    assert len(info["notes"]) == 1
 
 
 @pytest.mark.parametrize(
@@ -146,62 +146,62 @@ def test_a_panorama_is_known_by_its_form(page: Page) -> None:
             "cannot be read as a picture",
         ),
         (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic" + bytes(100), "HEIC"),
-        (bomb(), "pixels"),
+        (decompression_bomb(), "pixels"),
         (picture()[:-400], "cannot be read as a picture"),
         (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n", "cannot be read as a picture"),
     ],
     ids=["text", "nothing", "svg", "heic", "bomb", "cut", "postscript"],
 )
-def test_what_is_no_picture_gets_one_sentence(page: Page, content: bytes, word: str) -> None:
+def test_invalid_picture_is_refused(page: Page, content: bytes, word: str) -> None:
     code, text = page.refused("/api/photo?name=x.jpg", content)
     assert (code, word in text, "x.jpg" in text) == (422, True, True)
 
 
 @pytest.mark.parametrize("heading", [None, 80.0])
-def test_a_quick_answer_comes_before_the_same_answer(
+def test_quick_answer_has_the_same_best_cell(
     page: Page, bench: Workbench, heading: float | None
 ) -> None:
     cell = longest(bench)
-    one = {"photos": [photo(bench, cell, 80.0, heading=heading)]}
-    on = {"photos": [photo(bench, cell, 200.0)], "step": {"bearing": 90.0, "metres": 0.0}}
-    for views in ([one], [one, on]):
+    view = {"photos": [photo(bench, cell, 80.0, heading=heading)]}
+    later_view = {"photos": [photo(bench, cell, 200.0)], "step": {"bearing": 90.0, "metres": 0.0}}
+    for views in ([view], [view, later_view]):
         quick = page.ask("/api/answer", {"views": views, "quick": True})
         after = page.ask("/api/answer", {"views": views})
-        alone = Workbench(city=bench.city, store=bench.store).answer({"views": views})
+        expected = Workbench(city=bench.city, store=bench.store).answer({"views": views})
         assert (quick["quick"], after["quick"]) == (True, False)
-        for told, count in ((quick, 3), (after, 10)):
-            assert sum(bool(one["rays"]) for one in told["candidates"]) == count
+        for answer, count in ((quick, 3), (after, 10)):
+            assert sum(bool(view["rays"]) for view in answer["candidates"]) == count
         assert quick["candidates"][0]["cell"] == after["candidates"][0]["cell"]
-        del after["seconds"], alone["seconds"]
-        assert after == json.loads(json.dumps(alone))
-    grid = {"views": [one], "quick": True, "seen_from": "cells"}
-    assert not page.ask("/api/answer", grid)["quick"]  # which leaves nothing for later
+        del after["seconds"], expected["seconds"]
+        assert after == json.loads(json.dumps(expected))
+    grid = {"views": [view], "quick": True, "seen_from": "cells"}
+    assert not page.ask("/api/answer", grid)["quick"]  # complete at once
 
 
 @pytest.mark.parametrize("heading", [None, 80.0])
-def test_marks_of_photos_give_the_place(page: Page, heading: float | None) -> None:
+def test_marks_of_photos_are_localized(page: Page, heading: float | None) -> None:
     cell = longest(page.bench)
     views: list[dict[str, Any]] = [
         {"photos": [photo(page.bench, cell, 80.0, heading=heading)]},
         {"photos": [photo(page.bench, cell, 200.0, name="b.jpg")], "step": None},
     ]
-    asked = {"views": views, "truth": latlon(page.bench, cell), "noise": "light", "top": 3}
-    told = page.ask("/api/answer", asked)
-    assert told["given"]
-    assert told["truth"]["found"]
-    assert told["truth"]["metres"] < 10
-    assert told["truth"]["rank"] <= 3
-    assert math.isclose(told["places_left"], 2 ** told["entropy"])
-    assert list(told["region"]["counts"]) == ["0.99", "0.9", "0.5"]
-    first, *others = told["candidates"]
+    question = {"views": views, "truth": latlon(page.bench, cell), "noise": "light", "top": 3}
+    answer = page.ask("/api/answer", question)
+    assert answer["given"]
+    assert answer["truth"]["found"]
+    assert answer["truth"]["metres"] < 10
+    assert answer["truth"]["rank"] <= 3
+    assert math.isclose(answer["places_left"], 2 ** answer["entropy"])
+    assert list(answer["region"]["counts"]) == ["0.99", "0.9", "0.5"]
+    first, *others = answer["candidates"]
     assert len(others) == 2
-    assert first["place"] == pytest.approx(asked["truth"], abs=1e-4)
-    # Every mark has one ray, which says as what it was marked.
+    assert first["place"] == pytest.approx(question["truth"], abs=1e-4)
+    # Every mark has one ray with the class of the mark.
     rays = {tuple(ray["mark"]): ray for ray in first["rays"] if ray["mark"] is not None}
     marks = {
         (view, 0, number): mark["class"]
-        for view, one in enumerate(views)
-        for number, mark in enumerate(one["photos"][0]["marks"])
+        for view, item in enumerate(views)
+        for number, mark in enumerate(item["photos"][0]["marks"])
     }
     assert {key: ray["seen_class"] for key, ray in rays.items()} == marks
     assert {ray["verdict"] for ray in rays.values()} == {"matched"}
@@ -210,21 +210,27 @@ def test_marks_of_photos_give_the_place(page: Page, heading: float | None) -> No
     assert weights == sorted(weights, reverse=True)
 
 
-def asked_in_several_ways(bench: Workbench) -> dict[str, dict[str, Any]]:
+def questions(bench: Workbench) -> dict[str, dict[str, Any]]:
     cell = longest(bench)
-    one = photo(bench, cell, 80.0)
-    vague = {**one, "marks": [{**mark, "range": "near"} for mark in one["marks"]]}
+    marked_photo = photo(bench, cell, 80.0)
+    vague = {**marked_photo, "marks": [{**mark, "range": "near"} for mark in marked_photo["marks"]]}
     step = {"bearing": 90.0, "metres": 10.0}
     compass = [{"class": "street_light", "bearing": at, "range": None} for at in (10, 200)]
     return {
-        "photo": {"views": [{"photos": [one]}]},
-        "heading unknown": {"views": [{"photos": [{**one, "heading": None}]}], "noise": "light"},
+        "photo": {"views": [{"photos": [marked_photo]}]},
+        "heading unknown": {
+            "views": [{"photos": [{**marked_photo, "heading": None}]}],
+            "noise": "light",
+        },
         "rough": {"views": [{"photos": [vague]}], "top": 5},
-        "near": {"views": [{"photos": [one]}], "near": [*latlon(bench, cell // 2), 40.0]},
-        "two photos": {"views": [{"photos": [one, photo(bench, cell, 200.0)]}]},
+        "near": {"views": [{"photos": [marked_photo]}], "near": [*latlon(bench, cell // 2), 40.0]},
+        "two photos": {"views": [{"photos": [marked_photo, photo(bench, cell, 200.0)]}]},
         "compass": {"views": [{"compass": compass, "heading_error": 10}], "seen_from": "cells"},
         "route": {
-            "views": [{"photos": [one]}, {"photos": [photo(bench, cell, 90.0)], "step": step}]
+            "views": [
+                {"photos": [marked_photo]},
+                {"photos": [photo(bench, cell, 90.0)], "step": step},
+            ]
         },
     }
 
@@ -232,25 +238,25 @@ def asked_in_several_ways(bench: Workbench) -> dict[str, dict[str, Any]]:
 @pytest.mark.parametrize(
     "way", ["photo", "heading unknown", "rough", "near", "two photos", "compass", "route"]
 )
-def test_the_command_line_gives_the_same_answer(
+def test_command_line_returns_the_same_answer(
     page: Page, way: str, done: Done, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = page.ask("/api/answer", asked_in_several_ways(page.bench)[way])
-    before, _, command = told["command"].rpartition(" | ")
+    answer = page.ask("/api/answer", questions(page.bench)[way])
+    before, _, command = answer["command"].rpartition(" | ")
     lines = shlex.split(before)[2:]  # printf, and how each is printed
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
     _, *words = shlex.split(command)
     out = done("", *words, *([] if lines else ["--json"]))
     result = json.loads(out.splitlines()[-1] if lines else out)
     listed = [(row["cell_id"], row["chance"]) for row in result["candidates"]]
-    shown = [(row["cell"], row["chance"]) for row in told["candidates"]]
+    shown = [(row["cell"], row["chance"]) for row in answer["candidates"]]
     assert listed == [(cell, pytest.approx(chance)) for cell, chance in shown]
     place = [result["place"]["lat"], result["place"]["lon"]]
-    assert told["estimate"]["place"] == pytest.approx(place, abs=1e-6)
+    assert answer["estimate"]["place"] == pytest.approx(place, abs=1e-6)
 
 
 @pytest.mark.parametrize("quick", [True, False])
-def test_a_place_that_is_known_makes_it_likely(page: Page, *, quick: bool) -> None:
+def test_known_place_raises_its_chance(page: Page, *, quick: bool) -> None:
     bench = page.bench
     cell = longest(bench)
     other = int(np.hypot(*(bench.database.xy - bench.database.xy[cell]).T).argmax())
@@ -258,33 +264,33 @@ def test_a_place_that_is_known_makes_it_likely(page: Page, *, quick: bool) -> No
     views = [{"compass": [lamp], "heading_error": "unknown"}]
     for place in (cell, other):
         near = [*latlon(bench, place), 5.0]
-        told = page.ask("/api/answer", {"views": views, "near": near, "quick": quick})
-        found = told["candidates"][0]["place"]
-        assert found == pytest.approx(near[:2], abs=2e-4)
-        assert f"--near {near[0]:.10g}N,{near[1]:.10g}E,5" in told["command"]
-    # One that fits what was seen badly is told of.
-    seen = {"photos": [photo(bench, cell, 80.0)]}
-    told = page.ask("/api/answer", {"views": [seen], "near": [*latlon(bench, other), 5.0]})
-    assert "disagree" in told["notes"][0]
+        answer = page.ask("/api/answer", {"views": views, "near": near, "quick": quick})
+        best_place = answer["candidates"][0]["place"]
+        assert best_place == pytest.approx(near[:2], abs=2e-4)
+        assert f"--near {near[0]:.10g}N,{near[1]:.10g}E,5" in answer["command"]
+    # A place that contradicts the view causes a note.
+    view = {"photos": [photo(bench, cell, 80.0)]}
+    answer = page.ask("/api/answer", {"views": [view], "near": [*latlon(bench, other), 5.0]})
+    assert "disagree" in answer["notes"][0]
 
 
-def test_a_box_of_known_height_tells_a_range(page: Page) -> None:
+def test_box_of_known_height_gives_a_range(page: Page) -> None:
     camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
     tall = next(item for item in page.bench.taxonomy.classes if item.name == "street_light")
     assert tall.height_m is not None
     pixels = camera.focal * tall.height_m / 15.0
     box = [1900, 2500, 2100, 2500 - pixels]  # drawn from below
-    one = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [{"box": box, "class": tall.name}]}
-    (view,) = page.ask("/api/answer", {"views": [{"photos": [one]}]})["views"]
+    photo_of_box = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [{"box": box, "class": tall.name}]}
+    (view,) = page.ask("/api/answer", {"views": [{"photos": [photo_of_box]}]})["views"]
     assert view["ranges"] == [pytest.approx(15.0, rel=0.01)]
-    # Unless the range is told, or the class is not known.
+    # A given range and an unknown class override the box.
     for more in ({"range": 20.0}, {"class": "?"}):
-        told = {**one, "marks": [{**one["marks"][0], **more}]}
-        (view,) = page.ask("/api/answer", {"views": [{"photos": [told]}]})["views"]
+        changed = {**photo_of_box, "marks": [{**photo_of_box["marks"][0], **more}]}
+        (view,) = page.ask("/api/answer", {"views": [{"photos": [changed]}]})["views"]
         assert view.get("ranges") == ([20.0] if "range" in more else None)
 
 
-def test_marks_keep_their_numbers_when_views_sort_them(bench: Workbench) -> None:
+def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
     rng = np.random.default_rng(3)
     photos: list[dict[str, Any]] = []
     for number, heading in enumerate((300.0, 20.0, None)):
@@ -334,22 +340,20 @@ def test_marks_keep_their_numbers_when_views_sort_them(bench: Workbench) -> None
         ({"mark": {"range": "afar"}}, "afar"),
     ],
 )
-def test_a_question_that_cannot_be_answered_gets_one_sentence(
-    page: Page, change: dict[str, Any], word: str
-) -> None:
+def test_invalid_question_is_refused(page: Page, change: dict[str, Any], word: str) -> None:
     mark = {"x": 10, "y": 10, "class": "street_light"} | change.get("mark", {})
     inner = {
         key: value
         for key, value in change.items()
         if key in SIDE or key.startswith(("fov", "head"))
     }
-    one = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [mark], **inner}
+    marked_photo = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [mark], **inner}
     outer = {key: value for key, value in change.items() if key not in {"mark", *inner}}
-    code, text = page.refused("/api/answer", {"views": [{"photos": [one]}], **outer})
+    code, text = page.refused("/api/answer", {"views": [{"photos": [marked_photo]}], **outer})
     assert (code, word in text) == (422, True), text
 
 
-def test_boxes_of_a_detector_become_marks(page: Page) -> None:
+def test_detector_boxes_become_marks(page: Page) -> None:
     document = {
         "images": [{"id": 1, "file_name": "a.jpg", "width": WIDTH, "height": HEIGHT}],
         "categories": [{"id": 1, "name": "bench"}, {"id": 2, "name": "dog"}],
@@ -359,18 +363,18 @@ def test_boxes_of_a_detector_become_marks(page: Page) -> None:
             {"image_id": 1, "category_id": 1, "bbox": [100, 100, 50, 50], "score": 0.1},
         ],
     }
-    asked = {
+    body = {
         "text": json.dumps(document),
         "name": "../../boxes.json",
         "photos": [{**SIDE, "fov": FOV, "heading": 90.0}],
     }
-    told = page.ask("/api/boxes", asked)
-    (mark,) = told["photos"]["a.jpg"]
+    reply = page.ask("/api/boxes", body)
+    (mark,) = reply["photos"]["a.jpg"]
     assert (mark["box"], mark["score"]) == ([1900, 1500, 2100, 1600], 0.9)
     assert mark["class"] == "bench"
     assert mark["bearing"] == pytest.approx(90.0, abs=0.1)
     assert mark["range"] > 0
-    assert len(told["notes"]) == 2
+    assert len(reply["notes"]) == 2
     for change, word in (
         ({"text": "{"}, "boxes.json"),
         ({"text": ""}, "boxes.json"),
@@ -379,73 +383,73 @@ def test_boxes_of_a_detector_become_marks(page: Page) -> None:
         ({"photos": [{**SIDE, "name": "z.jpg", "fov": FOV}]}, "a.jpg"),
         ({"photos": [SIDE]}, "field of view"),
     ):
-        code, text = page.refused("/api/boxes", asked | change)
+        code, text = page.refused("/api/boxes", body | change)
         assert (code, word in text, "/tmp" in text) == (422, True, False), text  # noqa: S108
 
 
-def test_boxes_of_yolo_take_their_labels_from_a_list(page: Page) -> None:
-    asked = {
+def test_yolo_boxes_use_the_list_of_labels(page: Page) -> None:
+    body = {
         "text": "1 0.5 0.5 0.1 0.1 0.8\n0 0.2 0.5 0.1 0.1 0.9\n",
         "name": "a.txt",
         "classes": "dog\nbench\n",
         "photos": [{**SIDE, "fov": FOV, "heading": 90.0}],
     }
-    (mark,) = page.ask("/api/boxes", asked)["photos"]["a.jpg"]
+    (mark,) = page.ask("/api/boxes", body)["photos"]["a.jpg"]
     assert (mark["class"], mark["score"]) == ("bench", 0.8)
-    told = page.ask("/api/boxes", {**asked, "classes": "dog\n"})
-    assert (told["photos"]["a.jpg"], len(told["notes"])) == ([], 2)
+    reply = page.ask("/api/boxes", {**body, "classes": "dog\n"})
+    assert (reply["photos"]["a.jpg"], len(reply["notes"])) == ([], 2)
 
 
-def test_what_to_look_for_next_is_a_question(page: Page) -> None:
+def test_suggestions_are_questions_by_gain(page: Page) -> None:
     compass = [{"class": "street_light", "bearing": at, "range": None} for at in (10, 200)]
-    told = page.ask("/api/suggest", {"views": [{"compass": compass}]})
-    gains = [one["gain"] for one in told]
+    suggestions = page.ask("/api/suggest", {"views": [{"compass": compass}]})
+    gains = [item["gain"] for item in suggestions]
     assert gains == sorted(gains, reverse=True)
     assert 0 < gains[0] <= 1
-    by_name = {one["class"]: one["question"] for one in told}
+    by_name = {item["class"]: item["question"] for item in suggestions}
     assert by_name["street_light"] == "Is there another street light within 30 m?"
     assert by_name["indicator"] == "Is there an indicator within 30 m?"
     assert len(by_name) == len(page.bench.database.present_codes)
 
 
-def test_a_cell_tells_what_is_seen_from_its_middle(page: Page) -> None:
+def test_cell_request_returns_the_view_from_its_middle(page: Page) -> None:
     database, cell = page.bench.database, longest(page.bench)
     place = latlon(page.bench, cell)
-    told = page.ask("/api/cell", {"place": place})
-    assert told["cell"] == database.cell_ids[cell]
-    assert told["place"] == pytest.approx(place)
-    assert told["types"] == database.types(cell)
-    seen = database.select(slice(cell, cell + 1))
-    bearings = [mark["bearing"] for mark in told["view"]["compass"]]
-    assert bearings == pytest.approx(seen.bearings, abs=0.01)
-    assert told["distances"] == pytest.approx(seen.distances, abs=0.06)
-    types = [database.types(one) for one in range(len(database))]
-    assert told["alike"] == types.count(told["types"]) - 1
-    question = {"views": [told["view"]], "seen_from": "cells", "top": 3}
+    reply = page.ask("/api/cell", {"place": place})
+    assert reply["cell"] == database.cell_ids[cell]
+    assert reply["place"] == pytest.approx(place)
+    assert reply["types"] == database.types(cell)
+    row = database.select(slice(cell, cell + 1))
+    bearings = [mark["bearing"] for mark in reply["view"]["compass"]]
+    assert bearings == pytest.approx(row.bearings, abs=0.01)
+    assert reply["distances"] == pytest.approx(row.distances, abs=0.06)
+    types = [database.types(index) for index in range(len(database))]
+    assert reply["alike"] == types.count(reply["types"]) - 1
+    question = {"views": [reply["view"]], "seen_from": "cells", "top": 3}
     best = page.ask("/api/answer", question)["candidates"][0]
-    assert (best["cell"], best["types"]) == (told["cell"], told["types"])
+    assert (best["cell"], best["types"]) == (reply["cell"], reply["types"])
     code, text = page.refused("/api/cell", {"place": [0.0, 0.0]})
     assert (code, "no cell" in text) == (422, True), text
 
 
 @pytest.mark.parametrize("fov", [None, 120.0])
-def test_a_view_is_simulated_and_found(page: Page, fov: float | None) -> None:
+def test_simulated_view_is_answered(page: Page, fov: float | None) -> None:
     cell = longest(page.bench)
     place = latlon(page.bench, cell)
-    asked = {"place": place, "fov": fov, "heading": 350.0, "noise": None, "seed": 1}
-    told = page.ask("/api/simulate", asked)
-    assert told == page.ask("/api/simulate", asked)
-    assert told["cell"] == page.bench.database.cell_ids[cell]
+    body = {"place": place, "fov": fov, "heading": 350.0, "noise": None, "seed": 1}
+    reply = page.ask("/api/simulate", body)
+    assert reply == page.ask("/api/simulate", body)
+    assert reply["cell"] == page.bench.database.cell_ids[cell]
     if fov is None:
-        assert len(told["view"]["compass"]) == told["objects"]
+        assert len(reply["view"]["compass"]) == reply["objects"]
     else:
-        assert told["view"]["sectors"] == [[290.0, 50.0]]
-        assert 0 < len(told["view"]["compass"]) < told["objects"]
-    answer = page.ask("/api/answer", {"views": [told["view"]], "truth": told["truth"]["place"]})
+        assert reply["view"]["sectors"] == [[290.0, 50.0]]
+        assert 0 < len(reply["view"]["compass"]) < reply["objects"]
+    answer = page.ask("/api/answer", {"views": [reply["view"]], "truth": reply["truth"]["place"]})
     assert answer["truth"]["found"] == (answer["truth"]["metres"] <= answer["radius"])
     assert answer["truth"]["rank"] >= 1
-    spoiled = page.ask("/api/simulate", asked | {"noise": "strong"})
-    assert spoiled["view"]["compass"] != told["view"]["compass"]
+    spoiled = page.ask("/api/simulate", body | {"noise": "strong"})
+    assert spoiled["view"]["compass"] != reply["view"]["compass"]
 
 
 @pytest.mark.parametrize(
@@ -459,19 +463,17 @@ def test_a_view_is_simulated_and_found(page: Page, fov: float | None) -> None:
         ({"heading": 1e9, "fov": 90}, "heading"),
     ],
 )
-def test_what_cannot_be_simulated_gets_one_sentence(
-    page: Page, change: dict[str, Any], word: str
-) -> None:
-    asked = {"place": latlon(page.bench, longest(page.bench)), **change}
-    code, text = page.refused("/api/simulate", asked)
+def test_invalid_simulation_is_refused(page: Page, change: dict[str, Any], word: str) -> None:
+    body = {"place": latlon(page.bench, longest(page.bench)), **change}
+    code, text = page.refused("/api/simulate", body)
     assert (code, word in text) == (422, True), text
 
 
 @pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml"])
-def test_the_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None:
+def test_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None:
     cell = longest(page.bench)
-    asked = {"views": [{"photos": [photo(page.bench, cell, 80.0)]}]}
-    code, headers, content = page.send(f"/api/export?format={suffix}", json.dumps(asked).encode())
+    body = {"views": [{"photos": [photo(page.bench, cell, 80.0)]}]}
+    code, headers, content = page.send(f"/api/export?format={suffix}", json.dumps(body).encode())
     assert code == 200
     assert headers["content-disposition"] == f'attachment; filename="answer.{suffix}"'
     file = tmp_path / f"answer.{suffix}"
@@ -490,7 +492,7 @@ def test_the_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("marked", "ways", "shown"),
+    ("pattern", "legs", "place"),
     [
         ("101", [(30.0, 40.0)], 1),
         ("110", [(10.0, 0.0)], 1),
@@ -498,21 +500,21 @@ def test_the_answer_is_exported(page: Page, suffix: str, tmp_path: Path) -> None
         ("010", [], 0),
     ],
 )
-def test_a_view_without_marks_is_passed_on_the_way(
-    bench: Workbench, marked: str, ways: list[tuple[float, float]], shown: int
+def test_steps_over_a_view_without_marks_are_added(
+    bench: Workbench, pattern: str, legs: list[tuple[float, float]], place: int
 ) -> None:
     mark = {"x": 10, "y": 10, "class": "?"}
     steps = [None, {"bearing": 90, "metres": 10}, {"bearing": 26.565051177, "metres": 44.72135955}]
     views = [
-        {"photos": [{**SIDE, "fov": FOV, "marks": [mark] * int(one)}], "step": step}
-        for one, step in zip(marked, steps, strict=True)
+        {"photos": [{**SIDE, "fov": FOV, "marks": [mark] * int(has_marks)}], "step": step}
+        for has_marks, step in zip(pattern, steps, strict=True)
     ]
     question = Question.parse({"views": views}, taxonomy=bench.taxonomy, radius=30.0)
-    assert [(leg.dx, leg.dy) for leg in question.legs] == [pytest.approx(way) for way in ways]
-    assert len(question.views) == marked.count("1")
-    assert question.shown == shown
+    assert [(leg.dx, leg.dy) for leg in question.legs] == [pytest.approx(leg) for leg in legs]
+    assert len(question.views) == pattern.count("1")
+    assert question.place_number == place
 
 
-def test_a_question_is_read_without_a_server(bench: Workbench) -> None:
+def test_question_with_invalid_photos_is_refused(bench: Workbench) -> None:
     with refused(InputError, "list"):
         Question.parse({"views": [{"photos": 1}]}, taxonomy=bench.taxonomy, radius=30.0)
