@@ -116,7 +116,13 @@ def load(
     as_json: AsJson = False,
 ) -> None:
     """Read files of open data into street objects."""
-    from semsig_gis.objects import assemble, choose_layers, passed_by, read_files, read_small
+    from semsig_gis.objects import (
+        assemble,
+        choose_layers,
+        layers_in_same_extracts,
+        read_files,
+        read_small_layers,
+    )
     from semsig_gis.sources import (
         BOX,
         clip_layers,
@@ -140,7 +146,7 @@ def load(
         selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
         surroundings=bool(buildings or streets),
     )
-    others = passed_by(catalog, specs)
+    others = layers_in_same_extracts(catalog, specs)
     with progress("reading") as advance:
         found, absent = read_files(
             [*specs, *others],
@@ -150,7 +156,7 @@ def load(
             area=None if clip in {None, BOX} else parse_area(clip),
             progress=advance,
         )
-        found += read_small(catalog, [*specs, *others], files, filters=filters, crs=crs)
+        found += read_small_layers(catalog, [*specs, *others], files, filters=filters, crs=crs)
     notes = [
         f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); it is "
         "left out"

@@ -169,7 +169,7 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
 
 
 def _newton(terms: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights of the terms, of which the first is constant, by Newton's method."""
+    """Return the weights of the terms by Newton's method; the first term is constant."""
     penalty = np.full(terms.shape[1], RIDGE * len(shares))
     penalty[0] = 0.0
     weights = np.zeros(terms.shape[1])

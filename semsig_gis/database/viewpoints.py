@@ -146,9 +146,9 @@ def select_elements(
     """Return the buildings or streets of a table, which may have OpenStreetMap elements."""
     if table is None:
         return None
-    from semsig_gis.objects import elements_in  # noqa: PLC0415 - it takes 1 s to load
+    from semsig_gis.objects import select_role  # noqa: PLC0415 - it takes 1 s to load
 
-    return elements_in(table, role)
+    return select_role(table, role)
 
 
 def reproject(table: gpd.GeoDataFrame, crs: CRS) -> gpd.GeoDataFrame:

@@ -12,7 +12,7 @@ from .draft import draft_catalog as draft_catalog
 from .extent import settle_extent as settle_extent
 from .from_geodataframe import objects_from_frame as objects_from_frame
 from .guesses import Column as Column
-from .guesses import Sample as Sample
+from .guesses import LayerSample as LayerSample
 from .guesses import columns_of as columns_of
 from .guesses import guess_class as guess_class
 from .guesses import guess_class_by as guess_class_by
@@ -30,12 +30,12 @@ from .quality import SQUARE_M as SQUARE_M
 from .quality import ClassQuality as ClassQuality
 from .quality import QualityReport as QualityReport
 from .quality import quality_report as quality_report
-from .skipped_layers import passed_by as passed_by
-from .skipped_layers import read_small as read_small
-from .surroundings import elements_in as elements_in
+from .skipped_layers import layers_in_same_extracts as layers_in_same_extracts
+from .skipped_layers import read_small_layers as read_small_layers
 from .surroundings import read_area as read_area
 from .surroundings import read_surroundings as read_surroundings
 from .surroundings import save_surroundings as save_surroundings
+from .surroundings import select_role as select_role
 from .table import Licence as Licence
 from .table import StreetObjects as StreetObjects
 from .table import join_licences as join_licences

@@ -1,4 +1,4 @@
-"""What changed in the street objects of a city: two tables of them, compared and joined."""
+"""Compare two tables of street objects of a city, and replace layers of one by the other."""
 
 from __future__ import annotations
 
@@ -27,16 +27,17 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import ObjectClass, Taxonomy
 
-NAME = [SOURCE, SOURCE_ID]
-LOOKS = [CLASS_CODE, "x", "y"]
+IDENTIFIER = [SOURCE, SOURCE_ID]
+CLASS_AND_PLACE = [CLASS_CODE, "x", "y"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassChange:
-    """What changed in one class; ``after = before + added - removed + gained - lost``.
+    """Changes of one class; ``after = before + added - removed + gained - lost``.
 
-    `added` and `removed` objects are nowhere in the other table; `gained` were of another class
-    before, `lost` are now. `moved_m` is the median distance in metres, None where none moved.
+    `added` and `removed` objects are only in one table; `gained` objects had another class before,
+    `lost` objects have another class now. `moved_m` is the median distance in metres, None if none
+    moved.
     """
 
     class_name: str
@@ -52,11 +53,11 @@ class ClassChange:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ObjectChanges:
-    """Which rows of two tables of street objects are the same object.
+    """Rows of two tables of street objects that are the same object.
 
     `same` (class and place), `moved` (same source, id and class) and `changed` (same source and id,
-    other class) have shape (n, 2): rows of the old and of the new table. `removed` and `added`,
-    shape (n,), are the others. `classes` has the classes that are in one of the tables.
+    other class) are pairs of rows of the old and the new table, shape (n, 2). `removed` and
+    `added`, shape (n,), are the other rows. `classes` are the changes by class.
     """
 
     same: NDArray[np.int64]
@@ -67,33 +68,32 @@ class ObjectChanges:
     classes: tuple[ClassChange, ...]
 
     @property
-    def gone(self) -> NDArray[np.int64]:
-        """Rows of the old table at whose place no such object stands any more, shape (g,)."""
+    def obsolete_rows(self) -> NDArray[np.int64]:
+        """Rows of the old table that were removed, moved or reclassified, shape (g,)."""
         return np.concatenate([self.removed, self.moved[:, 0], self.changed[:, 0]])
 
     @property
-    def come(self) -> NDArray[np.int64]:
-        """Rows of the new table at whose place no such object stood before, shape (n,)."""
+    def new_rows(self) -> NDArray[np.int64]:
+        """Rows of the new table that were added, moved or reclassified, shape (n,)."""
         return np.concatenate([self.added, self.moved[:, 1], self.changed[:, 1]])
 
 
 def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
-    """Tell what was added, removed, moved, or is of another class now.
+    """Return which objects were added, removed, moved, or have another class now.
 
-    Both tables are in the same CRS and use the same class codes. An object of the same class at
-    exactly the same place is the same object, whatever its id, because some portals number rows
-    anew at each export. What is left is matched by source and id, where an id stands once in either
-    table.
+    Both tables have the same CRS and class codes. Objects of the same class at exactly the same
+    place are the same object, whatever their ids, because some portals renumber rows at each
+    export. The remaining objects are matched by source and id, if the id is unique in both tables.
     """
     tables = _keys(old), _keys(new)
-    same = _twins(*tables)
-    left = [_without(table, same[:, side]) for side, table in enumerate(tables)]
-    candidates = [_with_own_id(*pair) for pair in zip(left, tables, strict=True)]
-    linked = _pairs(*candidates)
-    equal = old.codes[linked[:, 0]] == new.codes[linked[:, 1]]
-    moved, changed = linked[equal], linked[~equal]
+    same = _pairs_at_same_place(*tables)
+    remaining = [_without(table, same[:, side]) for side, table in enumerate(tables)]
+    candidates = [_unique_ids(*pair) for pair in zip(remaining, tables, strict=True)]
+    linked = _equal_rows(*candidates)
+    equal_class = old.codes[linked[:, 0]] == new.codes[linked[:, 1]]
+    moved, changed = linked[equal_class], linked[~equal_class]
     removed, added = (
-        _without(table, linked[:, side]).index.to_numpy() for side, table in enumerate(left)
+        _without(table, linked[:, side]).index.to_numpy() for side, table in enumerate(remaining)
     )
     changes = ObjectChanges(
         same=same, moved=moved, changed=changed, removed=removed, added=added, classes=()
@@ -102,65 +102,76 @@ def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
 
 
 def _keys(objects: StreetObjects) -> pd.DataFrame:
-    """Return what objects are told apart by, numbered by row."""
-    keys = pd.DataFrame(objects.table[NAME]).reset_index(drop=True)
+    """Return source, id, class and coordinates of objects, with the row number as index."""
+    keys = pd.DataFrame(objects.table[IDENTIFIER]).reset_index(drop=True)
     keys[CLASS_CODE] = objects.codes
     keys[["x", "y"]] = objects.xy
     return keys
 
 
-def _twins(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
-    """Return pairs of rows of one class at one place; of several there, those of one id first."""
-    alone = _lone_twins(old, new)
-    rest = [_without(table, alone[:, side]) for side, table in enumerate((old, new))]
-    crowds = pd.concat([table.loc[table.duplicated(LOOKS), "x"] for table in rest])
-    named = _pairs(*(table[table["x"].isin(crowds)] for table in rest))
-    others = _pairs(*(_without(t, named[:, side])[LOOKS] for side, t in enumerate(rest)))
-    return np.concatenate([alone, named, others])
+def _pairs_at_same_place(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
+    """Return pairs of rows with the same class and place; if several have, first by equal id."""
+    pairs = _pairs_with_unique_x(old, new)
+    rest = [_without(table, pairs[:, side]) for side, table in enumerate((old, new))]
+    # Where several objects share class and place, pair those of the same id first.
+    shared_x = pd.concat([table.loc[table.duplicated(CLASS_AND_PLACE), "x"] for table in rest])
+    by_id = _equal_rows(*(table[table["x"].isin(shared_x)] for table in rest))
+    others = _equal_rows(
+        *(_without(t, by_id[:, side])[CLASS_AND_PLACE] for side, t in enumerate(rest))
+    )
+    return np.concatenate([pairs, by_id, others])
 
 
-def _lone_twins(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
-    """Return those pairs that nothing else has the x coordinate of: nearly all, and quickly."""
-    lone = []
+def _pairs_with_unique_x(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
+    """Return pairs of equal class and place with an x coordinate unique in both tables.
+
+    Nearly all pairs are found in this way, which is much faster than the general one.
+    """
+    unique = []
     for table in (old, new):
         x, row, count = np.unique(table["x"], return_index=True, return_counts=True)
-        lone.append((x[count == 1], row[count == 1]))
-    (x, row), (other_x, other_row) = lone
-    _, one, other = np.intersect1d(x, other_x, assume_unique=True, return_indices=True)
-    pairs: NDArray[np.int64] = np.stack([row[one], other_row[other]], axis=1)
-    looks = [table[LOOKS].to_numpy(float)[pairs[:, side]] for side, table in enumerate((old, new))]
-    equal: NDArray[np.bool_] = (looks[0] == looks[1]).all(axis=1)
+        unique.append((x[count == 1], row[count == 1]))
+    (old_x, old_row), (new_x, new_row) = unique
+    _, old_at, new_at = np.intersect1d(old_x, new_x, assume_unique=True, return_indices=True)
+    pairs: NDArray[np.int64] = np.stack([old_row[old_at], new_row[new_at]], axis=1)
+    old_keys, new_keys = (
+        table[CLASS_AND_PLACE].to_numpy(float)[pairs[:, side]]
+        for side, table in enumerate((old, new))
+    )
+    equal: NDArray[np.bool_] = (old_keys == new_keys).all(axis=1)
     return pairs[equal]
 
 
-def _with_own_id(rows: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
-    """Return source and id of the rows whose id no other row of the table has."""
-    alike = table.loc[table[SOURCE_ID].isin(rows[SOURCE_ID]) & table[SOURCE_ID].ne(""), NAME]
-    single = alike[~alike.duplicated(keep=False)]
-    return single[single.index.isin(rows.index)]
+def _unique_ids(rows: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
+    """Return source and id of those rows that no other row of the table has the id of."""
+    has_id = table[SOURCE_ID].isin(rows[SOURCE_ID]) & table[SOURCE_ID].ne("")
+    ids = table.loc[has_id, IDENTIFIER]
+    unique = ids[~ids.duplicated(keep=False)]
+    return unique[unique.index.isin(rows.index)]
 
 
 def _without(table: pd.DataFrame, rows: NDArray[np.int64]) -> pd.DataFrame:
     return table[~table.index.isin(rows)]
 
 
-def _pairs(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
-    """Return the index labels of equal rows, each row once, first with first."""
+def _equal_rows(old: pd.DataFrame, new: pd.DataFrame) -> NDArray[np.int64]:
+    """Return pairs of index labels of equal rows; each row is used once, in order."""
     both = pd.concat([old, new], ignore_index=True)
     group = both.groupby(list(both.columns), sort=False).ngroup()
-    first, second = (
-        part.to_numpy(np.int64) * (len(both) + 1) + part.groupby(part).cumcount().to_numpy()
-        for part in (group[: len(old)], group[len(old) :])
+    # Number equal rows within each table, and pair those of the same group and number.
+    old_keys, new_keys = (
+        groups.to_numpy(np.int64) * (len(both) + 1) + groups.groupby(groups).cumcount().to_numpy()
+        for groups in (group[: len(old)], group[len(old) :])
     )
-    _, row, other = np.intersect1d(first, second, assume_unique=True, return_indices=True)
-    return np.stack([old.index.to_numpy()[row], new.index.to_numpy()[other]], axis=1)
+    _, old_at, new_at = np.intersect1d(old_keys, new_keys, assume_unique=True, return_indices=True)
+    return np.stack([old.index.to_numpy()[old_at], new.index.to_numpy()[new_at]], axis=1)
 
 
 def _by_class(
     old: StreetObjects, new: StreetObjects, changes: ObjectChanges
 ) -> Iterable[ClassChange]:
-    """Yield the numbers of every class that one of the tables has."""
-    numbers = {
+    """Yield the changes of every class that occurs in one of the tables."""
+    counts_of = {
         name: np.bincount(codes, minlength=256)
         for name, codes in {
             "before": old.codes,
@@ -174,82 +185,80 @@ def _by_class(
     moved_codes = new.codes[changes.moved[:, 1]]
     metres = np.hypot(*(new.xy[changes.moved[:, 1]] - old.xy[changes.moved[:, 0]]).T)
     for item in new.taxonomy.classes:
-        own = {name: int(counts[item.code]) for name, counts in numbers.items()}
-        if own["before"] or own["after"]:
-            far = metres[moved_codes == item.code]
+        numbers = {name: int(counts[item.code]) for name, counts in counts_of.items()}
+        if numbers["before"] or numbers["after"]:
+            distances = metres[moved_codes == item.code]
             yield ClassChange(
                 class_name=item.name,
-                moved=len(far),
-                moved_m=float(np.median(far)) if len(far) else None,
-                **own,
+                moved=len(distances),
+                moved_m=float(np.median(distances)) if len(distances) else None,
+                **numbers,
             )
 
 
 def replace_layers(
     old: StreetObjects, new: StreetObjects
 ) -> tuple[StreetObjects, tuple[str, ...], tuple[str, ...]]:
-    """Return the objects of layers that were not loaded anew, then the new ones.
+    """Return the new objects and, before them, the old objects of layers that were not reloaded.
 
-    With them come the names of the layers that stay, and notes for the user. A layer was loaded
-    anew if a new object comes from it or a new licence is about it: it may be empty now. CrsError
-    for a different CRS, InputError for classes that do not fit.
+    Also return the names of the layers that were not reloaded, and notes for the user. A layer was
+    reloaded if a new object is from it or a new licence is for it; it may be empty now. CrsError
+    for a different CRS, InputError for classes that do not match.
     """
     if new.crs != old.crs:
-        own = old.crs.to_string()
+        crs = old.crs.to_string()
         raise CrsError(
-            f"the new objects are in {new.crs.to_string()} and those of the database in {own}; "
-            f"load the new ones with --metric-crs {own}."
+            f"the new objects are in {new.crs.to_string()} and those of the database in {crs}; "
+            f"load the new ones with --metric-crs {crs}."
         )
     taxonomy = joined_taxonomy(old.taxonomy, new.taxonomy)
-    renewed = set(new.table[SOURCE].unique()).union(*(licence.layers for licence in new.licenses))
-    stays = ~old.table[SOURCE].isin(renewed).to_numpy()
-    if not stays.any():
+    reloaded = set(new.table[SOURCE].unique()).union(*(licence.layers for licence in new.licenses))
+    remains = ~old.table[SOURCE].isin(reloaded).to_numpy()
+    if not remains.any():
         return replace(new, taxonomy=taxonomy), (), ()
-    remaining = old.table[stays]
+    remaining = old.table[remains]
     table = pd.concat([remaining, new.table], ignore_index=True)
     if MERGED in table:
         table[MERGED] = table[MERGED].fillna("")
-    staying = (
-        Licence(licence.terms, tuple(name for name in licence.layers if name not in renewed))
+    old_licences = (
+        Licence(licence.terms, tuple(name for name in licence.layers if name not in reloaded))
         for licence in old.licenses
-        if not licence.layers or not renewed.issuperset(licence.layers)
+        if not licence.layers or not reloaded.issuperset(licence.layers)
     )
-    licenses = join_licences([*staying, *new.licenses])
-    about_renewed = tuple(layer_note(name, "") for name in renewed)
-    warnings = (note for note in old.notes if not note.startswith(about_renewed))
+    licenses = join_licences([*old_licences, *new.licenses])
+    prefixes = tuple(layer_note(name, "") for name in reloaded)
+    warnings = (note for note in old.notes if not note.startswith(prefixes))
     objects = StreetObjects(
         table.astype({CLASS_CODE: np.uint8}),
         taxonomy,
         licenses,
         tuple(dict.fromkeys([*warnings, *new.notes])),
     )
-    kept = tuple(sorted(remaining[SOURCE].unique()))
-    notes = [*_doubts(objects, len(remaining), renewed)]
+    notes = [*_possible_duplicates(objects, len(remaining), reloaded)]
     notes += [
         f"the new objects do not say which layers the licence {licence.terms!r} is for, so a layer "
         "that is empty now keeps its old objects; load the new objects again"
         for licence in new.licenses
         if not licence.layers  # as in files of earlier versions
     ]
-    return objects, kept, tuple(notes)
+    return objects, tuple(sorted(remaining[SOURCE].unique())), tuple(notes)
 
 
 def joined_taxonomy(old: Taxonomy, new: Taxonomy) -> Taxonomy:
-    """Return all classes of two dates of one city, with the titles of the new ones.
+    """Return the classes of both taxonomies, with the titles of the new one.
 
-    InputError if a code or symbol means different classes, or a class is seen from another
-    distance.
+    InputError if a code or symbol has different classes, or a class has different ranges.
     """
-    theirs = {item.code: item for item in new.classes}
+    new_classes = {item.code: item for item in new.classes}
     for item in old.classes:
-        other = theirs.get(item.code)
+        other = new_classes.get(item.code)
         if other is not None and replace(other, title=item.title) != item:
             raise InputError(
                 f"class code {item.code} means {_brief(item)} before and {_brief(other)} after; "
                 "load both with the same catalogue, or build the database again."
             )
     codes = {item.code for item in old.classes}
-    if codes <= set(theirs):
+    if codes <= set(new_classes):
         return new
     try:
         return old.extended(item for item in new.classes if item.code not in codes)
@@ -265,22 +274,24 @@ def _brief(item: ObjectClass) -> str:
     return f"{item.name!r} (symbol {item.symbol}{reach})"
 
 
-def _doubts(objects: StreetObjects, kept: int, renewed: set[str]) -> Iterable[str]:
-    """Yield what may be twice, because the layers that stay were not loaded with the new ones."""
+def _possible_duplicates(
+    objects: StreetObjects, old_count: int, reloaded: set[str]
+) -> Iterable[str]:
+    """Yield notes on objects that may be listed twice; the first `old_count` are old ones."""
     table = objects.table
     if MERGED in table:
         merged: Counter[str] = Counter()
-        for text in table[MERGED][:kept]:
-            merged.update({part.partition(":")[0] for part in text.split("; ")} & renewed)
+        for text in table[MERGED][:old_count]:
+            merged.update({part.partition(":")[0] for part in text.split("; ")} & reloaded)
         for name, number in sorted(merged.items()):
             yield (
                 f"{number:,} objects of layers that were not loaded again were merged with objects "
                 f"of {name!r}, which may be there twice now; load merged layers together"
             )
-    keys = _keys(objects)[LOOKS]
-    twice = keys[kept:].merge(keys[:kept].drop_duplicates(), on=LOOKS)
-    if len(twice):
+    keys = _keys(objects)[CLASS_AND_PLACE]
+    duplicates = keys[old_count:].merge(keys[:old_count].drop_duplicates(), on=CLASS_AND_PLACE)
+    if len(duplicates):
         yield (
-            f"{len(twice):,} new objects are at exactly the place of an object in a layer that was "
-            "not loaded again; load overlapping layers together"
+            f"{len(duplicates):,} new objects are at exactly the place of an object in a layer "
+            "that was not loaded again; load overlapping layers together"
         )

@@ -1,7 +1,7 @@
-"""One object in two sources is one object: merge by class within a radius, and say what was done.
+"""Merge objects of the same class from different sources that are within a radius.
 
-Objects of one source are never merged with each other; `objects.load.build_objects` has
-dealt with rows that stand twice in a source.
+Objects of one source are never merged with each other; `objects.load.build_objects` has already
+collapsed duplicates within a source.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
     from semsig_gis.objects.table import StreetObjects
 
-# A catalogue accepts the same: beyond that, two objects of a class are two objects.
+# Catalogues have the same limit; objects farther apart are different objects.
 RADIUS_LIMIT_M = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConflatedPair:
-    """What was merged of one class between two sources.
+    """Objects of one class that were merged between two sources.
 
-    `count` objects of the source `merged` lay within `radius` metres of objects of `kept`, whose
-    positions stay; `median_m` and `largest_m` are the distances between the two.
+    `count` objects of the source `merged` were merged into objects of the source `kept` within
+    `radius` metres, which keep their positions; `median_m` and `largest_m` are the distances.
     """
 
     class_name: str
@@ -53,9 +53,9 @@ class ConflatedPair:
 
 @dataclass(frozen=True, repr=False, slots=True)
 class ConflationReport(Displayed):
-    """What was merged, for every class and pair of sources with something in common.
+    """Merged objects for every class and pair of sources.
 
-    Classes stand in the order in which their radii were given, sources in that of the objects.
+    Classes are in the order of the radii, sources in the order of the objects.
     """
 
     pairs: tuple[ConflatedPair, ...]
@@ -72,31 +72,30 @@ class ConflationReport(Displayed):
 def conflate(
     objects: StreetObjects, radii: Mapping[str, float]
 ) -> tuple[StreetObjects, ConflationReport]:
-    """Merge objects that stand in several sources.
+    """Merge objects that occur in several sources.
 
-    Source after source is compared with what remains of those before it. Of all pairs of a
-    remaining and a new object within the radius, the nearest is merged first, and each object takes
-    part once. Pairs of equal distance go by source, position and identifier, so that the order of
-    the rows in a source does not matter.
+    Each source is compared with the remaining objects of all sources before it. Of the pairs of a
+    remaining and a new object within the radius, the nearest is merged first, and each object is
+    merged at most once. Pairs at equal distance are ordered by source, position and identifier, so
+    the result does not depend on the order of rows in a source.
 
     Parameters
     ----------
     objects : StreetObjects
-        The objects; the column ``source`` tells the sources apart, and one whose rows begin
-        earlier is trusted more. InputError if they were conflated before.
+        The objects; their source is in the column ``source``. The source that occurs first has
+        priority. InputError if they are conflated already.
     radii : mapping of str to float
-        Classes, and the metres (above 0, below 100) within which two objects of different sources
-        are the same. Other classes are left as they are. UnknownNameError if there is no such
-        class.
+        Distance in metres (above 0, below 100) by class, within which two objects of different
+        sources are the same. Other classes are unchanged. UnknownNameError for an unknown class.
 
     Returns
     -------
     objects : StreetObjects
-        The remaining objects in their order. An object that others were merged into keeps its
-        source and position, its ``count`` is the sum of theirs, and its column ``merged`` lists
-        them as ``"source:id; source:id"``. The licences of all sources still hold.
+        The remaining objects in their order. Each has its source and position, the sum of the
+        ``count`` of the objects merged into it, and their list ``"source:id; source:id"`` in the
+        column ``merged``. The licences of all sources are included.
     report : ConflationReport
-        How many were merged, a class and pair of sources.
+        Number of merged objects by class and pair of sources.
 
     Examples
     --------
@@ -121,34 +120,34 @@ def conflate(
             raise InputError(
                 f"class {name!r} has the radius {radius!r}; give metres above 0 and below 100."
             )
-    view = _view(objects)
+    keys = _merge_keys(objects)
     matches = [
-        _Match(name, kept, merged, metres)
+        _Match(name, first, second, metres)
         for name, radius in radii.items()
-        for kept, merged, metres in _matches(
-            view, np.flatnonzero(objects.codes == codes[name]), radius
+        for first, second, metres in _matches(
+            keys, np.flatnonzero(objects.codes == codes[name]), radius
         )
     ]
-    return _merged(objects, view, matches), _report(view, matches, radii)
+    return _merged(objects, keys, matches), _report(keys, matches, radii)
 
 
-class _View(NamedTuple):
-    """What decides about merging, an entry an object."""
+class _MergeKeys(NamedTuple):
+    """Columns that decide about merging, shape (n,) but for `xy`, (n, 2), and `names`."""
 
     xy: NDArray[np.float64]
-    source: NDArray[np.int64]  # number of the source, the first one 0
+    source: NDArray[np.int64]  # number of the source, from 0
     names: list[str]  # of the sources
-    rank: NDArray[np.int64]  # place in an order that does not depend on that of the rows
+    rank: NDArray[np.int64]  # in an order that does not depend on the order of rows
 
 
 class _Match(NamedTuple):
     class_name: str
-    kept: int  # row
-    merged: int  # row
+    first: int  # row that remains
+    second: int  # row merged into it
     metres: float
 
 
-def _view(objects: StreetObjects) -> _View:
+def _merge_keys(objects: StreetObjects) -> _MergeKeys:
     table = objects.table
     source, names = pd.factorize(table[SOURCE])
     x, y = objects.xy.T
@@ -157,76 +156,79 @@ def _view(objects: StreetObjects) -> _View:
     )
     rank = np.empty(len(keys), np.int64)
     rank[keys.sort_values(list(keys.columns)).index] = np.arange(len(keys))
-    return _View(objects.xy, source, names.tolist(), rank)
+    return _MergeKeys(objects.xy, source, names.tolist(), rank)
 
 
 def _matches(
-    view: _View, members: NDArray[np.int64], radius: float
+    keys: _MergeKeys, members: NDArray[np.int64], radius: float
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield row kept, row merged and metres between them, for the objects of one class."""
+    """Yield remaining row, merged row and metres between them, for the objects of one class."""
     remaining = members[:0]
-    for number in np.unique(view.source[members]):
-        new = members[view.source[members] == number]
-        pairs = _nearest_first(view, remaining, new, radius) if len(remaining) else []
+    # Sources in order of priority: each is matched with the rows that remain of those before.
+    for number in np.unique(keys.source[members]):
+        new = members[keys.source[members] == number]
+        pairs = _nearest_first(keys, remaining, new, radius) if len(remaining) else []
         yield from pairs
         merged = [row for _, row, _ in pairs]
         remaining = np.concatenate([remaining, np.setdiff1d(new, merged)])
 
 
 def _nearest_first(
-    view: _View, old: NDArray[np.int64], new: NDArray[np.int64], radius: float
+    keys: _MergeKeys, old: NDArray[np.int64], new: NDArray[np.int64], radius: float
 ) -> list[tuple[int, int, float]]:
-    """Pair old and new objects one to one, the nearest first."""
-    new_at, old_at = ObjectIndex(view.xy[old]).pairs_within(view.xy[new], radius=radius)
+    """Match old and new rows one to one, the nearest pairs first."""
+    new_at, old_at = ObjectIndex(keys.xy[old]).pairs_within(keys.xy[new], radius=radius)
     new_row, old_row = new[new_at], old[old_at]
-    metres = np.hypot(*(view.xy[old_row] - view.xy[new_row]).T)
-    order = np.lexsort((view.rank[new_row], view.rank[old_row], metres))
-    taken: set[int] = set()
+    metres = np.hypot(*(keys.xy[old_row] - keys.xy[new_row]).T)
+    order = np.lexsort((keys.rank[new_row], keys.rank[old_row], metres))
+    matched: set[int] = set()
     pairs = []
-    for left, right, distance in zip(
+    for pair in zip(
         old_row[order].tolist(), new_row[order].tolist(), metres[order].tolist(), strict=True
     ):
-        if left not in taken and right not in taken:
-            taken.update((left, right))
-            pairs.append((left, right, distance))
+        if matched.isdisjoint(pair[:2]):
+            matched.update(pair[:2])
+            pairs.append(pair)
     return pairs
 
 
-def _merged(objects: StreetObjects, view: _View, matches: Sequence[_Match]) -> StreetObjects:
-    """Return the objects that remain, with what was merged into them."""
+def _merged(objects: StreetObjects, keys: _MergeKeys, matches: Sequence[_Match]) -> StreetObjects:
+    """Return the remaining objects with their new counts and lists of merged objects."""
     table = objects.table
     source, source_id = table[SOURCE].tolist(), table[SOURCE_ID].tolist()
     counts = table[COUNT].to_numpy(np.int64).copy()
     entries: dict[int, list[str]] = {}
-    for match in sorted(matches, key=lambda match: view.rank[match.merged]):  # by source
-        counts[match.kept] += counts[match.merged]
-        entry = f"{source[match.merged]}:{source_id[match.merged]}"
-        entries.setdefault(match.kept, []).append(entry)
+    for match in sorted(matches, key=lambda match: keys.rank[match.second]):  # by source
+        counts[match.first] += counts[match.second]
+        entry = f"{source[match.second]}:{source_id[match.second]}"
+        entries.setdefault(match.first, []).append(entry)
     result = table.drop(columns=GEOMETRY)
     result[COUNT] = counts.astype(np.int32)
     result[MERGED] = ["; ".join(entries.get(row, [])) for row in range(len(table))]
     result = result.set_geometry(table.geometry)
-    gone = [match.merged for match in matches]
-    return replace(objects, table=result.drop(index=gone).reset_index(drop=True))
+    merged_rows = [match.second for match in matches]
+    return replace(objects, table=result.drop(index=merged_rows).reset_index(drop=True))
 
 
-def _report(view: _View, matches: Sequence[_Match], radii: Mapping[str, float]) -> ConflationReport:
+def _report(
+    keys: _MergeKeys, matches: Sequence[_Match], radii: Mapping[str, float]
+) -> ConflationReport:
     classes = list(radii)
     metres_of: dict[tuple[int, int, int], list[float]] = {}
     for match in matches:
-        sources = int(view.source[match.kept]), int(view.source[match.merged])
+        sources = int(keys.source[match.first]), int(keys.source[match.second])
         metres_of.setdefault((classes.index(match.class_name), *sources), []).append(match.metres)
     return ConflationReport(
         tuple(
             ConflatedPair(
                 class_name=classes[number],
                 radius=float(radii[classes[number]]),
-                kept=view.names[kept],
-                merged=view.names[merged],
+                kept=keys.names[first],
+                merged=keys.names[second],
                 count=len(metres),
                 median_m=float(np.median(metres)),
                 largest_m=max(metres),
             )
-            for (number, kept, merged), metres in sorted(metres_of.items())
+            for (number, first, second), metres in sorted(metres_of.items())
         )
     )

@@ -1,4 +1,4 @@
-"""Drafts of catalogues: what a file seems to hold, by its names, fields and values."""
+"""Draft a catalogue for a file from its names, fields and values."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from semsig_gis.objects.guesses import (
     guess_class,
     guess_class_by,
     guess_position,
-    samples_of,
+    sample_layers,
 )
 from semsig_gis.objects.load import assemble, read_files
 from semsig_gis.sources import (
@@ -56,16 +56,16 @@ from semsig_gis.sources import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from semsig_gis.objects.guesses import Column, Sample
+    from semsig_gis.objects.guesses import Column, LayerSample
 
 
-# Any plane will do to look at coordinates as they are.
+# Any projected CRS, to read coordinates unchanged.
 PLANE = "EPSG:3857"
-# Marks what a person must check.
+# Mark of lines that a person must check.
 EDIT = "EDIT"
 FILTERS_SHOWN = 8
-# A field that has more rows a value than this does not identify anything.
-FEW_PER_ID = 10
+# Maximum number of rows per value of a field that may identify objects.
+MAX_ROWS_PER_ID = 10
 FIRST_OWN_CODE = 12
 SYMBOLS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
 GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Polygon": "polygon"}
@@ -73,10 +73,10 @@ GEOMETRIES = {"Point": "point", "LineString": "line", "LinearRing": "line", "Pol
 
 @dataclass(frozen=True, slots=True)
 class _Draft:
-    """What is known and guessed of one layer."""
+    """Facts and guesses about a layer."""
 
     file: Path
-    sample: Sample
+    sample: LayerSample
     columns: tuple[Column, ...]
     geometry: str | None
     guess: ClassGuess
@@ -99,16 +99,16 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     Returns
     -------
     str
-        TOML text, by which the file loads. What only a person can know is marked ``EDIT`` in a
-        comment; if nothing in the file suggests the class, it is one of its own. Filters, classes
-        by the value of a field and the like are offered in comments.
+        TOML text that can load the file. Values that only a person can know are marked ``EDIT`` in
+        a comment. If nothing suggests a class, the layer gets a class of its own. Filters, classes
+        by the value of a field and similar settings are offered in comments.
 
     Raises
     ------
     SourceError
-        If the file is missing, damaged, of another kind, or holds no positions.
+        If the file is missing, damaged, of another kind, or contains no positions.
     CrsError
-        If nobody states the CRS, and the coordinates cannot be degrees.
+        If the CRS is not stated, and the coordinates cannot be degrees.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
     # Fields: id, lon, lat, wood
     """
     path = Path(path)
-    items = samples_of(path)
+    items = sample_layers(path)
     layers = [item for item in items if item.info.geometry != NO_GEOMETRY]
     if not layers:
         raise SourceError(f"{path} has no layer with positions; give a file that has one.")
@@ -160,7 +160,7 @@ def draft_catalog(path: str | Path, *, crs: str | None = None) -> str:
 
 
 def _require_loads(text: str, path: Path) -> None:
-    """Refuse a draft by which its own file does not load, with what a load says of it."""
+    """Raise SourceError if the file does not load with the draft."""
     with temporary_folder(Path(tempfile.gettempdir())) as folder:
         file = folder / "draft.toml"
         file.write_text(text, encoding="utf-8")
@@ -179,7 +179,7 @@ def _require_loads(text: str, path: Path) -> None:
             ) from error
 
 
-def _draft(path: Path, sample: Sample, crs: str | None) -> _Draft:
+def _draft(path: Path, sample: LayerSample, crs: str | None) -> _Draft:
     columns = columns_of(sample)
     geometry = GEOMETRIES.get(sample.info.geometry.removeprefix("3D ").removeprefix("Multi"))
     position = sample.coordinates if sample.placed else guess_position(sample, columns)
@@ -191,32 +191,28 @@ def _draft(path: Path, sample: Sample, crs: str | None) -> _Draft:
         )
     names = f"{path.stem} / {sample.info.name}"
     guess = guess_class(names, columns, geometry=geometry, rows=len(sample.rows))
-    if not guess.name:
-        guess = ClassGuess(_class_name(path.stem))
-    kinds = [column for column in columns if column.meant_for("filter") or not guess.sure]
-    class_by = None if guess.is_role else guess_class_by(kinds, guess.name)
-    found, reason = _crs(path, sample, position, crs)
-    return _Draft(path, sample, columns, geometry, guess, class_by, position, found, reason)
-
-
-def _class_name(text: str) -> str:
-    """Return the name of a class for what nothing is known of but its name."""
-    name = re.sub(r"[^a-z0-9]+", "_", _snake(text)).strip("_")
-    return name if name[:1].isalpha() else f"layer_{name}".rstrip("_")
+    if not guess.name:  # a class of its own, named after the file
+        name = re.sub(r"[^a-z0-9]+", "_", _snake(path.stem)).strip("_")
+        guess = ClassGuess(name if name[:1].isalpha() else f"layer_{name}".rstrip("_"))
+    candidates = [column for column in columns if column.meant_for("filter") or not guess.sure]
+    class_by = None if guess.is_role else guess_class_by(candidates, guess.name)
+    crs, crs_reason = _crs(path, sample, position, crs)
+    return _Draft(path, sample, columns, geometry, guess, class_by, position, crs, crs_reason)
 
 
 def _crs(
-    path: Path, sample: Sample, position: tuple[str, ...], given: str | None
+    path: Path, sample: LayerSample, position: tuple[str, ...], crs: str | None
 ) -> tuple[str | None, str]:
-    """Return the CRS that a catalogue has to state, None where the file does, and how it is known.
+    """Return the CRS for the catalogue, None if the file states it, and a comment on it.
 
-    CrsError where nobody knows.
+    CrsError if it is unknown; `crs` is that of a file that does not state one.
     """
     stated = sample.info.crs
     if stated is not None and len(position) < 2:  # noqa: PLR2004 - not x and y
         return (stated if sample.reader == VECTOR else None), ""
-    if given is not None:
-        return given, ""
+    if crs is not None:
+        return crs, ""
+    # Read the coordinates in any CRS, to see whether they can be degrees.
     x, y = position if len(position) == 2 else (None, None)  # noqa: PLR2004 - x and y
     spec = LayerSpec(
         name="draft",
@@ -236,8 +232,8 @@ def _crs(
     )
 
 
-def _metric_crs(layers: Sequence[Sample]) -> str:
-    """Take the CRS of the layers, where it is one in which distances can be taken."""
+def _metric_crs(layers: Sequence[LayerSample]) -> str:
+    """Return the line with the CRS of all layers if it is metric, or else a comment."""
     crs, *others = {item.info.crs for item in layers}
     if not others:
         with contextlib.suppress(CrsError):
@@ -250,27 +246,27 @@ def _classes(drafts: Sequence[_Draft]) -> Iterator[str]:
     """Yield stanzas for classes that the paper does not have."""
     taxonomies = [load_catalog(name).taxonomy for name in catalog_names()]
     shipped = {item.name: item for taxonomy in taxonomies for item in taxonomy.classes}
-    taken = list(shipped.values())
+    existing = list(shipped.values())
     paper = {item.name for item in paper_taxonomy().classes}
-    sure = [draft.guess.name for draft in drafts if draft.guess.name and not draft.guess.is_role]
-    maybe = [name for draft in drafts if draft.class_by for name in draft.class_by[1].values()]
-    for name in dict.fromkeys([*sure, *maybe]):
+    used = [draft.guess.name for draft in drafts if draft.guess.name and not draft.guess.is_role]
+    possible = [name for draft in drafts if draft.class_by for name in draft.class_by[1].values()]
+    for name in dict.fromkeys([*used, *possible]):
         if name in paper:
             continue
-        item = shipped.get(name) or _new_class(name, taken)
-        taken.append(item)
-        comment = "" if name in sure else "# "
-        yield from [""] if name in sure else ["", "# For class_by below:"]
+        item = shipped.get(name) or _new_class(name, existing)
+        existing.append(item)
+        comment = "" if name in used else "# "
+        yield from [""] if name in used else ["", "# For class_by below:"]
         yield f"{comment}[[classes]]"
         for key in ("code", "symbol", "name", "title", "height_m", "height_sigma"):
             if (value := getattr(item, key)) is not None:
                 yield f"{comment}{key} = {json.dumps(value, ensure_ascii=False)}"
 
 
-def _new_class(name: str, taken: Sequence[ObjectClass]) -> ObjectClass:
-    """Return a class with a code and a symbol that no shipped class has."""
-    codes = {item.code for item in taken}
-    symbols = {item.symbol for item in taken}
+def _new_class(name: str, existing: Sequence[ObjectClass]) -> ObjectClass:
+    """Return a class with a code and a symbol that no existing class has."""
+    codes = {item.code for item in existing}
+    symbols = {item.symbol for item in existing}
     code = next(code for code in range(FIRST_OWN_CODE, MAX_CODE) if code not in codes)
     letters = name.upper() + name + SYMBOLS
     symbol = next(letter for letter in letters if letter in SYMBOLS and letter not in symbols)
@@ -314,39 +310,40 @@ def _class(guess: ClassGuess) -> str:
 
 
 def _identifier(draft: _Draft) -> Iterator[str]:
-    """Yield the field that tells rows apart, or those that may."""
+    """Yield the line with the identifier of rows, or comments on possible ones."""
     rows = len(draft.sample.rows)
-    some = "every row" if rows == draft.sample.info.rows else f"each of the first {rows:,} rows"
-    named = [column for column in draft.columns if column.meant_for("identifier")]
+    where = "every row" if rows == draft.sample.info.rows else f"each of the first {rows:,} rows"
+    identifiers = [column for column in draft.columns if column.meant_for("identifier")]
     numbers = [column for column in draft.columns if column.meant_for("row_number")]
-    for column in [*named, *numbers]:
+    for column in [*identifiers, *numbers]:
         if column.unique:
             warning = (
                 ""
-                if column in named
+                if column in identifiers
                 else "; assigned by a program, which may assign others next time"
             )
-            yield f"id_field = {_text(column.name)}  # a different value in {some}{warning}"
+            yield f"id_field = {_text(column.name)}  # a different value in {where}{warning}"
             return
     yield (
-        f"# No field that is named like an identifier has a different value in {some}; rows "
+        f"# No field that is named like an identifier has a different value in {where}; rows "
         "are identified by their number."
     )
-    best = max(named, key=lambda column: len(column.counts), default=None)
-    if best is not None and best.counts and len(best.counts) * FEW_PER_ID >= rows:
+    best = max(identifiers, key=lambda column: len(column.counts), default=None)
+    if best is not None and best.counts and len(best.counts) * MAX_ROWS_PER_ID >= rows:
         yield f"# id_field = {_text(best.name)}  # {len(best.counts):,} values in {rows:,} rows"
         yield "# unique_id = true  # if rows of the same id are the same object"
         return
     for column in draft.columns:
-        # Numbers with decimals are different by chance.
+        # Numbers with decimals are measurements, which are unique by chance.
         measured = any(str(value).count(".") == 1 for value in column.counts)
         if column.unique and not measured and column.name not in draft.position:
-            yield f"# id_field = {_text(column.name)}  # different in {some}; use it if it is an id"
+            name = _text(column.name)
+            yield f"# id_field = {name}  # different in {where}; use it if it is an id"
             return
 
 
 def _place(draft: _Draft) -> Iterator[str]:
-    """Yield where positions are found, and in which CRS."""
+    """Yield the lines with the fields of positions and the CRS."""
     if len(draft.position) == 1:
         (field,) = draft.position
         yield f"aliases = {{ geo_point_2d = [{_text(field)}] }}  # latitude, longitude"
@@ -361,14 +358,14 @@ def _place(draft: _Draft) -> Iterator[str]:
     except CRSError:
         yield f"# The file states its own coordinate system, {_text(draft.crs)}, which has no code."
     else:
-        why = f"  # {EDIT}: {draft.crs_reason}" if draft.crs_reason else ""
-        yield f"crs = {_text(draft.crs)}{why}"
+        comment = f"  # {EDIT}: {draft.crs_reason}" if draft.crs_reason else ""
+        yield f"crs = {_text(draft.crs)}{comment}"
 
 
 def _filters(draft: _Draft) -> Iterator[str]:
-    """Yield, in comments, the fields of few values, and the classes that one of them tells."""
+    """Yield comments with fields of few values, and with a field that may contain the class."""
     rows = len(draft.sample.rows)
-    seen = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
+    sampled = "" if rows == draft.sample.info.rows else f" (seen in the first {rows:,} rows)"
     if draft.class_by is not None:
         field, classes = draft.class_by
         (counts,) = (column.counts for column in draft.columns if column.name == field)
@@ -376,14 +373,17 @@ def _filters(draft: _Draft) -> Iterator[str]:
             f"{_key(_exactly(str(value)))} = {_text(classes.get(value, draft.guess.name))}"
             for value, _ in counts.most_common()
         )
-        yield f"# If {_plain(field)} gives the class of a row, with all of its values{seen}:"
+        yield f"# If {_plain(field)} gives the class of a row, with all of its values{sampled}:"
         yield f"# class_by = {{ field = {_text(field)}, values = {{ {values} }} }}"
     few = [column for column in draft.columns if column.few]
-    few.sort(key=lambda column: not column.meant_for("filter"))  # the others keep their order
+    few.sort(key=lambda column: not column.meant_for("filter"))  # stable: typical filters first
     if few:
-        yield f"# To keep only some rows, use one of these without the unwanted values{seen}:"
+        yield f"# To keep only some rows, use one of these without the unwanted values{sampled}:"
     for column in few[:FILTERS_SHOWN]:
-        values = ", ".join(_value(value) for value, _ in column.counts.most_common())
+        values = ", ".join(
+            str(value).lower() if isinstance(value, bool) else _text(_exactly(str(value)))
+            for value, _ in column.counts.most_common()
+        )
         numbers = ", ".join(f"{number:,}" for _, number in column.counts.most_common())
         missing = f"; without: {column.missing:,}" if column.missing else ""
         yield f"# where = {{ {_key(column.name)} = [{values}] }}  # rows: {numbers}{missing}"
@@ -393,22 +393,18 @@ def _filters(draft: _Draft) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """Return a TOML string: JSON's, but for the one control character that JSON lets pass."""
+    """Return a TOML string: a JSON string with U+007F escaped as well."""
     clean = text.encode("utf-8", "replace").decode("utf-8")  # a file name may be anything
     return json.dumps(clean, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _plain(text: str) -> str:
-    """Return text that fits into a comment."""
+    """Return text escaped for a comment."""
     return _text(text)[1:-1].replace('\\"', '"')
 
 
-def _value(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else _text(_exactly(str(value)))
-
-
 def _exactly(value: str) -> str:
-    """Return what a catalogue takes for that very value, which may look like a condition."""
+    """Return a condition for exactly this value, which may itself look like a condition."""
     with contextlib.suppress(CatalogError):
         if Condition.parse([value]) == Condition((value,)) and value != ANY_VALUE:
             return value if not BETWEEN_SLASHES.fullmatch(value) else f"/{re.escape(value)}/"
@@ -424,9 +420,9 @@ def _snake(text: str) -> str:
 
 
 def _unique(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names, with a number where one comes again."""
-    seen: set[str] = set()
+    """Yield the names, with a number appended to repeated ones."""
+    used: set[str] = set()
     for name in names:
-        free = (f"{name}_{number}" if number > 1 else name for number in itertools.count(1))
-        seen.add(first := next(candidate for candidate in free if candidate not in seen))
-        yield first
+        candidates = (f"{name}_{number}" if number > 1 else name for number in itertools.count(1))
+        used.add(unique := next(candidate for candidate in candidates if candidate not in used))
+        yield unique

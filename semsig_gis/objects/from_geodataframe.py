@@ -1,4 +1,4 @@
-"""From a GeoDataFrame to street objects: by tags of OpenStreetMap, a column, or a catalogue."""
+"""Convert a GeoDataFrame to street objects, by OpenStreetMap tags, classes or a catalogue."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
 
 WHERE = "the table"
-COLUMNS_TOLD = 12
+COLUMNS_SHOWN = 12
 
 
 def objects_from_frame(
@@ -54,38 +54,37 @@ def objects_from_frame(
     layers: Sequence[str] = (),
     metric_crs: str | None = None,
 ) -> StreetObjects:
-    """Turn a GeoDataFrame into street objects.
+    """Convert a GeoDataFrame to street objects.
 
-    A table of OpenStreetMap's elements, as osmnx and QuackOSM make it, needs no more: its tags are
-    in columns of their own, or in a column ``tags`` (a map, JSON, or text as of hstore).
+    A table of OpenStreetMap elements, as from osmnx or QuackOSM, needs no other parameter. Its tags
+    are in columns of their own, or in a column ``tags`` (a map, JSON, or hstore text).
 
     Parameters
     ----------
     frame : GeoDataFrame
-        A row a thing, in any CRS. What is not a point stands at its centroid.
+        One row per feature, in any CRS. A feature that is not a point is placed at its centroid.
     class_column : str, optional
-        Column of the classes, by name; rows without one are left out. The classes are those of
+        Column of class names; rows without a value are omitted. The classes are those of
         `catalog`, or of all built-in catalogues.
     tags : bool, default False
-        Whether the columns are tags of OpenStreetMap; a table that says which elements it contains
-        (such as ``element`` and ``id``, ``feature_id``, or ``osm_id``) is recognised by that.
+        Whether the columns are OpenStreetMap tags; not needed for a table with identifiers of
+        elements (such as ``element`` and ``id``, ``feature_id``, or ``osm_id``).
     catalog : Catalog, str or Path, optional
-        Catalogue whose layers are looked for: ``openstreetmap`` by tags, any other by the fields
-        of its layers.
+        Catalogue of the layers: ``openstreetmap`` by tags, any other by the fields of its layers.
     layers : sequence of str, optional
         Layers of the catalogue, as in `choose_layers`.
     metric_crs : str, optional
-        CRS to work in; the catalogue's by default, or the UTM zone of the data where it has none.
+        Metric CRS; by default that of the catalogue, or else the UTM zone of the data.
 
     Returns
     -------
     StreetObjects
-        The objects. ``frame.attrs["licenses"]`` says whom to name for classes in a column.
+        The objects. With `class_column`, the licences are ``frame.attrs["licenses"]``.
 
     Raises
     ------
     InputError
-        If the table does not say what it contains, or a value of the column is not a class.
+        If the contents of the table are not clear, or a value of the column is not a class.
     CrsError
         If it has no CRS.
     EmptyResultError
@@ -108,29 +107,30 @@ def objects_from_frame(
         raise InputError(
             "tags were given together with a column of classes or a catalogue; give one of them."
         )
-    known = load_catalog(catalog) if isinstance(catalog, str | Path) else catalog
+    if isinstance(catalog, str | Path):
+        catalog = load_catalog(catalog)
     if class_column is not None:
-        return _by_column(frame, class_column, known, metric_crs=metric_crs)
-    if known is None:
-        _require_tags(frame, sure=not tags)
-        known = load_catalog("openstreetmap")
-    specs = choose_layers(known, layers)
+        return _by_column(frame, class_column, catalog, metric_crs=metric_crs)
+    if catalog is None:
+        _require_tags(frame, with_elements=not tags)
+        catalog = load_catalog("openstreetmap")
+    specs = choose_layers(catalog, layers)
     by_tags = tuple(spec for spec in specs if spec.reader == TAGS_READER)
     if by_tags:
         _require_tags(frame)
         raw = frame_layers(frame, by_tags)
     else:
-        raw = (_by_fields(frame, specs, known),)
+        raw = (_by_fields(frame, specs, catalog),)
     if not any(len(layer.table) for layer in raw):
         raise EmptyResultError(
             f"none of the {len(frame):,} rows of the table is a street object of catalogue "
-            f"{known.name!r}; check their tags or fields (`semsig sources` lists what is read)."
+            f"{catalog.name!r}; check their tags or fields (`semsig sources` lists what is read)."
         )
-    return assemble(raw, known, metric_crs=metric_crs).objects
+    return assemble(raw, catalog, metric_crs=metric_crs).objects
 
 
 def _require_frame(frame: object) -> None:
-    """Refuse what is no table of places."""
+    """Raise an error if `frame` is not a GeoDataFrame with geometry and CRS."""
     if not isinstance(frame, gpd.GeoDataFrame):
         raise InputError(
             f"a {type(frame).__name__} was given; give a GeoDataFrame, or street objects such as "
@@ -142,21 +142,21 @@ def _require_frame(frame: object) -> None:
         raise CrsError("the table has no coordinate reference system; state it with set_crs.")
 
 
-def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
-    """Refuse a table without tags of OpenStreetMap, or, to be sure, without its elements."""
+def _require_tags(frame: gpd.GeoDataFrame, *, with_elements: bool = False) -> None:
+    """Raise InputError if a table has no OpenStreetMap tags, or no identifiers of elements."""
     fields = frame_fields(frame)
-    tells = has_element_columns if sure else has_tag_columns
-    if tells(fields):
+    accepted = has_element_columns if with_elements else has_tag_columns
+    if accepted(fields):
         return
-    told = ", ".join(fields[:COLUMNS_TOLD]) + (", ..." if len(fields) > COLUMNS_TOLD else "")
-    if sure and has_tag_columns(fields):
+    names = ", ".join(fields[:COLUMNS_SHOWN]) + (", ..." if len(fields) > COLUMNS_SHOWN else "")
+    if with_elements and has_tag_columns(fields):
         msg = (
-            f"the table does not say what its columns ({told}) are; give tags=True if they are "
+            f"the table does not say what its columns ({names}) are; give tags=True if they are "
             "tags of OpenStreetMap, or else class_column or catalog."
         )
     else:
         msg = (
-            f"the table has no tags of OpenStreetMap among its columns ({told}); give it to "
+            f"the table has no tags of OpenStreetMap among its columns ({names}); give it to "
             "objects_from_frame with class_column, the column of the classes, or a catalog."
         )
     raise InputError(msg)
@@ -165,7 +165,7 @@ def _require_tags(frame: gpd.GeoDataFrame, *, sure: bool = False) -> None:
 def _by_column(
     frame: gpd.GeoDataFrame, column: str, catalog: Catalog | None, *, metric_crs: str | None
 ) -> StreetObjects:
-    """Return the objects of a table that has their classes in a column."""
+    """Return the objects of a table with a column of class names."""
     taxonomy = built_in_taxonomy() if catalog is None else catalog.taxonomy
     names = [item.name for item in taxonomy.classes]
     spec = LayerSpec(
@@ -182,29 +182,29 @@ def _by_column(
             f"class{nearest_name(unknown, names)}; the classes are {', '.join(names)}, and rows "
             "without one are left out."
         )
-    layer = replace(layer, notes=())  # that rows have no class is meant
-    known = catalog or Catalog(name="frame", title="Table", taxonomy=taxonomy, layers=(spec,))
-    objects = assemble([layer], replace(known, layers=(spec,)), metric_crs=metric_crs).objects
+    layer = replace(layer, notes=())  # rows without a class are intended, not worth a note
+    catalog = catalog or Catalog(name="frame", title="Table", taxonomy=taxonomy, layers=(spec,))
+    objects = assemble([layer], replace(catalog, layers=(spec,)), metric_crs=metric_crs).objects
     lines = frame.attrs.get(LICENSES, ())
     return replace(objects, licenses=tuple(map(Licence, lines))) if lines else objects
 
 
 def _by_fields(frame: gpd.GeoDataFrame, specs: Sequence[LayerSpec], catalog: Catalog) -> RawLayer:
-    """Return the one layer of a catalogue whose fields a table has."""
+    """Return the only layer of a catalogue that has its fields in a table; else InputError."""
     fields = set(frame_fields(frame))
-    fitting = [spec for spec in specs if fields.issuperset(name for _, name in spec.fields)]
-    if len(fitting) != 1:
-        what = "several of them" if fitting else "none of them"
-        named = ", ".join(spec.name for spec in (fitting or specs))
+    matches = [spec for spec in specs if fields.issuperset(name for _, name in spec.fields)]
+    if len(matches) != 1:
+        what = "several of them" if matches else "none of them"
+        names = ", ".join(spec.name for spec in (matches or specs))
         raise InputError(
-            f"the table fits {what} of the layers of catalogue {catalog.name!r} ({named}); give "
+            f"the table fits {what} of the layers of catalogue {catalog.name!r} ({names}); give "
             "the right one as layers, or the column of its classes as class_column."
         )
-    return _by_rules(frame, fitting[0])
+    return _by_rules(frame, matches[0])
 
 
 def _by_rules(frame: gpd.GeoDataFrame, spec: LayerSpec) -> RawLayer:
-    """Return a layer of a table by the rules of a catalogue."""
+    """Return the layer of a table that the rules of a layer spec select."""
     levels = [name for name in frame.index.names if name is not None and name not in frame]
     table = frame.reset_index(level=levels) if levels else frame
     rules = RowRules(spec, [str(name) for name in table.columns], filters=True, where=WHERE)

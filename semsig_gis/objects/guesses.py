@@ -1,8 +1,9 @@
-"""Guesses of what a file holds: the class and the position of its rows, by fields and values."""
+"""Guess the class and the position of the rows of a file from its fields and values."""
 
 from __future__ import annotations
 
 import itertools
+import operator
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -33,28 +34,28 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 VECTOR = "vector_file"
-# Files that may be a plain table of records, which GDAL takes for nothing or for rows of text.
+# Files that may be a plain table of records, which GDAL cannot read or reads as text.
 TABLE_SUFFIXES = frozenset({".csv", ".gml", ".json", ".parquet"})
 SAMPLE_ROWS = 100_000
 ROLE_GEOMETRY = {"buildings": "polygon", "streets": "line"}
-# A field with no more values is one to filter by, unless most of them are seen only once.
+# Maximum number of distinct values of a field that is offered as a filter.
 FEW_VALUES = 12
-# A field that tells the class may have more.
-MOST_CLASS_VALUES = 50
-LONGEST_VALUE = 60
-LEAST_SHARE = 0.1
-# A class must be named by the values of at least this share of the rows.
-MOST_ROWS = 0.5
+# Maximum number of distinct values of a field with the class of a row.
+MAX_CLASS_VALUES = 50
+MAX_VALUE_LENGTH = 60
+MIN_FILLED_SHARE = 0.1
+# Minimum share of rows with a value that names the guessed class.
+MIN_CLASS_SHARE = 0.5
 DATE = re.compile(r"\d{4}-\d\d-\d\d|\d\d[-/.]\d\d[-/.]\d{4}")
 LAT_LON = re.compile(r"\s*-?\d{1,2}\.\d+\s*,\s*-?\d{1,3}\.\d+\s*")
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
-    """One layer, the name of its reader, and all fields of its first rows.
+class LayerSample:
+    """A layer with the name of its reader and its first rows.
 
-    `placed` says whether the reader finds the positions by itself; `coordinates` are the two fields
-    in which it finds them, where they are two.
+    `placed` is whether the reader finds the positions by itself; `coordinates` are the two fields
+    of the positions, if it finds them in two fields.
     """
 
     reader: str
@@ -64,29 +65,29 @@ class Sample:
     coordinates: tuple[str, ...] = ()
 
 
-def samples_of(path: Path) -> tuple[Sample, ...]:
-    """Return the layers of a file that may hold positions; SourceError for one not to describe."""
+def sample_layers(path: Path) -> tuple[LayerSample, ...]:
+    """Return samples of the layers of a file; SourceError if it cannot be drafted."""
     suffix = path.suffix.lower()
     if path.name.lower().endswith(tuple(FORMATS)):
         raise SourceError(
             f"{path} is OpenStreetMap data; load it with the built-in catalogue 'openstreetmap'."
         )
-    layers: tuple[Sample, ...] = ()
+    layers: tuple[LayerSample, ...] = ()
     try:
         if suffix != ".parquet":
             layers = tuple(
-                Sample(VECTOR, info, rows, coordinates=coordinates)
+                LayerSample(VECTOR, info, rows, coordinates=coordinates)
                 for info, rows, coordinates in first_rows(path, limit=SAMPLE_ROWS)
             )
     except SourceError:
         if suffix not in TABLE_SUFFIXES:
             raise
     if suffix in TABLE_SUFFIXES and all(item.info.geometry == NO_GEOMETRY for item in layers):
-        return (_table(path),)
+        return (_table_sample(path),)
     return layers
 
 
-def _table(path: Path) -> Sample:
+def _table_sample(path: Path) -> LayerSample:
     table = open_table(path)
     records = (item for item in table.records(table.fields) if isinstance(item, ServiceRecord))
     first = tuple(itertools.islice(records, SAMPLE_ROWS))
@@ -94,7 +95,7 @@ def _table(path: Path) -> Sample:
     shapes = {
         record.geometry.geom_type.removeprefix("Multi")
         for record in first
-        if isinstance(record.geometry, BaseGeometry)  # as of GML
+        if isinstance(record.geometry, BaseGeometry)  # for example in GML
     }
     info = LayerInfo(
         name=path.stem,
@@ -103,16 +104,16 @@ def _table(path: Path) -> Sample:
         rows=len(rows) + sum(1 for _ in records),
         fields=tuple(table.fields),
     )
-    named = {fold(field) for field in table.fields} & {fold(SHAPE), fold(POINT)}
+    position_fields = {fold(field) for field in table.fields} & {fold(SHAPE), fold(POINT)}
     kind = "wfs" if path.suffix.lower() == ".gml" else "opendatasoft"
-    return Sample(kind, info, rows, placed=table.has_geometry or bool(named))
+    return LayerSample(kind, info, rows, placed=table.has_geometry or bool(position_fields))
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A field and its values in a sample.
+    """A field with the counts of its values in a sample.
 
-    `counts` has the rows of every value that is not blank, in the order of their first row;
+    `counts` is the number of rows of each value that is not blank, in the order of first rows;
     `missing` is the number of rows without a value.
     """
 
@@ -122,73 +123,71 @@ class Column:
 
     @property
     def unique(self) -> bool:
-        """Whether every row has a value of its own."""
+        """Whether every row has a different value."""
         return not self.missing and max(self.counts.values(), default=2) == 1
 
     @property
     def few(self) -> bool:
-        """Whether the values are few, name something, and most rows or many have one."""
-        return self.at_most(FEW_VALUES)
+        """Whether the column is categorical with at most `FEW_VALUES` distinct values."""
+        return self.is_categorical(FEW_VALUES)
 
-    def at_most(self, values: int) -> bool:
-        """Tell as `few` does, where few are so many."""
+    def is_categorical(self, limit: int) -> bool:
+        """Whether the column has 2 to `limit` distinct names, repeated, in enough rows."""
         rows = self.counts.total()
         return (
-            2 <= len(self.counts) <= values  # noqa: PLR2004 - one value tells nothing apart
+            2 <= len(self.counts) <= limit  # noqa: PLR2004 - a single value distinguishes nothing
             and 2 * len(self.counts) <= rows
-            and rows >= LEAST_SHARE * (rows + self.missing)
-            and all(_names_something(value) for value in self.counts)
+            and rows >= MIN_FILLED_SHARE * (rows + self.missing)
+            and all(_is_name(value) for value in self.counts)
         )
 
     def meant_for(self, purpose: str) -> bool:
-        """Tell whether the name is typical of a filter, identifier, row_number, x or y."""
+        """Whether the field name is typical of a filter, identifier, row_number, x or y."""
         return any(match.name == purpose for match in keywords("fields").find(self.name))
 
     @property
     def numeric(self) -> bool:
-        """Whether a value is a number, as a column of coordinates has them."""
-        return any(map(_number, self.counts))
+        """Whether a value is a number."""
+        return any(_number(value) is not None for value in self.counts)
 
     def within(self, limit: float) -> bool:
-        """Tell whether all of its numbers are from ``-limit`` to ``limit``."""
-        return all(abs(_value_of(value)) <= limit for value in self.counts if _number(value))
+        """Whether all numbers are from ``-limit`` to ``limit``."""
+        numbers = map(_number, self.counts)
+        return all(abs(number) <= limit for number in numbers if number is not None)
 
 
-def _names_something(value: object) -> bool:
+def _is_name(value: object) -> bool:
+    """Whether a value is a truth value, or a text that is no number, date or long text."""
     if not isinstance(value, str):
         return isinstance(value, bool)
-    return len(value) <= LONGEST_VALUE and not _number(value) and not DATE.search(value)
+    short = len(value) <= MAX_VALUE_LENGTH
+    return short and _number(value) is None and not DATE.search(value)
 
 
-def _number(value: object) -> bool:
+def _number(value: object) -> float | None:
+    """Return a number, also from its text; None for other values."""
     try:
-        _value_of(value)
+        return decimal(value) if isinstance(value, str) else float(value)  # type: ignore[arg-type] # raises
     except (TypeError, ValueError):
-        return False
-    return True
+        return None
 
 
-def _value_of(value: object) -> float:
-    """Return a number, or one that is written as text."""
-    return decimal(value) if isinstance(value, str) else float(value)  # type: ignore[arg-type] # what cannot be one raises
-
-
-def columns_of(sample: Sample) -> tuple[Column, ...]:
-    """Return the fields of a sample in their order, without those of lists, mappings or bytes."""
+def columns_of(sample: LayerSample) -> tuple[Column, ...]:
+    """Return the fields of a sample in their order, without fields of lists, mappings or bytes."""
     columns = []
     for name in sample.info.fields:
         values = [row.get(name) for row in sample.rows]
-        there = [value for value in values if value is not None and value != ""]
-        if all(isinstance(value, str | int | float) for value in there):
-            columns.append(Column(name, Counter(there), len(values) - len(there)))
+        filled = [value for value in values if value is not None and value != ""]
+        if all(isinstance(value, str | int | float) for value in filled):
+            columns.append(Column(name, Counter(filled), len(values) - len(filled)))
     return tuple(columns)
 
 
 @dataclass(frozen=True, slots=True)
 class ClassGuess:
-    """What a layer seems to hold: a class, or a role if `is_role`; empty if nothing points to one.
+    """Guessed class of a layer, or its role if `is_role`; the name is empty without a guess.
 
-    `others` are further classes that the name could mean; `sure`, that it means nothing else.
+    `others` are further possible classes; `sure` is whether the guess is certain.
     """
 
     name: str = ""
@@ -201,11 +200,11 @@ class ClassGuess:
 def guess_class(
     names: str, columns: Sequence[Column], *, geometry: str | None, rows: int
 ) -> ClassGuess:
-    """Guess the class of a layer, or its role where it holds no objects.
+    """Guess the class of a layer, or its role (buildings or streets).
 
-    `names` are those of the file and of the layer; `geometry` is None where it is of several kinds;
-    `rows` is the size of the sample. The name decides; else values that most rows have; else a
-    field that only one class has.
+    `names` are the names of the file and the layer; `geometry` is None for several kinds; `rows` is
+    the size of the sample. The guess is from the name, or else from values in most rows, or else
+    from a field that is typical of a class.
     """
     classes = keywords("classes").find(names)
     for role in keywords("roles").find(names):
@@ -216,23 +215,24 @@ def guess_class(
     if classes:
         first, *others = classes
         reason = f'from the name: "{first.words}"'
-        also = tuple(match.name for match in others)
-        return ClassGuess(first.name, reason=reason, others=also, sure=not also)
+        other_names = tuple(match.name for match in others)
+        return ClassGuess(first.name, reason=reason, others=other_names, sure=not other_names)
     if geometry not in {"point", None}:
         return ClassGuess()
-    return next(_by_content(columns, rows), ClassGuess())
+    return next(_guesses_by_content(columns, rows), ClassGuess())
 
 
-def _by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:
+def _guesses_by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:
+    """Yield guesses from values, then from field names."""
     for column in columns:
-        seen: Counter[str] = Counter()
+        row_counts: Counter[str] = Counter()
         example: dict[str, str] = {}
         for value, number in column.counts.items() if len(column.counts) <= FEW_VALUES else ():
             for match in keywords("classes").find(str(value))[:1]:
-                seen[match.name] += number
+                row_counts[match.name] += number
                 example.setdefault(match.name, str(value))
-        for name, number in seen.most_common(1):
-            if number >= MOST_ROWS * rows:
+        for name, number in row_counts.most_common(1):
+            if number >= MIN_CLASS_SHARE * rows:
                 yield ClassGuess(name, reason=f"from {column.name} = {example[name]}")
     for column in columns:
         for match in keywords("class_fields").find(column.name):
@@ -240,7 +240,7 @@ def _by_content(columns: Sequence[Column], rows: int) -> Iterator[ClassGuess]:
 
 
 def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dict[str, str]] | None:
-    """Return the field with most values that name other classes than the layer's, and which."""
+    """Return the field with most values that name other classes, and the class of each value."""
     fields = [
         (
             column.name,
@@ -253,14 +253,14 @@ def guess_class_by(columns: Sequence[Column], class_name: str) -> tuple[str, dic
             },
         )
         for column in columns
-        if column.at_most(MOST_CLASS_VALUES)
+        if column.is_categorical(MAX_CLASS_VALUES)
     ]
     best = max(fields, key=lambda field: len(field[1]), default=None)
     return best if best and best[1] else None
 
 
-def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]:
-    """Return the field of a table that holds ``lat, lon``, or those of x and y, or nothing."""
+def guess_position(sample: LayerSample, columns: Sequence[Column]) -> tuple[str, ...]:
+    """Return the field with ``lat, lon``, or the fields of x and y; empty if there are none."""
     for name in sample.info.fields:
         values = [row[name] for row in sample.rows if row.get(name) not in {None, ""}]
         points = sum(isinstance(value, str) and bool(LAT_LON.fullmatch(value)) for value in values)
@@ -273,14 +273,14 @@ def guess_position(sample: Sample, columns: Sequence[Column]) -> tuple[str, ...]
         for y in numbers
         if x is not y and x.meant_for("x") and y.meant_for("y")
     ]
-    best = max(pairs, key=_likeness, default=())
+    best = max(pairs, key=_pair_rank, default=())
     return tuple(column.name for column in best)
 
 
-def _likeness(pair: tuple[Column, Column]) -> tuple[bool, bool]:
-    """Tell whether two coordinates are named alike, and are degrees rather than a plane's."""
+def _pair_rank(pair: tuple[Column, Column]) -> tuple[bool, bool]:
+    """Whether the names of x and y differ in one word only, and whether they may be degrees."""
     x, y = pair
-    first, second = (words_of(column.name) for column in pair)
-    differing = sum(one != other for one, other in zip(first, second, strict=False))
-    alike = len(first) == len(second) and differing == 1
-    return alike, x.within(LONGITUDE_LIMIT) and y.within(LATITUDE_LIMIT)
+    x_words, y_words = (words_of(column.name) for column in pair)
+    differences = sum(map(operator.ne, x_words, y_words))
+    similar = len(x_words) == len(y_words) and differences == 1
+    return similar, x.within(LONGITUDE_LIMIT) and y.within(LATITUDE_LIMIT)

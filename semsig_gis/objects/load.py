@@ -1,4 +1,4 @@
-"""From files to street objects, and what surrounds them: read, in one metric CRS, merged."""
+"""Read layers from files, and assemble them to street objects, buildings and streets."""
 
 from __future__ import annotations
 
@@ -51,19 +51,18 @@ if TYPE_CHECKING:
     from semsig_gis.sources import Area, Catalog, LayerSpec, RawLayer, Role, RowCounts
 
 
-# Two objects of a class within the same centimetre are one object listed twice.
+# Objects of a class at the same place, rounded to this, are one object listed several times.
 SAME_PLACE_M = 0.01
-# Column of the geometries that positions come from; dimensions of an area.
+# Column of the original geometries.
 SHAPE = "shape"
-AREA = 2
+AREA_DIMENSIONS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class LayerReport:
-    """What became of one layer's rows; `notes` are warnings and messages on unreadable rows.
+    """Counts of the rows of a layer; `notes` are warnings and messages on unreadable rows.
 
-    `role` is that of the layer: street objects, buildings or streets. `classes` are those that its
-    objects may have.
+    `role` is "objects", "buildings" or "streets"; `classes` are the possible classes of objects.
     """
 
     name: str
@@ -75,7 +74,7 @@ class LayerReport:
 
 @dataclass(frozen=True, slots=True)
 class UnreadLayer:
-    """A layer of objects that was not read, and how many it has; None where nobody counted."""
+    """A layer of objects that was not read, with its number of objects; None if not counted."""
 
     name: str
     classes: tuple[str, ...]
@@ -84,7 +83,7 @@ class UnreadLayer:
 
 @dataclass(frozen=True, repr=False, slots=True)
 class LoadReport(Displayed):
-    """What became of every layer, in the order they were given, and which were not read."""
+    """Reports of all layers in their order, and the layers that were not read."""
 
     layers: tuple[LayerReport, ...]
     unread: tuple[UnreadLayer, ...] = ()
@@ -100,7 +99,7 @@ class LoadReport(Displayed):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The notes on all layers, each with the name of its layer before it."""
+        """The notes on all layers, each beginning with the name of its layer."""
         return tuple(layer_note(item.name, note) for item in self.layers for note in item.notes)
 
 
@@ -112,32 +111,32 @@ def build_objects(
     collapse: bool = True,
     apart: Collection[str] = (),
 ) -> tuple[StreetObjects, LoadReport]:
-    """Turn raw layers into one table of street objects.
+    """Return one table of street objects from raw layers.
 
     A geometry that is not a point is represented by its centroid in the metric CRS (paper, section
-    on semantic signatures). Rows without a usable position are dropped and counted.
+    on semantic signatures). Rows without a valid position are dropped and counted.
 
     Parameters
     ----------
     layers : iterable of RawLayer
-        What readers return. CrsError if one has no coordinate reference system.
+        The layers. CrsError if one has no coordinate reference system.
     taxonomy : Taxonomy
-        Classes that the layers name. UnknownNameError if it lacks one.
+        The classes. UnknownNameError if it lacks a class of the layers.
     crs : pyproj.CRS or str
-        Metric coordinate reference system to work in.
+        Metric coordinate reference system of the result.
     collapse : bool, default True
         Whether objects of one class at the same place (within the same centimetre) become one,
         with their number in ``count``. The place of an area is a point of its class in it, if any.
     apart : collection of str
         Classes that are collapsed within each layer only, because they will be conflated (see
-        `conflate`), which keeps account of where objects came from.
+        `conflate`), which needs their sources.
 
     Returns
     -------
     objects : StreetObjects
-        The objects, in the order of the layers; EmptyResultError if there is none.
+        The objects, in the order of the layers; EmptyResultError if there are none.
     report : LoadReport
-        What became of every row.
+        The counts of rows by layer.
 
     Examples
     --------
@@ -150,66 +149,61 @@ def build_objects(
     system = require_metric_crs(crs)
     layers = tuple(layers)
     parts = [_positions(layer, taxonomy, system) for layer in layers]
-    if not any(len(part) for part, _, _ in parts):
+    if not any(len(rows) for rows, _, _ in parts):
         raise EmptyResultError(
             f"no object remains of {sum(layer.counts.read for layer in layers)} rows in "
             f"{len(layers)} layers; look at the filters, the area, the geometries and the "
             "coordinate systems."
         )
-    everything = pd.concat([part for part, _, _ in parts], ignore_index=True)
-    # By number, because two layers may bear one name.
-    owner = np.repeat(np.arange(len(parts)), [len(part) for part, _, _ in parts])
-    # An element of the map is the same in files of all kinds.
+    rows = pd.concat([rows for rows, _, _ in parts], ignore_index=True)
+    # Layers are identified by number, because two may have the same name.
+    owner = np.repeat(np.arange(len(parts)), [len(rows) for rows, _, _ in parts])
+    # Drop rows with the id of an earlier row, as in a second file of a layer. OpenStreetMap
+    # elements have the same id in all files.
     unique = np.array([layer.spec.unique_id or bool(layer.spec.tags) for layer in layers])[owner]
-    has_id = (everything[SOURCE_ID] != "") & unique
-    # Of the id of an earlier row of the layer, as in a second file of it.
-    again = (has_id & everything.duplicated([SOURCE, SOURCE_ID])).to_numpy(bool)
-    repeated = np.bincount(owner[again], minlength=len(parts)).tolist()
-    everything, owner = everything[~again].reset_index(drop=True), owner[~again]
+    has_id = (rows[SOURCE_ID] != "") & unique
+    is_duplicate = (has_id & rows.duplicated([SOURCE, SOURCE_ID])).to_numpy(bool)
+    duplicates = np.bincount(owner[is_duplicate], minlength=len(parts)).tolist()
+    rows, owner = rows[~is_duplicate].reset_index(drop=True), owner[~is_duplicate]
+    # Collapse objects of a class at the same place, by layer for the classes in `apart`.
     if collapse:
         codes = [taxonomy.by_name(name).code for name in apart]
-        group = np.where(everything[CLASS_CODE].isin(codes), owner, -1)
-        everything[["x", "y"]] = _at_points(everything, group)
-        first, counts = _first_at_place(everything, group)
+        group = np.where(rows[CLASS_CODE].isin(codes), owner, -1)
+        rows[["x", "y"]] = _at_points(rows, group)
+        first, counts = _first_at_place(rows, group)
     else:
-        first, counts = np.arange(len(everything)), np.ones(len(everything), np.int64)
-    kept = everything.iloc[first].reset_index(drop=True)
+        first, counts = np.arange(len(rows)), np.ones(len(rows), np.int64)
+    rows = rows.iloc[first].reset_index(drop=True)
     table = gpd.GeoDataFrame(
         {
-            CLASS_CODE: kept[CLASS_CODE].to_numpy(np.uint8),
-            SOURCE: kept[SOURCE].to_numpy(str).astype(object),
-            SOURCE_ID: kept[SOURCE_ID].to_numpy(str).astype(object),
+            CLASS_CODE: rows[CLASS_CODE].to_numpy(np.uint8),
+            SOURCE: rows[SOURCE].to_numpy(str).astype(object),
+            SOURCE_ID: rows[SOURCE_ID].to_numpy(str).astype(object),
             COUNT: counts.astype(np.int32),
         },
-        geometry=shapely.points(kept["x"].to_numpy(), kept["y"].to_numpy()),
+        geometry=shapely.points(rows["x"].to_numpy(), rows["y"].to_numpy()),
         crs=system,
     )
     remaining = np.bincount(owner[first], minlength=len(parts)).tolist()
     reports = []
-    for layer, (part, missing, misplaced), twice, kept_here in zip(
-        layers, parts, repeated, remaining, strict=True
+    for layer, (layer_rows, missing, misplaced), duplicate_count, remaining_count in zip(
+        layers, parts, duplicates, remaining, strict=True
     ):
-        dropped = replace(
+        row_counts = replace(
             layer.counts,
             missing=missing,
-            duplicates=layer.counts.duplicates + twice,
+            duplicates=layer.counts.duplicates + duplicate_count,
             misplaced=layer.counts.misplaced + misplaced,
-            collapsed=len(part) - twice - kept_here,
+            collapsed=len(layer_rows) - duplicate_count - remaining_count,
         )
-        reports.append(
-            LayerReport(
-                layer.spec.name,
-                dropped,
-                (*layer.notes, *layer.errors),
-                classes=layer.spec.classes,
-            )
-        )
+        notes = (*layer.notes, *layer.errors)
+        reports.append(LayerReport(layer.spec.name, row_counts, notes, classes=layer.spec.classes))
     report = LoadReport(tuple(reports))
     return StreetObjects(table, taxonomy, layer_licences(layers), report.notes), report
 
 
 def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFrame, int, int]:
-    """Return the usable rows of a layer, and how many are missing and misplaced."""
+    """Return the rows of a layer with a valid position, and the numbers without and misplaced."""
     table = layer.table
     if table.crs is None:
         raise CrsError(
@@ -219,20 +213,20 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
     geometry = table.geometry
     usable = ~(geometry.isna() | geometry.is_empty).to_numpy(bool)
     shapes = geometry[usable]
-    # In metres first: by degrees, a line that turns would have its middle elsewhere.
+    # Centroids in the metric CRS, because those in degrees are elsewhere.
     shapes = (shapes if shapes.crs == crs else shapes.to_crs(crs)).to_numpy()
     others = shapely.get_type_id(shapes) != shapely.GeometryType.POINT
     points = shapes.copy()
     with np.errstate(invalid="ignore", over="ignore"):  # such rows are dropped below
         points[others] = shapely.centroid(shapes[others])
-    # A broken geometry may have an empty centroid, which has no coordinates at all.
+    # An invalid geometry may have an empty centroid, which has no coordinates.
     xy = np.full((len(points), 2), np.nan)
     coordinates, row = shapely.get_coordinates(points, return_index=True)
     xy[row] = coordinates
     placed = (np.abs(xy) < BEYOND_EARTH_M).all(axis=1)  # false for NaN too
     codes = {name: taxonomy.by_name(name).code for name in table[CLASS_NAME].unique()}
     rows = table[usable][placed]
-    part = pd.DataFrame(
+    result = pd.DataFrame(
         {
             SOURCE: layer.spec.name,
             SOURCE_ID: rows[SOURCE_ID].to_numpy(),
@@ -242,22 +236,22 @@ def _positions(layer: RawLayer, taxonomy: Taxonomy, crs: CRS) -> tuple[pd.DataFr
             SHAPE: shapes[placed],
         }
     )
-    return part, int((~usable).sum()), int((~placed).sum())
+    return result, int((~usable).sum()), int((~placed).sum())
 
 
-def _at_points(everything: pd.DataFrame, group: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return where objects are, an area at the first point of its group and class that is in it.
+def _at_points(rows: pd.DataFrame, group: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return positions of objects; an area is moved to the first point of its group in it.
 
-    They are one thing, drawn as both. Somebody has put the point where it stands, and several
-    points in an area are several things.
+    An area and a point of the same class are one object, mapped twice, and the point is more exact.
+    Several points in an area are several objects.
     """
-    xy = everything[["x", "y"]].to_numpy(copy=True)
-    shapes = everything[SHAPE].to_numpy()
-    areas = np.flatnonzero(shapely.get_dimensions(shapes) == AREA)
+    xy = rows[["x", "y"]].to_numpy(copy=True)
+    shapes = rows[SHAPE].to_numpy()
+    areas = np.flatnonzero(shapely.get_dimensions(shapes) == AREA_DIMENSIONS)
     points = np.flatnonzero(shapely.get_type_id(shapes) == shapely.GeometryType.POINT)
     area, point = shapely.STRtree(shapes[points]).query(shapes[areas], predicate="covers")
     area, point = areas[area], points[point]
-    codes = everything[CLASS_CODE].to_numpy()
+    codes = rows[CLASS_CODE].to_numpy()
     same = (group[area] == group[point]) & (codes[area] == codes[point])
     order = np.lexsort((point[same], area[same]))
     area, first = np.unique(area[same][order], return_index=True)
@@ -266,11 +260,11 @@ def _at_points(everything: pd.DataFrame, group: NDArray[np.int64]) -> NDArray[np
 
 
 def _first_at_place(
-    everything: pd.DataFrame, group: NDArray[np.int64]
+    rows: pd.DataFrame, group: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first row of every group, class and place, in order, and how many share it."""
-    places = np.rint(everything[["x", "y"]].to_numpy() / SAME_PLACE_M).astype(np.int64)
-    keys = np.column_stack([group, everything[CLASS_CODE].to_numpy(np.int64), places])
+    """Return the first row of every group, class and place, in order, and the number of rows."""
+    places = np.rint(rows[["x", "y"]].to_numpy() / SAME_PLACE_M).astype(np.int64)
+    keys = np.column_stack([group, rows[CLASS_CODE].to_numpy(np.int64), places])
     _, first, counts = np.unique(keys, axis=0, return_index=True, return_counts=True)
     order = np.argsort(first)
     return first[order], counts[order]
@@ -278,19 +272,19 @@ def _first_at_place(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Loaded(Displayed):
-    """What came of a load.
+    """Result of a load.
 
     Parameters
     ----------
     objects : StreetObjects
         The street objects.
     report, conflation : LoadReport, ConflationReport
-        What became of every row, and what was merged between layers.
+        Counts of rows by layer, and objects merged between layers.
     buildings, streets : GeoDataFrame, optional
-        Footprints (polygons) and centre lines in the CRS of the objects, where layers hold them;
-        of streets whose widths a layer knows, ``half_width`` in metres, and whose names, ``name``.
+        Footprints (polygons) and centre lines in the CRS of the objects, if there are such layers.
+        Streets have ``half_width`` in metres and ``name``, if a layer has widths or names.
     notes : tuple of str
-        Warnings about all of it; those about a layer are in its report. The objects bear both.
+        Warnings about the whole load; those about a layer are in its report. The objects have both.
 
     Examples
     --------
@@ -319,7 +313,7 @@ class Loaded(Displayed):
         }
 
 
-# Which layers are read where none is named.
+# The layers that are read if none is named.
 Selection = Literal["default", "paper", "all"]
 
 
@@ -337,14 +331,14 @@ def choose_layers(
     catalog : Catalog
         The catalogue.
     names : sequence of str
-        Layers by name, which are read alone; with a plus sign before its name, as ``"+cameras"``,
-        a layer is read as well. UnknownNameError if there is none of that name.
+        Names of the only layers to read. With a plus sign, as in ``"+cameras"``, a layer is read in
+        addition to the selection. UnknownNameError for an unknown name.
     selection : {"default", "paper", "all"}
-        The layers that are read where none is named alone: those that are not optional, of these
-        the paper's eleven classes only, or every layer of objects. InputError if layers are named
-        alone as well.
+        The layers that are read if there are no names without a plus sign: layers that are not
+        optional, only the paper's eleven classes of these, or all layers of objects. InputError if
+        it is given together with names without a plus sign.
     surroundings : bool, default False
-        Whether buildings and streets are wanted too.
+        Whether to include buildings and streets.
 
     Returns
     -------
@@ -361,34 +355,34 @@ def choose_layers(
     >>> [spec.name for spec in chosen][-2:]
     ['bus_platforms', 'clocks']
     """
-    alone = {catalog.layer(name).name for name in names if not name.startswith("+")}
+    only = {catalog.layer(name).name for name in names if not name.startswith("+")}
     added = {catalog.layer(name[1:]).name for name in names if name.startswith("+")}
-    if alone and selection != "default":
+    if only and selection != "default":
         raise InputError(
-            f"layer {min(alone)!r} was given without a plus sign together with {selection} layers; "
-            f"write '+{min(alone)}' to read it as well, or give only the layers to read."
+            f"layer {min(only)!r} was given without a plus sign together with {selection} layers; "
+            f"write '+{min(only)}' to read it as well, or give only the layers to read."
         )
-    chosen: list[LayerSpec | None] = []
+    specs: list[LayerSpec | None] = []
     for spec in catalog.layers:
-        if spec.name in alone | added or (spec.role != "objects" and surroundings):
-            chosen.append(spec)
-        elif spec.role == "objects" and not alone and (selection == "all" or not spec.optional):
-            chosen.append(_of_the_paper(spec) if selection == "paper" else spec)
-    return tuple(spec for spec in chosen if spec is not None)
+        if spec.name in only | added or (spec.role != "objects" and surroundings):
+            specs.append(spec)
+        elif spec.role == "objects" and not only and (selection == "all" or not spec.optional):
+            specs.append(_paper_classes_only(spec) if selection == "paper" else spec)
+    return tuple(spec for spec in specs if spec is not None)
 
 
-def _of_the_paper(spec: LayerSpec) -> LayerSpec | None:
-    """Return a layer without the classes that the paper lacks, or None if it has no other."""
+def _paper_classes_only(spec: LayerSpec) -> LayerSpec | None:
+    """Return a layer with only the paper's classes, or None if it has none of them."""
     paper = {item.name for item in paper_taxonomy().classes}
     by = spec.class_by
     if by is None or paper.issuperset(spec.classes):
         return spec if paper.issuperset(spec.classes) else None
-    # A value of such a class is still that value: no pattern below it may take it.
+    # Values of other classes remain, without a class, so that no later pattern matches them.
     classes = tuple((value, name if name in paper else "") for value, name in by.classes)
     class_name = spec.class_name if spec.class_name in paper else ""
     by = replace(by, classes=classes, otherwise=by.otherwise and class_name != "")
-    own = replace(spec, class_name=class_name, class_by=by)
-    return own if own.classes else None
+    spec = replace(spec, class_name=class_name, class_by=by)
+    return spec if spec.classes else None
 
 
 def read_files(
@@ -400,30 +394,30 @@ def read_files(
     area: Area | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[RawLayer, ...], tuple[LayerSpec, ...]]:
-    """Read layers from local files, each file once, and extracts of OpenStreetMap as one.
+    """Read layers from local files, each file once, and OpenStreetMap extracts together.
 
     Parameters
     ----------
     specs : sequence of LayerSpec
-        The layers to look for.
+        The layers.
     paths : iterable of str or Path
-        Files, and folders that hold them. SourceError if one does not exist, matches no layer, or
+        Files, and folders with files. SourceError if one does not exist, matches no layer, or
         cannot be read.
     filters : bool, default True
-        Whether the filters of the layers apply.
+        Whether the filters of the layers are applied.
     crs : str, optional
-        CRS of files that state none.
+        CRS of files that do not state one.
     area : Area, optional
-        What is wanted: of large files, what lies elsewhere need not be read (see `clip_layers`).
+        Parts of large files outside this area need not be read (see `clip_layers`).
     progress : callable, optional
-        Takes the number of files done and in all.
+        Called with the number of files read and the total.
 
     Returns
     -------
     layers : tuple of RawLayer
-        What was read, in the order of `specs`.
+        The layers with files, in the order of `specs`.
     absent : tuple of LayerSpec
-        Layers that have no file among `paths`.
+        The layers without files in `paths`.
 
     Examples
     --------
@@ -435,26 +429,28 @@ def read_files(
     nowhere does not exist; give a file or a folder of files.
     """
     pairs, absent = find_files(specs, paths)
-    told = {
+    # A layer by tags may be in files of several formats, each with its own reader.
+    reader_of = {
         path: file_reader(path) or TAGS_READER
         for path in {path for spec, path in pairs if spec.reader == TAGS_READER}
     }
-    by_files: dict[tuple[str, tuple[Path, ...]], list[LayerSpec]] = {}
-    for spec, found in itertools.groupby(pairs, key=lambda pair: pair[0]):
+    # Group the layers by reader and files, so that each file is read once for all its layers.
+    specs_of: dict[tuple[str, tuple[Path, ...]], list[LayerSpec]] = {}
+    for spec, spec_pairs in itertools.groupby(pairs, key=lambda pair: pair[0]):
         by_reader: dict[str, list[Path]] = {}
-        for _, path in found:
-            name = told[path] if spec.reader == TAGS_READER else spec.reader
+        for _, path in spec_pairs:
+            name = reader_of[path] if spec.reader == TAGS_READER else spec.reader
             by_reader.setdefault(name, []).append(path)
-        for name, some in by_reader.items():
-            for together in [some] if name in MERGING else ([path] for path in some):
-                by_files.setdefault((name, tuple(together)), []).append(spec)
+        for name, files in by_reader.items():
+            for group in [files] if name in MERGING else ([path] for path in files):
+                specs_of.setdefault((name, tuple(group)), []).append(spec)
     layers: list[RawLayer] = []
-    for done, ((name, (first, *more)), layers_of_files) in enumerate(by_files.items(), start=1):
-        files = (first, *more) if more else first
-        within = {"area": area} if name in PRUNING else {}
-        layers.extend(reader(name)(files, layers_of_files, filters=filters, crs=crs, **within))
+    for count, ((name, group), group_specs) in enumerate(specs_of.items(), start=1):
+        source = group if len(group) > 1 else group[0]
+        options = {"area": area} if name in PRUNING else {}
+        layers.extend(reader(name)(source, group_specs, filters=filters, crs=crs, **options))
         if progress is not None:
-            progress(done, len(by_files))
+            progress(count, len(specs_of))
     order = {spec.name: number for number, spec in enumerate(specs)}
     return tuple(sorted(layers, key=lambda layer: order[layer.spec.name])), absent
 
@@ -470,33 +466,33 @@ def assemble(
     max_distortion: float = MAX_DISTORTION,
     notes: Sequence[str] = (),
 ) -> Loaded:
-    """Place raw layers in one metric CRS and merge what stands in several of them.
+    """Transform raw layers to one metric CRS, and merge objects that occur in several layers.
 
     Parameters
     ----------
     layers : sequence of RawLayer
-        What was read or fetched.
+        Layers that were read or fetched.
     catalog : Catalog
-        Whose classes, metric CRS and merging radii hold.
+        Catalogue with the classes, the metric CRS and the radii for merging.
     metric_crs : str, optional
-        CRS to work in; the catalogue's by default, or the UTM zone of the data where it has none.
+        Metric CRS; by default that of the catalogue, or else the UTM zone of the data.
     collapse : bool, default True
         Whether objects of one class at the same place become one.
     merge : bool, default True
         Whether objects of different layers are merged by the catalogue's radii.
     counted : sequence of RawLayer
-        Layers that are none of the objects; the report tells how many they would add.
+        Further layers that are only counted, not included; the counts are in the report.
     max_distortion : float, default 6
-        By how many degrees bearings, and by how many percent lengths, may be off over the data.
+        Maximum error of bearings in degrees, and of lengths in percent, over the data.
     notes : sequence of str
-        Warnings of the reading, to be kept with those of this.
+        Warnings from reading, to be included in the result.
 
     Returns
     -------
     Loaded
-        The objects and what became of every row; those far from all others are misplaced. CrsError
-        if the CRS is not metric, a layer has none or lies where it cannot, or the plane is too far
-        from the ground; EmptyResultError if no object remains.
+        The objects and counts of rows; objects far from all others are misplaced. CrsError if the
+        CRS is not metric, a layer has none or is outside its area of use, or the distortion is too
+        large; EmptyResultError if no object remains.
 
     Examples
     --------
@@ -505,12 +501,12 @@ def assemble(
     >>> assemble(layers, load_catalog("openstreetmap")).objects.crs.name
     'WGS 84 / UTM zone 31N'
     """
-    layers, system, more = settle_extent(
+    layers, system, extent_notes = settle_extent(
         [note_outside(layer) for layer in layers],
         crs=metric_crs or catalog.metric_crs,
         max_distortion=max_distortion,
     )
-    of_all = (*notes, *more)
+    notes = (*notes, *extent_notes)
     objects, report = build_objects(
         [layer for layer in layers if layer.spec.role == "objects"],
         taxonomy=catalog.taxonomy,
@@ -521,28 +517,28 @@ def assemble(
     merged = ConflationReport(())
     if merge and catalog.conflate:
         objects, merged = conflate(objects, dict(catalog.conflate))
-    buildings, on_buildings = _surroundings(layers, "buildings", objects.crs)
-    streets, on_streets = _surroundings(layers, "streets", objects.crs)
+    buildings, building_reports = _surroundings(layers, "buildings", objects.crs)
+    streets, street_reports = _surroundings(layers, "streets", objects.crs)
     report = LoadReport(
-        (*report.layers, *on_buildings, *on_streets), _unread(catalog, layers, counted)
+        (*report.layers, *building_reports, *street_reports), _unread(catalog, layers, counted)
     )
     return Loaded(
-        objects=replace(objects, notes=(*of_all, *report.notes)),
+        objects=replace(objects, notes=(*notes, *report.notes)),
         report=report,
         conflation=merged,
         buildings=buildings,
         streets=streets,
-        notes=of_all,
+        notes=notes,
     )
 
 
 def _unread(
     catalog: Catalog, layers: Sequence[RawLayer], counted: Sequence[RawLayer]
 ) -> tuple[UnreadLayer, ...]:
-    """Return the layers of objects in the catalogue that are not among those read."""
+    """Return the layers of objects in the catalogue that were not read."""
     read = {layer.spec.name for layer in layers}
     numbers: Counter[str] = Counter()
-    for layer in counted:  # of which there may be several of one name
+    for layer in counted:  # several may have the same name
         numbers[layer.spec.name] += layer.counts.kept
     return tuple(
         UnreadLayer(spec.name, spec.classes, numbers.get(spec.name))
@@ -554,7 +550,7 @@ def _unread(
 def _surroundings(
     layers: Sequence[RawLayer], role: Literal["buildings", "streets"], crs: CRS
 ) -> tuple[gpd.GeoDataFrame | None, tuple[LayerReport, ...]]:
-    """Return the usable buildings or streets of all layers, and what became of their rows."""
+    """Return the valid buildings or streets of all layers, and the reports of the layers."""
     of_role = [layer for layer in layers if layer.spec.role == role]
     if not of_role:
         return None, ()
@@ -579,7 +575,7 @@ def _surroundings(
 
 
 def _on_earth(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
-    """Tell which shapes have all of their coordinates on the Earth; false for NaN too."""
+    """Return a mask of the shapes with all coordinates on the Earth; false for NaN."""
     xy, row = shapely.get_coordinates(shapes, return_index=True)
     placed = np.ones(len(shapes), bool)
     placed[row[~(np.abs(xy) < BEYOND_EARTH_M).all(axis=1)]] = False

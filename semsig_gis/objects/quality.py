@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from semsig_gis.core import COUNT, Displayed, degree_bounds, plane_distortion
+from semsig_gis.core import COUNT, Displayed, crs_label, degree_bounds, plane_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -35,10 +35,11 @@ M2_PER_KM2 = 1e6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassQuality:
-    """The objects of one class, after collapsing and conflation, and their density.
+    """Number and density of the objects of one class, after collapsing and conflation.
 
-    `rows` of the sources stand behind them. `per_km2_hull` is None where the hull has no area;
-    `nearest_m` is the median distance to the nearest other object of the class, None for one alone.
+    `rows` is the number of rows of the sources that they were made of. `per_km2_hull` is None if
+    the hull has no area; `nearest_m` is the median distance in metres to the nearest other object
+    of the class, None for a single object.
     """
 
     class_name: str
@@ -53,12 +54,12 @@ class ClassQuality:
 class QualityReport(Displayed):
     """The quality report of a load.
 
-    `classes` are those with objects in the order of the taxonomy, `absent` those without; `sources`
-    stand in the order they were loaded. `crs` is a code, or a name where there is none. Extents are
-    west, south, east and north, in metres and in degrees of WGS 84. `hull_km2` is the area of the
-    convex hull of all objects, `occupied_km2` that of the squares of 100 m that hold one. `notes`
-    are warnings about all of the load; those about a layer stand in `sources`. `absent` are classes
-    that were looked for; those of layers in `unread` were not.
+    `classes` are the classes with objects in the order of the taxonomy, `absent` the classes of the
+    loaded layers without objects; classes only in `unread` layers are in neither. `sources` are in
+    the order of loading. `crs` is a code, or else a name. Extents are west, south, east and north,
+    in metres and in degrees of WGS 84. `hull_km2` is the area of the convex hull of all objects,
+    `occupied_km2` the area of the squares of 100 m that contain an object. `notes` are warnings
+    about the whole load; warnings about a layer are in `sources`.
     """
 
     classes: tuple[ClassQuality, ...]
@@ -111,18 +112,18 @@ def quality_report(
     *,
     notes: Sequence[str] = (),
 ) -> QualityReport:
-    """Report on the quality of a load.
+    """Return a quality report of a load.
 
     Parameters
     ----------
     objects : StreetObjects
-        What was loaded, after conflation if there was one.
+        The loaded objects, after conflation if it was used.
     load : LoadReport
-        What `build_objects` says of the layers.
+        The report of `build_objects`.
     conflation : ConflationReport, optional
-        What `conflate` says, if it was used.
+        The report of `conflate`, if it was used.
     notes : sequence of str
-        Warnings about all of the load.
+        Warnings about the whole load.
 
     Returns
     -------
@@ -144,7 +145,7 @@ def quality_report(
     east, north = xy.max(axis=0).tolist()
     pairs = conflation.pairs if conflation is not None else ()
     present = set(np.unique(objects.codes).tolist())
-    looked_for = {name for layer in load.layers for name in layer.classes}
+    loaded_classes = {name for layer in load.layers for name in layer.classes}
     return QualityReport(
         classes=tuple(
             _class_quality(objects, item, hull_km2=hull_km2, occupied_km2=occupied_km2)
@@ -154,11 +155,11 @@ def quality_report(
         absent=tuple(
             item.name
             for item in objects.taxonomy.classes
-            if item.name in looked_for and item.code not in present
+            if item.name in loaded_classes and item.code not in present
         ),
         sources=tuple(_sources(load.layers, pairs)),
         conflated=pairs,
-        crs=f"EPSG:{code}" if (code := objects.crs.to_epsg()) else objects.crs.name,
+        crs=crs_label(objects.crs),
         extent=(west, south, east, north),
         extent_degrees=degree_bounds(objects.crs, (west, south, east, north)),
         distortion=plane_distortion(objects.crs, (west, south, east, north)),
@@ -186,17 +187,17 @@ def _class_quality(
 
 
 def _nearest(xy: NDArray[np.float64]) -> float | None:
-    """Return the median distance to the nearest other point."""
+    """Return the median distance to the nearest other point; None for a single point."""
     if len(xy) == 1:
         return None
     places, counts = np.unique(xy, axis=0, return_counts=True)
-    alone = counts == 1
-    # Points that share their place are at no distance; the tree passes over equal points.
+    single = counts == 1
+    # Points at the same place have the distance 0; the query of the tree ignores equal points.
     distances = np.zeros(len(xy))
-    if alone.any():
+    if single.any():
         points = np.asarray(shapely.points(places))
         _, nearest = shapely.STRtree(points).query_nearest(
-            points[alone], exclusive=True, all_matches=False, return_distance=True
+            points[single], exclusive=True, all_matches=False, return_distance=True
         )
         distances[: len(nearest)] = nearest
     return float(np.median(distances))
@@ -205,12 +206,12 @@ def _nearest(xy: NDArray[np.float64]) -> float | None:
 def _sources(
     layers: Sequence[LayerReport], pairs: Iterable[ConflatedPair]
 ) -> Iterator[LayerReport]:
-    """Yield what became of the rows of every layer, with those that were merged into others."""
+    """Yield the reports of all layers, with the number of conflated rows added."""
     merged: Counter[str] = Counter()
     for pair in pairs:
         merged[pair.merged] += pair.count
     for layer in layers:
-        # Layers of one name are one source to conflation: the first has given what it can.
+        # Conflation treats layers of the same name as one source; the first ones are counted first.
         conflated = min(layer.counts.kept, merged[layer.name])
         merged[layer.name] -= conflated
         yield replace(layer, counts=replace(layer.counts, conflated=conflated))

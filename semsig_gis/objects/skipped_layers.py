@@ -1,4 +1,4 @@
-"""Layers of objects that are not read: how many objects they would add, where that is cheap."""
+"""Read layers that were not requested, if that is cheap, to report how many objects they have."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
     from semsig_gis.sources import Catalog, LayerSpec, RawLayer
 
-# Files that are read in about a second.
+# Files up to this size are read in about a second.
 SMALL_BYTES = 2**21
 
 
-def passed_by(catalog: Catalog, specs: Sequence[LayerSpec]) -> tuple[LayerSpec, ...]:
-    """Return the other layers that a reading of `specs` passes by anyway.
+def layers_in_same_extracts(catalog: Catalog, specs: Sequence[LayerSpec]) -> tuple[LayerSpec, ...]:
+    """Return the other layers in the same OpenStreetMap extracts as `specs`.
 
-    These are those of the same extracts of a map, of which every element is looked at.
+    They can be counted without reading another file, because an extract is always read completely.
     """
     files = {spec.files for spec in specs if spec.reader in MERGING}
     return tuple(
@@ -30,7 +30,7 @@ def passed_by(catalog: Catalog, specs: Sequence[LayerSpec]) -> tuple[LayerSpec, 
     )
 
 
-def read_small(
+def read_small_layers(
     catalog: Catalog,
     specs: Sequence[LayerSpec],
     paths: Sequence[Path],
@@ -38,13 +38,13 @@ def read_small(
     filters: bool = True,
     crs: str | None = None,
 ) -> tuple[RawLayer, ...]:
-    """Read the other layers whose files are there and small; one that cannot be read is left out.
-
-    What is wrong with a layer that nobody asked for is not told.
-    """
+    """Read the other layers with small files; layers that cannot be read are skipped silently."""
     layers: list[RawLayer] = []
     for spec in _others(catalog, specs):
-        files = _files(spec, paths)
+        files: list[Path] = []
+        for path in paths:
+            with contextlib.suppress(SemsigError, OSError):  # the path is of another layer
+                files += [file for _, file in find_files([spec], [path])[0]]
         if files and sum(file.stat().st_size for file in files) <= SMALL_BYTES:
             with contextlib.suppress(SemsigError, OSError):
                 layers.extend(read_files([spec], files, filters=filters, crs=crs)[0])
@@ -54,11 +54,3 @@ def read_small(
 def _others(catalog: Catalog, specs: Sequence[LayerSpec]) -> Iterator[LayerSpec]:
     names = {spec.name for spec in specs}
     return (spec for spec in catalog.layers if spec.role == "objects" and spec.name not in names)
-
-
-def _files(spec: LayerSpec, paths: Sequence[Path]) -> list[Path]:
-    files: list[Path] = []
-    for path in paths:
-        with contextlib.suppress(SemsigError, OSError):  # which a path of other layers raises
-            files += [file for _, file in find_files([spec], [path])[0]]
-    return files

@@ -1,4 +1,4 @@
-"""Files of buildings, streets and areas: what surrounds street objects, and where cells lie."""
+"""Read and write buildings and streets, and read areas."""
 
 from __future__ import annotations
 
@@ -44,20 +44,21 @@ if TYPE_CHECKING:
 
 DIMENSIONS: dict[GeometryKind, int] = {"line": 1, "polygon": 2}
 KIND_OF: dict[str, GeometryKind] = {"buildings": "polygon", "streets": "line", "area": "polygon"}
-# Between the points of an edge of a box, so that the curve that it is is met to centimetres.
+# Distance between points along the edges of a box, which are curves in the metric CRS: this is
+# accurate to centimetres.
 EDGE_DEGREES = 0.01
 
 
 def save_surroundings(table: gpd.GeoDataFrame, path: str | Path) -> None:
-    """Save buildings or streets as one GeoParquet file that can be read by box.
+    """Save buildings or streets as a GeoParquet file that can be read by box.
 
     Parameters
     ----------
     table : GeoDataFrame
-        Features, each with a geometry; all columns and the `attrs` are kept. The file holds them in
+        Features, all with a geometry; all columns and the `attrs` are stored. The file has them in
         a spatial order, with their bounds in the column ``bbox``.
     path : str or Path
-        File to write; it appears whole, by rename.
+        File to write, atomically.
 
     Examples
     --------
@@ -98,25 +99,24 @@ def read_surroundings(
     Parameters
     ----------
     path : str, Path or GeoDataFrame
-        Any vector file that `read_layer` reads, a ``.parquet`` file such as ``semsig load
-        --buildings`` writes, or a table. Of one that tells elements of OpenStreetMap and their
-        tags, what the catalogue calls buildings or streets. SourceError if it is missing, damaged,
-        or of another kind.
+        Any vector file that `read_layer` reads, a ``.parquet`` file as from ``semsig load
+        --buildings``, or a table. From OpenStreetMap elements, the buildings or streets are
+        selected by their tags. SourceError if it is missing, damaged, or of another kind.
     role : {"buildings", "streets"}
-        What the file holds: polygons or lines. InputError if it has none, or something else too.
+        The features: polygons or lines. InputError if there are none, or also other geometries.
     crs : pyproj.CRS or str
-        CRS to move it to. CrsError if nobody knows its own.
+        CRS of the result. CrsError if the CRS of the file is unknown.
     box : sequence of float, optional
-        ``xmin, ymin, xmax, ymax`` in the CRS of the file, which `save_surroundings` wrote: only
-        features whose bounds meet it.
+        ``xmin, ymin, xmax, ymax`` in the CRS of a file by `save_surroundings`: only features with
+        bounds that intersect it.
     tell : callable, optional
-        Takes a remark on the file, such as on outlines that are not closed and so left out.
+        Called with notes on the file, for example on outlines omitted because they are not closed.
 
     Returns
     -------
     GeoDataFrame
-        One row a feature that has a geometry; in a box there may be none. Of a ``.parquet`` file
-        all columns are kept. ``attrs["licenses"]`` says whom to name for it, where that is known.
+        One row per feature with a geometry; in a box there may be none. A ``.parquet`` file keeps
+        all columns. ``attrs["licenses"]`` has the attribution lines, if known.
 
     Examples
     --------
@@ -132,8 +132,8 @@ def read_surroundings(
     return _read(path, role, crs, box, tell)
 
 
-def elements_in(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame:
-    """Return the buildings or streets of a table of OpenStreetMap's elements, any other as it is.
+def select_role(table: gpd.GeoDataFrame, role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame:
+    """Return the buildings or streets in a table of OpenStreetMap elements; other tables unchanged.
 
     InputError if there are none.
     """
@@ -154,12 +154,12 @@ def _with_licences(layer: RawLayer) -> gpd.GeoDataFrame:
 def read_area(
     area: str | Path | gpd.GeoDataFrame, *, crs: CRS | str
 ) -> shapely.Polygon | shapely.MultiPolygon:
-    """Return ``west,south,east,north`` in degrees, or all polygons of a file or table, in a CRS.
+    """Return a box ``west,south,east,north`` in degrees, or the polygons of a file or table.
 
-    Errors are as of `parse_area` and `read_surroundings`.
+    The result is one (multi)polygon in `crs`. Errors are those of `parse_area` and
+    `read_surroundings`.
     """
     if isinstance(area, str | Path) and NUMBERS.fullmatch(str(area)):
-        # In metres an edge of the box is a curve.
         box = shapely.segmentize(parse_area(str(area)).polygon, EDGE_DEGREES)
         shapes = gpd.GeoSeries([box], crs=WGS84).to_crs(crs)
     else:
@@ -181,7 +181,7 @@ def _read(
     notes: tuple[str, ...] = ()
     where = _named(path)
     if isinstance(path, gpd.GeoDataFrame):
-        table = path if role == "area" else elements_in(path, role)
+        table = path if role == "area" else select_role(path, role)
         table = table if box is None else table.iloc[np.sort(table.sindex.intersection(box))]
     else:
         table, notes = _read_file(Path(path), role, kind, box)
@@ -214,10 +214,10 @@ def _read_file(
     kind: GeometryKind,
     box: Sequence[float] | None,
 ) -> tuple[gpd.GeoDataFrame, tuple[str, ...]]:
-    """Read what a file holds, and remarks on it."""
-    told = None if role == "area" else file_reader(path, sure=True)
-    if told is not None:
-        (layer,) = reader(told)(path, [load_catalog("openstreetmap").layer(role)])
+    """Return the features of a file, and notes on it."""
+    reader_name = None if role == "area" else file_reader(path, sure=True)
+    if reader_name is not None:
+        (layer,) = reader(reader_name)(path, [load_catalog("openstreetmap").layer(role)])
         return _with_licences(layer), layer.notes
     if path.suffix.lower() in SUFFIXES:
         return read_parquet(path, kind=f"{kind}s", box=box), ()

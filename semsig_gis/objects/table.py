@@ -1,4 +1,4 @@
-"""Street objects: raw layers become one checked table of points in a metric CRS."""
+"""The table of street objects: points in a metric CRS, saved as GeoParquet."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core import (
@@ -56,36 +57,36 @@ if TYPE_CHECKING:
 
 KIND = "street objects"
 NUMBERS, TEXTS = {CLASS_CODE, COUNT}, {SOURCE, SOURCE_ID, MERGED}
-COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT)  # which all objects have, beside their geometry
+COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT)  # columns of all objects, without the geometry
 BETWEEN_LAYERS = ", "
 BEFORE_LAYERS = ": "
-# Key of the layers that each line of ``licenses`` is about, where the line does not tell.
+# Key of the layers of each line of ``licenses``, if the line itself is ambiguous.
 LICENSE_LAYERS = "license_layers"
 
 
 @dataclass(frozen=True, slots=True)
 class Licence:
-    """Whom to name for layers and under which licence; as text, a line for people.
+    """Attribution and licence of layers; its text is an attribution line.
 
-    `layers` is empty where it is not known which they are.
+    `layers` is empty if they are not known.
     """
 
     terms: str
     layers: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """Return the line."""
+        """Return the attribution line."""
         layers = BETWEEN_LAYERS.join(self.layers)
         return f"{self.terms}{BEFORE_LAYERS}{layers}" if layers else self.terms
 
 
 def layer_note(layer: str, note: str) -> str:
-    """Return a warning about a layer as a note of street objects."""
+    """Return a note about a layer, which begins with its name."""
     return f"{layer}{BEFORE_LAYERS}{note}"
 
 
 def join_licences(licences: Iterable[Licence]) -> tuple[Licence, ...]:
-    """Return one licence for all layers of the same terms, each layer once."""
+    """Return licences with those of the same terms joined; each layer is listed once."""
     layers_of: dict[str, dict[str, None]] = {}
     for licence in licences:
         layers_of.setdefault(licence.terms, {}).update(dict.fromkeys(licence.layers))
@@ -93,7 +94,7 @@ def join_licences(licences: Iterable[Licence]) -> tuple[Licence, ...]:
 
 
 def layer_licences(layers: Iterable[RawLayer]) -> tuple[Licence, ...]:
-    """Return whom to name for layers."""
+    """Return the licences of layers."""
     return join_licences(Licence(layer.spec.terms, (layer.spec.name,)) for layer in layers)
 
 
@@ -104,15 +105,15 @@ class StreetObjects(Displayed):
     Parameters
     ----------
     table : GeoDataFrame
-        One row an object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
-        ``count`` (rows that were collapsed into it) and ``geometry`` (point in a metric CRS); after
+        One row per object: ``class_code`` (uint8), ``source`` (layer name), ``source_id``,
+        ``count`` (number of rows collapsed into it) and ``geometry`` (point in a metric CRS); after
         `conflate` also ``merged``, the same object in other sources: ``"source:id; source:id"``.
     taxonomy : Taxonomy
-        The classes that the codes belong to.
+        The classes of the codes.
     licenses : tuple of Licence
-        One for every publisher and licence: who, under what, which layers.
+        One for every publisher and licence, with its layers.
     notes : tuple of str
-        Warnings of the load; one about a layer begins with its name and a colon.
+        Warnings of the load; a warning about a layer begins with its name and a colon.
 
     Examples
     --------
@@ -151,24 +152,22 @@ class StreetObjects(Displayed):
 
     @property
     def class_counts(self) -> dict[int, int]:
-        """How many objects of each class code there are, of those that there are."""
+        """Number of objects by class code; classes without objects are omitted."""
         codes, counts = np.unique(self.codes, return_counts=True)
         return dict(zip(codes.tolist(), counts.tolist(), strict=True))
 
     @functools.cached_property
     def xy(self) -> NDArray[np.float64]:
         """Position of every object in metres, shape (n, 2)."""
-        import shapely  # noqa: PLC0415 - it loads slowly
-
         xy: NDArray[np.float64] = shapely.get_coordinates(self.table.geometry.array)
         xy.setflags(write=False)
         return xy
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
-        """Return the objects as a table in their CRS that tells their classes in words.
+        """Return the objects as a table with the symbols, names and titles of their classes.
 
-        ``class_code``, ``symbol``, ``class_name`` and ``title``, then the other columns of `table`;
-        `objects_from_frame` takes it with ``class_column="class_name"``.
+        The columns are ``class_code``, ``symbol``, ``class_name``, ``title`` and the other columns
+        of `table`; `objects_from_frame` accepts it with ``class_column="class_name"``.
         """
         classes = {item.code: item for item in self.taxonomy.classes}
         kinds = [classes[code] for code in self.codes.tolist()]
@@ -180,7 +179,7 @@ class StreetObjects(Displayed):
         return frame
 
     def plot(self, *, ax: Axes | None = None, legend: bool = True) -> Axes:
-        """Draw the objects with the signs of their classes (see `plot_objects`)."""
+        """Plot the objects with the symbols of their classes (see `plot_objects`)."""
         return plot_with("plot_objects", self, ax=ax, legend=legend)
 
     def explore(self) -> MapFrame:
@@ -189,22 +188,21 @@ class StreetObjects(Displayed):
 
 
 class _OpenedObjects(StreetObjects):
-    """Street objects of a file, whose table is made when it is first asked for."""
+    """Street objects of a file, with a table that is created at its first use."""
 
     _arrow: pa.Table
 
     @classmethod
-    def of(cls, arrow: pa.Table, **known: Any) -> _OpenedObjects:  # noqa: ANN401 - any attribute
-        """Return the objects of columns, of which all else is known."""
+    def of(cls, arrow: pa.Table, **attributes: Any) -> _OpenedObjects:  # noqa: ANN401
+        """Return the objects of an Arrow table, with the values of all other attributes."""
         objects = cls.__new__(cls)
-        vars(objects).update(known, _arrow=arrow)
+        vars(objects).update(attributes, _arrow=arrow)
         return objects
 
     @functools.cached_property
     def table(self) -> gpd.GeoDataFrame:
-        """The objects, a row each."""
-        import geopandas as gpd  # noqa: PLC0415 - it loads slowly
-        import shapely  # noqa: PLC0415 - it loads slowly
+        """The table of objects."""
+        import geopandas as gpd  # noqa: PLC0415 - 0.7 s
 
         merged = [MERGED] if MERGED in self._arrow.column_names else []  # of conflated objects
         columns = {
@@ -216,18 +214,18 @@ class _OpenedObjects(StreetObjects):
 
 
 def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool = False) -> None:
-    """Save street objects as one GeoParquet file that can be read by box.
+    """Save street objects as a GeoParquet file that can be read by box.
 
     Parameters
     ----------
     objects : StreetObjects
-        What to save.
+        The objects.
     path : str or Path
-        File to write; it appears whole, by rename.
+        File to write, atomically.
     keep_order : bool, default False
-        Whether the objects stay in their order, for whoever knows them by row number. Else the
-        file holds them in a spatial order, in groups of rows, of which a box is read faster; saving
-        that again does not change the order.
+        Whether to keep the order of the objects, for data that refers to them by row number. By
+        default they are sorted along a curve, in row groups, which makes reading by box faster;
+        saving them again does not change this order.
 
     Examples
     --------
@@ -238,8 +236,6 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
     ...     len(open_objects(f"{folder}/objects.parquet")) == len(demo_objects)
     True
     """
-    import shapely  # noqa: PLC0415 - it loads slowly
-
     table = objects.table
     if not keep_order:
         table = table.iloc[hilbert_order(table.geometry.array)]
@@ -262,10 +258,10 @@ def save_objects(objects: StreetObjects, path: str | Path, *, keep_order: bool =
 
 
 def objects_specs(objects: StreetObjects) -> dict[str, Any]:
-    """Return all but the table of street objects, as plain values for JSON.
+    """Return the metadata of street objects as plain values for JSON.
 
-    The layers of licences are among them only where the lines of the licences do not tell, and
-    notes only where there are some.
+    The layers of licences are included only if the lines of the licences are ambiguous, and notes
+    only if there are any.
     """
     specs: dict[str, Any] = {
         "kind": KIND,
@@ -281,7 +277,7 @@ def objects_specs(objects: StreetObjects) -> dict[str, Any]:
 
 
 def _licences(specs: Mapping[str, Any], sources: Iterable[str]) -> tuple[Licence, ...]:
-    """Return the licences of a file from its specs and the layers that its objects come from."""
+    """Return the licences of a file from its specs and the layers of its objects."""
     lines = specs["licenses"]
     if LICENSE_LAYERS not in specs:
         layers = frozenset(sources)
@@ -296,7 +292,7 @@ def _licences(specs: Mapping[str, Any], sources: Iterable[str]) -> tuple[Licence
 
 
 def _licence_of(line: str, sources: Collection[str]) -> Licence:
-    """Return the licence that a line states, without layers if it can be read in several ways."""
+    """Return the licence of a line, without layers if the line is ambiguous."""
     parts = line.split(BEFORE_LAYERS)
     readings = [
         Licence(BEFORE_LAYERS.join(parts[:mark]), names)
@@ -307,7 +303,10 @@ def _licence_of(line: str, sources: Collection[str]) -> Licence:
 
 
 def _names_in(text: str, sources: Collection[str]) -> list[tuple[str, ...]]:
-    """Return the ways to read a text as a list of layers, at most two."""
+    """Return the ways to parse a text as a list of layers, at most two.
+
+    A name may itself contain the separator, so this is dynamic programming from the end.
+    """
     parts = text.split(BETWEEN_LAYERS)
     ways: list[list[tuple[str, ...]]] = [[] for _ in parts] + [[()]]  # from each part to the end
     for start in reversed(range(len(parts))):
@@ -320,12 +319,12 @@ def _names_in(text: str, sources: Collection[str]) -> list[tuple[str, ...]]:
 
 
 def open_objects(path: str | Path, *, box: Sequence[float] | None = None) -> StreetObjects:
-    """Open a file that `save_objects` wrote, or a part of it.
+    """Open a file by `save_objects`, or a part of it.
 
     Parameters
     ----------
     path : str or Path
-        File to read. DatabaseError if it is missing, damaged, or holds something else.
+        File to read. DatabaseError if it is missing, damaged, or of another kind.
     box : sequence of float, optional
         ``xmin, ymin, xmax, ymax`` in metres: only objects in it or on its edge.
 
@@ -357,11 +356,11 @@ def objects_of(
     path: str | Path,
     box: Sequence[float] | None = None,
 ) -> StreetObjects:
-    """Return the street objects that columns and the values of `objects_specs` hold.
+    """Return street objects from an Arrow table and the values of `objects_specs`.
 
-    The columns are those of `StreetObjects.table`, ``geometry`` as WKB. With a box, only objects in
-    it or on its edge are returned, possibly none. DatabaseError, which names `path`, if they are
-    damaged; without a box, a table without objects is.
+    The columns are those of `StreetObjects.table`, with ``geometry`` as WKB. With a box, only
+    objects in it or on its edge are returned, possibly none. DatabaseError, with `path`, if the
+    data is damaged or, without a box, has no objects.
     """
     try:
         arrow.validate(full=True)
@@ -377,8 +376,8 @@ def objects_of(
         raise DatabaseError(
             f"{path} is damaged ({error}); load the street objects again."
         ) from error
-    some = len(arrow) > 0 or box is not None
-    if not (some and len(xy) == len(arrow) and np.isfinite(xy).all()):
+    may_be_empty = box is not None
+    if not ((len(arrow) or may_be_empty) and len(xy) == len(arrow) and np.isfinite(xy).all()):
         raise DatabaseError(
             f"{path} is damaged (it has rows without a position); load the street objects again."
         )
@@ -393,16 +392,16 @@ def objects_of(
 
 
 def licenses_of(*tables: gpd.GeoDataFrame | None) -> tuple[str, ...]:
-    """Return whom to name for buildings and streets, a line for every publisher and licence.
+    """Return the distinct attribution lines of tables of buildings and streets.
 
-    The tables are those of `read_surroundings` or `objects.load.assemble`.
+    The tables are from `read_surroundings` or `assemble`.
     """
     lines = [table.attrs.get(LICENSES, ()) for table in tables if table is not None]
     return tuple(dict.fromkeys(itertools.chain.from_iterable(lines)))
 
 
 def _require_columns(arrow: pa.Table) -> None:
-    """Raise KeyError if street objects lack a column, TypeError if one is of another type."""
+    """Raise KeyError for a missing column, TypeError for a column of another type."""
     arrow.select([*COLUMNS, GEOMETRY])
     for field in arrow.schema:
         kind = field.type

@@ -313,7 +313,10 @@ def data_folder() -> Traversable:
 
 @functools.lru_cache
 def _parse_catalog(text: str, where: str) -> Catalog:
-    content = parse_toml(text, where)
+    return _checked_catalog(parse_toml(text, where), where)
+
+
+def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
     check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
     own_classes = _classes(content.get("classes", []), where)

@@ -1,4 +1,4 @@
-"""From the service that a catalogue names: layers of an area, through a cache."""
+"""Fetch layers of an area from the service of a catalogue, through a cache."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import LayerSpec
 
-# Readers whose service sends an area in parts, each a file.
+# Readers of services that send an area in tiles, each a file.
 TILED: Mapping[str, ModuleType] = {
     "mapillary": mapillary,
     "osm_file": overpass,
@@ -47,34 +47,34 @@ def fetch_layers(
     progress: Callable[[int, int], None] | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[RawLayer, ...]:
-    """Fetch layers of an area from the service that a catalogue names, and read them.
+    """Fetch layers of an area from the service of a catalogue, and read them.
 
     Parameters
     ----------
     specs : sequence of LayerSpec
         The layers.
     catalog : Catalog
-        Whose endpoints are asked; nothing else is.
+        The catalogue; requests go only to its endpoints.
     area : Area
-        What is fetched.
+        The area.
     cache : Cache
-        Where files are kept; what has not changed is not sent again.
+        Cache of downloaded files; unchanged files are not downloaded again.
     http : HttpSpec
-        How requests are made; offline, everything comes from the cache.
+        Settings of requests; offline, all files come from the cache.
     filters : bool, default True
-        Whether the filters of the layers apply.
+        Whether the filters of the layers are applied.
     progress : callable, optional
-        Takes how much has arrived and how much there is, 0 where nobody knows: bytes of a portal's
-        file, rows of a service that sends pages, parts of an area.
+        Called with the amount received and the total, 0 if unknown: bytes of a portal's file, rows
+        of a paged service, or tiles of an area.
     tell : callable, optional
-        Takes a line about each layer that has arrived: rows, size and date.
+        Called with a line about each layer that was fetched: rows, size and date.
 
     Returns
     -------
     tuple of RawLayer
-        The layers, cut to the area. InputError if the catalogue has no service to fetch from, or
-        the access token that it wants is not in the environment, SourceError if a service refuses,
-        fails, or sends something else.
+        The layers, clipped to the area. InputError if the catalogue has no service, or its access
+        token is not in the environment; SourceError if a service refuses, fails, or sends an
+        unexpected answer.
 
     Examples
     --------
@@ -115,11 +115,11 @@ def fetch_layers(
     ):
         layer = download.read(filters=filters)
         layers.append(clip_layer(layer, area))
-        kept = all(file.from_cache for file in download.files)
+        from_cache = all(file.from_cache for file in download.files)
         tell(
             f"{layer.spec.name}: {layer.counts.read:,} rows, "
             f"{sum(file.bytes for file in download.files) / 1e6:.2f} MB, "
-            f"from {'the cache' if kept else 'the portal'}, "
+            f"from {'the cache' if from_cache else 'the portal'}, "
             f"fetched {min(file.fetched_at for file in download.files)}; {layer.spec.terms}"
         )
     return tuple(layers)
@@ -137,19 +137,19 @@ def open_cache(
     Parameters
     ----------
     folder : str or Path, optional
-        Where it is; by default ``semsig`` in the user's cache folder, which on Linux is
+        Folder of the cache; by default ``semsig`` in the user's cache folder, which on Linux is
         ``XDG_CACHE_HOME`` or ``.cache`` in the home folder.
     offline : bool, default False
-        Whether everything comes from the cache.
+        Whether all files come from the cache.
     deadline_s : float, default 600
-        Seconds after which a file has to be there, with all attempts and pauses.
+        Maximum time for a file in seconds, including all attempts and pauses.
     tell : callable, optional
-        Takes a line where a server fails and is waited for.
+        Called with a line if a server fails and the request will be repeated.
 
     Returns
     -------
     tuple of (Cache, HttpSpec)
-        The cache, and how requests are made.
+        The cache, and the settings of requests.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def open_cache(
 def find_area(
     text: str | gpd.GeoDataFrame, catalog: Catalog, *, cache: Cache, http: HttpSpec
 ) -> Area:
-    """Return an area from what a user says of it.
+    """Return an area from its bounds, polygons or name.
 
     Parameters
     ----------
@@ -173,14 +173,14 @@ def find_area(
         ``west,south,east,north`` in degrees, the path of a polygon file, polygons, or the name of a
         place.
     catalog : Catalog
-        Whose geocoder knows places by name.
+        Catalogue with the geocoder for names.
     cache, http : Cache, HttpSpec
-        Where the answer about a name is kept, and how it is asked for (see `open_cache`).
+        Cache and settings of requests to the geocoder (see `open_cache`).
 
     Returns
     -------
     Area
-        The area. InputError if the numbers are no box on the Earth, or the catalogue has no
+        The area. InputError if the numbers are not a box on the Earth, or the catalogue has no
         geocoder; SourceError if the file cannot be read.
 
     Examples

@@ -54,8 +54,8 @@ def test_added_removed_moved_and_of_another_class() -> None:
     )
     changes = compare_objects(OLD, new)
     assert rows_of(changes) == ([[0, 0]], [[1, 1]], [[2, 2]], [3], [3, 4])
-    assert sorted(changes.gone.tolist()) == [1, 2, 3]
-    assert sorted(changes.come.tolist()) == [1, 2, 3, 4]
+    assert sorted(changes.obsolete_rows.tolist()) == [1, 2, 3]
+    assert sorted(changes.new_rows.tolist()) == [1, 2, 3, 4]
     assert [dataclasses.asdict(change) for change in changes.classes] == [
         {
             "class_name": "alignment_tree", "before": 2, "after": 3, "added": 0, "removed": 0,
@@ -90,12 +90,12 @@ THINGS = st.lists(
 def test_every_row_is_told_of_once(before: list[Thing], now: list[Thing]) -> None:
     old, new = table(*before), table(*now)
     changes = compare_objects(old, new)
-    assert sorted([*changes.same[:, 0], *changes.gone]) == list(range(len(old)))
-    assert sorted([*changes.same[:, 1], *changes.come]) == list(range(len(new)))
+    assert sorted([*changes.same[:, 0], *changes.obsolete_rows]) == list(range(len(old)))
+    assert sorted([*changes.same[:, 1], *changes.new_rows]) == list(range(len(new)))
     # What is gone and has come is what differs in class and place, and no more.
     looks = [Counter(thing[:3] for thing in things) for things in (before, now)]
-    assert Counter(before[row][:3] for row in changes.gone) == looks[0] - looks[1]
-    assert Counter(now[row][:3] for row in changes.come) == looks[1] - looks[0]
+    assert Counter(before[row][:3] for row in changes.obsolete_rows) == looks[0] - looks[1]
+    assert Counter(now[row][:3] for row in changes.new_rows) == looks[1] - looks[0]
     names = [Counter(thing[3:] for thing in things) for things in (before, now)]
     for kind, alike in ((changes.moved, True), (changes.changed, False)):
         for row, other in kind:

@@ -23,7 +23,7 @@ from sentences import refused
 from semsig_gis.core import CrsError, SourceError
 from semsig_gis.objects import (
     Column,
-    Sample,
+    LayerSample,
     assemble,
     columns_of,
     draft_catalog,
@@ -434,9 +434,9 @@ def test_the_classes_are_those_of_the_catalogues() -> None:
     assert {name for name, _ in keywords("class_fields").phrases} <= known
 
 
-def sample(*rows: dict[str, Any]) -> Sample:
+def sample(*rows: dict[str, Any]) -> LayerSample:
     fields = tuple(dict.fromkeys(name for row in rows for name in row))
-    return Sample("opendatasoft", LayerInfo("x", "Point", None, len(rows), fields), rows)
+    return LayerSample("opendatasoft", LayerInfo("x", "Point", None, len(rows), fields), rows)
 
 
 def column(name: str, *values: object) -> Column:

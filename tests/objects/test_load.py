@@ -17,11 +17,11 @@ from semsig_gis.database import build_database, open_database, save_database
 from semsig_gis.objects import (
     assemble,
     choose_layers,
+    layers_in_same_extracts,
     open_objects,
-    passed_by,
     quality_report,
     read_files,
-    read_small,
+    read_small_layers,
     save_objects,
 )
 from semsig_gis.reports import quality_tables
@@ -106,7 +106,7 @@ def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None
     tags = [{"amenity": "bench"}, *[{"amenity": "clock"}] * 2, {"natural": "tree"}]
     nodes = (node(n, 7.42, 43.73 + n / 1000, one) for n, one in enumerate(tags, start=1))
     specs = choose_layers(osm, ["benches", "trees"])
-    others = passed_by(osm, specs)
+    others = layers_in_same_extracts(osm, specs)
     assert {"clocks", "taxi_ranks"} < {spec.name for spec in others}
     layers, _ = read_files([*specs, *others], [write_osm(tmp_path / "town.osm", *nodes)])
     counted = [layer for layer in layers if layer.spec in others]
@@ -119,7 +119,7 @@ def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None
     (table,) = [one for one in quality_tables(report) if one.title == "Layers not read"]
     assert ("clocks", "clock", "2") in table.rows
     # Nobody counts what stands in other files, or was not fetched.
-    assert passed_by(load_catalog("montpellier"), []) == ()
+    assert layers_in_same_extracts(load_catalog("montpellier"), []) == ()
     unread = assemble([one for one in layers if one.spec in specs], osm).report.unread
     assert {one.objects for one in unread} == {None}
 
@@ -140,9 +140,9 @@ def test_layers_of_small_files_are_counted(tmp_path: Path, monkeypatch: pytest.M
     specs[0] = replace(specs[0], where=(("n", (">=3",)),))
     catalog = catalog_of(layers=(BENCH, *specs))
     monkeypatch.setattr("semsig_gis.objects.skipped_layers.SMALL_BYTES", 1000)
-    (bins,) = read_small(catalog, [BENCH], [tmp_path, tmp_path / "bins.csv"])
+    (bins,) = read_small_layers(catalog, [BENCH], [tmp_path, tmp_path / "bins.csv"])
     assert (bins.spec.name, bins.counts.kept) == ("bins", 2)
-    assert read_small(catalog, specs, [tmp_path]) == ()
+    assert read_small_layers(catalog, specs, [tmp_path]) == ()
 
 
 def test_a_file_is_read_once_for_all_its_layers(

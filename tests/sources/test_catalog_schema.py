@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import tomllib
 from functools import cache
@@ -28,8 +29,7 @@ from semsig_gis.sources import (
     data_folder,
     paper_taxonomy,
 )
-from semsig_gis.sources.catalog import _parse_catalog
-from semsig_gis.storage import toml_text
+from semsig_gis.sources.catalog import _checked_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,7 +52,7 @@ ONLY_READER = (
 def accepts(content: dict[str, Any]) -> bool:
     """Whether the reader accepts a catalogue."""
     try:
-        _parse_catalog(toml_text(content), "it")
+        _checked_catalog(copy.deepcopy(content), "it")
     except CatalogError:
         return False
     return True

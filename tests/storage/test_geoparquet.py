@@ -68,7 +68,7 @@ def example(tmp_path: Path) -> Path:
 
 
 @given(st.lists(st.tuples(*[st.floats(allow_nan=False)] * 2)))
-def test_points_are_the_bytes_that_shapely_writes(places: list[tuple[float, float]]) -> None:
+def test_points_have_the_same_bytes_as_in_shapely(places: list[tuple[float, float]]) -> None:
     xy = np.array(places).reshape(-1, 2)
     column = points_to_wkb(xy)
     assert column.type == pa.binary()
@@ -76,14 +76,14 @@ def test_points_are_the_bytes_that_shapely_writes(places: list[tuple[float, floa
     assert column.to_pylist() == [shapely.to_wkb(point, byte_order=1) for point in points]
 
 
-def test_what_is_written_is_read_again(example: Path) -> None:
+def test_table_specs_and_crs_are_read_back(example: Path) -> None:
     table, specs, crs = read_geoparquet(example, kind="sample")
     assert table["number"].to_pylist() == NUMBERS
     assert table["text"].to_pylist() == TEXTS
     assert table["list"].to_pylist() == LISTS
     assert (specs, crs) == (SPECS, CRS(2154))
-    some, _, _ = read_geoparquet(example, kind="sample", columns=["text"])
-    assert some.column_names == ["text"]
+    subset, _, _ = read_geoparquet(example, kind="sample", columns=["text"])
+    assert subset.column_names == ["text"]
 
 
 def test_other_programs_read_the_file(example: Path) -> None:
@@ -101,7 +101,7 @@ def test_other_programs_read_the_file(example: Path) -> None:
     assert column["bbox"] == list(shapely.total_bounds(POINTS))
 
 
-def test_a_file_cut_anywhere_is_an_error(example: Path) -> None:
+def test_truncated_file_is_refused(example: Path) -> None:
     content = example.read_bytes()
     for size in range(0, len(content), 10):
         example.write_bytes(content[:size])
@@ -109,13 +109,13 @@ def test_a_file_cut_anywhere_is_an_error(example: Path) -> None:
             read_geoparquet(example, kind="sample")
 
 
-def test_a_flipped_bit_is_an_error_or_changes_nothing_that_is_read(example: Path) -> None:
+def test_flipped_bit_is_detected_or_harmless(example: Path) -> None:
     content = example.read_bytes()
     whole, _, _ = read_geoparquet(example, kind="sample")
-    chance = random.Random(0)  # noqa: S311
+    rng = random.Random(0)  # noqa: S311
     for _ in range(300):
         broken = bytearray(content)
-        broken[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        broken[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
         example.write_bytes(broken)
         try:
             table, _, _ = read_geoparquet(example, kind="sample", columns=whole.column_names)
@@ -132,15 +132,13 @@ def test_a_flipped_bit_is_an_error_or_changes_nothing_that_is_read(example: Path
         *({"crs": crs} for crs in (None, {}, {"type": "x"}, "EPSG:0", 7.5)),
     ],
 )
-def test_a_file_with_specs_or_a_crs_of_another_kind_is_not_ours(
-    tmp_path: Path, change: dict[str, Any]
-) -> None:
+def test_file_with_foreign_specs_or_crs_is_refused(tmp_path: Path, change: dict[str, Any]) -> None:
     path = write_example(tmp_path / "a.parquet", **change)
     with refused(DatabaseError, "was not written by semsig"):
         read_geoparquet(path, kind="sample")
 
 
-def test_what_is_not_the_file_that_is_meant_is_said(
+def test_error_says_what_is_wrong_with_the_file(
     example: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with refused(DatabaseError, "is a sample file", "give a signature database file"):
@@ -163,13 +161,13 @@ def test_what_is_not_the_file_that_is_meant_is_said(
         other.write_bytes(content)
         with refused(DatabaseError, str(other), "is damaged or is not a Parquet file"):
             read_geoparquet(other, kind="sample")
-    # A file that may not be read is not called damaged.
+    # A file without read permission is not reported as damaged.
     monkeypatch.setattr(pq, "ParquetFile", Mock(side_effect=denied))
     with refused(DatabaseError, str(example), "cannot be read (Permission denied)"):
         read_geoparquet(example, kind="sample")
 
 
-def test_a_file_in_use_can_be_replaced(example: Path) -> None:
+def test_open_file_can_be_replaced(example: Path) -> None:
     table, _, _ = read_geoparquet(example, kind="sample")
     write_example(example, specs={"kind": "other"})
     assert table["number"].to_pylist() == NUMBERS
@@ -180,18 +178,18 @@ BOUNDS = arrays(np.float64, st.tuples(st.integers(0, 9), st.just(4)), elements=s
 
 
 @given(bounds=BOUNDS)
-def test_bounds_are_rounded_outwards_by_less_than_they_are_long(
+def test_bounds_are_rounded_outwards_to_the_next_float(
     bounds: NDArray[np.float64],
 ) -> None:
     column = bounds_column(bounds)
-    found = np.stack([side.to_numpy() for side in column.flatten()], axis=1).astype(float)
-    assert found.shape == bounds.shape
-    assert (found[:, :2] <= bounds[:, :2]).all()
-    assert (found[:, 2:] >= bounds[:, 2:]).all()
-    assert (np.abs(found - bounds) <= np.spacing(np.abs(bounds).astype(np.float32))).all()
+    rounded = np.stack([side.to_numpy() for side in column.flatten()], axis=1).astype(float)
+    assert rounded.shape == bounds.shape
+    assert (rounded[:, :2] <= bounds[:, :2]).all()
+    assert (rounded[:, 2:] >= bounds[:, 2:]).all()
+    assert (np.abs(rounded - bounds) <= np.spacing(np.abs(bounds).astype(np.float32))).all()
 
 
-def test_neighbours_in_the_order_are_neighbours_in_the_plane() -> None:
+def test_hilbert_order_keeps_neighbours_together() -> None:
     points = np.asarray(shapely.points(np.random.default_rng(0).uniform(0, 100, (2_000, 2))))
     order = hilbert_order(points)
     assert sorted(order.tolist()) == list(range(2_000))
@@ -202,7 +200,7 @@ def test_neighbours_in_the_order_are_neighbours_in_the_plane() -> None:
         assert hilbert_order(points[[0] * equal]).tolist() == [*range(equal)]
 
 
-def test_groups_and_rows_that_may_meet_a_box_are_found(tmp_path: Path) -> None:
+def test_row_groups_and_rows_are_selected_by_box(tmp_path: Path) -> None:
     places = np.arange(12.0)[:, None] * [[10.0, 0.0, 10.0, 0.0]] + [[0, 0, 4, 4]]
     table = pa.table({"bbox": bounds_column(places), "row": np.arange(12)})
     pq.write_table(table, tmp_path / "a.parquet", row_group_size=3)
@@ -216,7 +214,7 @@ def test_groups_and_rows_that_may_meet_a_box_are_found(tmp_path: Path) -> None:
     assert np.concatenate(list(bounds_by_group(tmp_path / "a.parquet"))).tolist() == places.tolist()
 
 
-def test_a_file_without_bounds_may_meet_any_box(tmp_path: Path) -> None:
+def test_file_without_bounds_intersects_any_box(tmp_path: Path) -> None:
     for column in (pa.array([1, 2]), pa.array([{"xmin": "a"}, None])):
         table = pa.table({"bbox": column})
         pq.write_table(table, tmp_path / "a.parquet")

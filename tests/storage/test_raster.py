@@ -28,14 +28,14 @@ FIRST = (65_000, 686_001)
 
 def write(
     path: Path,
-    values: Any,  # noqa: ANN401 - whatever makes an array
+    values: Any,  # noqa: ANN401 - any array-like
     *,
     pixel: float = 10.0,
     corner: tuple[float, float] = CORNER,
     crs: CRS | None = LAMBERT,
-    **options: Any,  # noqa: ANN401 - those of rasterio
+    **options: Any,  # noqa: ANN401 - options of rasterio
 ) -> Path:
-    """Write bands (the first row is the southern one) whose lower left corner is given."""
+    """Write bands at a lower left corner; their first row is the southern one."""
     bands = np.asarray(values)
     bands = bands[None] if bands.ndim == 2 else bands
     height = bands.shape[1]
@@ -64,24 +64,24 @@ def read(path: Path, cells: Sequence[tuple[int, int]], **options: Any) -> NDArra
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 99), pixel=st.sampled_from([5.0, 10.0, 20.0]), shift=st.integers(-3, 3))
-def test_a_cell_has_the_mean_of_its_pixels(
+def test_value_of_a_cell_is_the_mean_of_its_pixels(
     tmp_path_factory: pytest.TempPathFactory, seed: int, pixel: float, shift: int
 ) -> None:
     values = np.random.default_rng(seed).uniform(0, 9, (6, 8))
     corner = CORNER[0] + shift * 10, CORNER[1]
     path = write(tmp_path_factory.mktemp("raster") / "x.tif", values, pixel=pixel, corner=corner)
     cells = [(x, y) for x in range(-4, 20) for y in range(-1, 14)]
-    size = round(20 / pixel)  # of a cell, in half pixels
-    whole = np.kron(values, np.ones((2, 2)))
-    for (x, y), found in zip(cells, read(path, cells), strict=True):
-        left, low = (x - shift) * size, y * size
-        if 0 <= left < whole.shape[1] and 0 <= low < whole.shape[0]:
-            assert found == pytest.approx(whole[low : low + size, left : left + size].mean())
-        elif not (-size <= left <= whole.shape[1] and -size <= low <= whole.shape[0]):
-            assert np.isnan(found)  # neither inside nor next to the edge
+    size = round(20 / pixel)  # of a cell in half pixels
+    halves = np.kron(values, np.ones((2, 2)))
+    for (x, y), value in zip(cells, read(path, cells), strict=True):
+        column, row = (x - shift) * size, y * size
+        if 0 <= column < halves.shape[1] and 0 <= row < halves.shape[0]:
+            assert value == pytest.approx(halves[row : row + size, column : column + size].mean())
+        elif not (-size <= column <= halves.shape[1] and -size <= row <= halves.shape[0]):
+            assert np.isnan(value)  # neither inside nor next to the edge
 
 
-def test_other_coordinates_and_any_order_of_the_cells(tmp_path: Path) -> None:
+def test_raster_in_another_crs_and_cells_in_any_order(tmp_path: Path) -> None:
     to_degrees = Transformer.from_crs(LAMBERT, 4326, always_xy=True)
     lon, lat = to_degrees.transform(*CORNER)
     values = np.arange(400.0).reshape(20, 20)
@@ -89,16 +89,16 @@ def test_other_coordinates_and_any_order_of_the_cells(tmp_path: Path) -> None:
         tmp_path / "degrees.tif", values, pixel=0.001, corner=(lon, lat), crs=CRS("EPSG:4326")
     )
     cells = [(30, 12), (2, 100), (80, 3), (30, 12)]
-    found = read(path, cells)
+    values_at_cells = read(path, cells)
     centres = GRID.viewpoints(*(np.array(cells) + FIRST).T)
-    for centre, value in zip(centres, found, strict=True):
+    for centre, value in zip(centres, values_at_cells, strict=True):
         corners = np.add(centre, [[-5, -5], [-5, 5], [5, -5], [5, 5]])
         lons, lats = np.array(to_degrees.transform(*corners.T))
-        seen = values[((lats - lat) / 0.001).astype(int), ((lons - lon) / 0.001).astype(int)]
-        assert seen.min() <= value <= seen.max()
+        nearby = values[((lats - lat) / 0.001).astype(int), ((lons - lon) / 0.001).astype(int)]
+        assert nearby.min() <= value <= nearby.max()
 
 
-def test_no_data_is_not_a_number(tmp_path: Path) -> None:
+def test_cells_without_data_are_nan(tmp_path: Path) -> None:
     marked = write(tmp_path / "marked.tif", np.array([[1, 255, 0]], np.uint8), nodata=255)
     gaps = write(tmp_path / "gaps.tif", np.array([[1.0, np.nan, 0.0]]))
     for path in (marked, gaps):
@@ -107,18 +107,18 @@ def test_no_data_is_not_a_number(tmp_path: Path) -> None:
     assert read(half, [(0, 0)]).tolist() == [3.0]
 
 
-def test_which_band_is_read(tmp_path: Path) -> None:
+def test_band_is_chosen_or_must_be_given(tmp_path: Path) -> None:
     three = write(tmp_path / "three.tif", np.arange(3, dtype=np.uint16).reshape(3, 1, 1))
     assert read(three, [(0, 0)], band=3).tolist() == [2]
     opaque = np.array([[[7, 8]], [[255, 0]]], np.uint8)
     path = write(tmp_path / "opaque.tif", opaque, photometric="MINISBLACK", alpha="YES")
     assert read(path, [(0, 0)]).tolist() == [7]
-    for band, said in ((None, "none was named"), (4, "band 4 was asked for"), (0, "band 0 was")):
-        with refused(InputError, said):
+    for band, words in ((None, "none was named"), (4, "band 4 was asked for"), (0, "band 0 was")):
+        with refused(InputError, words):
             read(three, [(0, 0)], band=band)
 
 
-def test_what_is_no_raster_is_refused(tmp_path: Path) -> None:
+def test_file_that_is_no_raster_is_refused(tmp_path: Path) -> None:
     text = tmp_path / "text.tif"
     text.write_text("no raster")
     cut = write(tmp_path / "cut.tif", np.random.default_rng(1).uniform(size=(300, 300)))
@@ -129,7 +129,7 @@ def test_what_is_no_raster_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
-def test_a_raster_that_is_not_on_this_earth_is_refused(tmp_path: Path) -> None:
+def test_raster_without_crs_or_on_another_planet_is_refused(tmp_path: Path) -> None:
     moon = CRS("+proj=longlat +R=1737400 +no_defs")
     for crs, words in (
         (None, "does not say its coordinate reference system"),

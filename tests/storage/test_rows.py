@@ -1,4 +1,4 @@
-"""Rows of CSV and of JSON lines."""
+"""Rows of CSV and JSON lines."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_siz
 
 
 @given(st.lists(st.fixed_dictionaries({"a": WORDS, "b": WORDS}), min_size=1, max_size=4))
-def test_what_was_written_is_read(rows: list[dict[str, str]]) -> None:
+def test_rows_of_json_lines_are_read(rows: list[dict[str, str]]) -> None:
     text = "\n".join(json.dumps(row) for row in rows)
-    found = parse_rows(text.split("\n"), "x", dict, what="thing")
-    assert found == list(enumerate(rows, start=1))
+    rows_read = parse_rows(text.split("\n"), "x", dict, what="thing")
+    assert rows_read == list(enumerate(rows, start=1))
 
 
-def test_cells_of_a_table_may_hold_commas_and_line_breaks(tmp_path: Path) -> None:
+def test_quoted_cells_may_contain_commas_and_line_breaks(tmp_path: Path) -> None:
     path = tmp_path / "rows.CSV"
     path.write_text('\ufeffid,types\n"a, b",D\n\n"c\nd",B\n', encoding="utf-8")
-    found = read_rows(path, lambda row: (row["id"], row["types"]), what="thing")
-    assert found == [(2, ("a, b", "D")), (5, ("c\nd", "B"))]
+    rows_read = read_rows(path, lambda row: (row["id"], row["types"]), what="thing")
+    assert rows_read == [(2, ("a, b", "D")), (5, ("c\nd", "B"))]
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_cells_of_a_table_may_hold_commas_and_line_breaks(tmp_path: Path) -> Non
         ("types\n" + "D" * 200_000, True, ["not CSV"]),
     ],
 )
-def test_what_cannot_be_used_is_named(
+def test_error_names_the_unusable_row(
     tmp_path: Path,
     text: str,
     table: bool,  # noqa: FBT001

@@ -34,14 +34,14 @@ OTHERS: list[tuple[dict[str, Any], str]] = [
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return the folder of a run that has a result."""
-    place = partial_folder(tmp_path / "new" / "out")
-    RUN.begin(place, RECIPE)
-    (place / "part_1").touch()
-    return place
+    """Return the folder of a run with a result."""
+    out_folder = partial_folder(tmp_path / "new" / "out")
+    RUN.begin(out_folder, RECIPE)
+    (out_folder / "part_1").touch()
+    return out_folder
 
 
-def test_a_run_is_taken_up_by_the_same_recipe(folder: Path) -> None:
+def test_run_is_resumed_with_the_same_recipe(folder: Path) -> None:
     (folder / "deep" / f"{MACHINE_PREFIX}x").mkdir(parents=True)  # as a killed process leaves
     RUN.begin(folder, RECIPE)
     assert sorted(path.name for path in folder.iterdir()) == ["deep", "part_1", "recipe.json"]
@@ -56,7 +56,7 @@ def test_another_recipe_is_refused_or_replaces_a_run_without_results(
         with refused(InputError, str(folder), f"differs in {difference};"):
             refuse(folder, other)
     (folder / "part_1").unlink()
-    (folder / "letter.txt").touch()  # never thrown away
+    (folder / "letter.txt").touch()  # must not be removed
     with pytest.raises(InputError):
         RUN.begin(folder, other)
     (folder / "letter.txt").unlink()
@@ -65,28 +65,28 @@ def test_another_recipe_is_refused_or_replaces_a_run_without_results(
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "\0", None])
-def test_what_is_not_a_run_is_not_taken_for_one(folder: Path, text: str | None) -> None:
+def test_folder_without_a_recipe_is_refused(folder: Path, text: str | None) -> None:
     recipe = folder / "recipe.json"
     recipe.unlink() if text is None else recipe.write_text(text, encoding="utf-8")
     with refused(InputError, str(folder), "'part_1'", "no results of a trial"):
         RUN.begin(folder, RECIPE)
 
 
-def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
+def test_unwritable_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    for place in (tmp_path / "file", tmp_path / "file" / "out"):
-        with refused(InputError, str(place), "Not a directory", "choose a"):
-            RUN.begin(place, RECIPE)
+    for out_folder in (tmp_path / "file", tmp_path / "file" / "out"):
+        with refused(InputError, str(out_folder), "Not a directory", "choose a"):
+            RUN.begin(out_folder, RECIPE)
 
 
-def test_a_run_is_abandoned_only_without_results(folder: Path) -> None:
+def test_only_runs_without_results_are_removed(folder: Path) -> None:
     assert not RUN.abandon(folder)
     (folder / "part_1").unlink()
     assert RUN.abandon(folder)
     assert not folder.exists()
 
 
-def test_a_finished_run_is_renamed_to_its_place(folder: Path) -> None:
+def test_finished_run_is_renamed(folder: Path) -> None:
     out = finish(folder)
     assert not folder.exists()
     assert {path.name for path in out.iterdir()} == {"recipe.json", "part_1"}
@@ -98,17 +98,17 @@ def test_a_finished_run_is_renamed_to_its_place(folder: Path) -> None:
     assert [path.name for path in out.parent.iterdir()] == ["out"]
 
 
-def test_what_a_late_process_removes_meanwhile_is_no_fault(
+def test_files_removed_meanwhile_by_another_process_are_ignored(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "late" / "half").mkdir(parents=True)
     remove = shutil.rmtree
 
-    def removed_twice(path: Path, **options: Any) -> None:  # noqa: ANN401
+    def remove_twice(path: Path, **options: Any) -> None:  # noqa: ANN401
         monkeypatch.setattr(shutil, "rmtree", remove)
         (path / "half").rmdir()
         raise FileNotFoundError(path, options)
 
-    monkeypatch.setattr(shutil, "rmtree", removed_twice)
+    monkeypatch.setattr(shutil, "rmtree", remove_twice)
     out = finish(folder, keep={"part_1"})
     assert [path.name for path in out.iterdir()] == ["part_1"]

@@ -1,4 +1,4 @@
-"""What is read whole: regular files up to a size, JSON up to a depth."""
+"""Limits for reading text and JSON files."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such files")
-def test_a_pipe_and_a_device_are_not_read(tmp_path: Path) -> None:
+def test_pipe_and_device_are_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", "/dev/zero"):
         with pytest.raises(OSError, match="it is a pipe or a device, not a file"):
             read_whole(path)
 
 
-def test_a_file_that_is_too_long_is_not_read(tmp_path: Path) -> None:
+def test_too_large_file_is_refused(tmp_path: Path) -> None:
     with (tmp_path / "long.json").open("wb") as file:
-        file.truncate(MAX_TEXT_BYTES + 1)  # which takes no room on the disk
+        file.truncate(MAX_TEXT_BYTES + 1)  # sparse: takes no space on the disk
     with pytest.raises(OSError, match=r"it has 268,435,457 bytes, and at most 268,435,456 "):
         read_whole(tmp_path / "long.json")
 
 
-def test_text_without_its_mark(tmp_path: Path) -> None:
+def test_byte_order_mark_is_removed(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes("\ufeffé".encode())
     assert read_text(tmp_path / "a.toml") == "é"
 
@@ -46,11 +46,11 @@ def test_text_without_its_mark(tmp_path: Path) -> None:
         ("[" + "1" * 10_000 + "]", "digits"),
     ],
 )
-def test_json_that_cannot_be_a_setting(text: str, words: str) -> None:
+def test_finite_json_refuses_deep_nesting_and_unusable_numbers(text: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_json(text, finite=True)
 
 
-def test_json_of_others_may_hold_any_number() -> None:
+def test_other_json_may_contain_any_number() -> None:
     assert parse_json("[1e999, 1.5, 7]")[1:] == [1.5, 7]
     assert parse_json("[1.5, -7]", finite=True) == [1.5, -7]

@@ -1,4 +1,4 @@
-"""Values as TOML; what is wrong in such files is among the mistakes of catalogues."""
+"""Values as TOML; wrong TOML files are tested with catalogues."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ VALUES: st.SearchStrategy[Any] = st.recursive(
 
 
 @given(st.dictionaries(WORDS, VALUES, max_size=4))
-def test_any_values_are_read_back(table: dict[str, Any]) -> None:
+def test_toml_text_is_parsed_to_the_same_values(table: dict[str, Any]) -> None:
     assert tomllib.loads(toml_text(table)) == table
 
 
-def test_values_beside_tables_stay_with_their_own() -> None:
+def test_values_after_tables_belong_to_the_right_section() -> None:
     table = {"noises": {"mine": {"clutter": 2.0, "by_class": {"bench": 0.5}}}, "queries": 3}
-    text = toml_text({**table, "parts": {}})  # which is left out
+    text = toml_text({**table, "parts": {}})  # an empty table is omitted
     assert text.startswith("queries = 3\n\n[noises.mine]\nclutter = 2.0\n")
     assert tomllib.loads(text) == table
 
 
 @given(st.floats() | st.integers() | st.booleans() | st.text() | st.none())
-def test_a_length_is_above_nothing_and_up_to_the_most(value: object) -> None:
+def test_metres_are_above_0_and_up_to_the_limit(value: object) -> None:
     number = not isinstance(value, bool) and isinstance(value, int | float)
     if number and 0 < value <= 100:  # type: ignore[operator]
         assert math.isclose(metres(value, "a", "a.toml", most=100), float(value))  # type: ignore[arg-type]
