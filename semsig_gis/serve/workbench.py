@@ -52,12 +52,12 @@ from semsig_gis.maps import (
     to_metres,
 )
 from semsig_gis.observation import (
-    Detector,
     LabelMap,
     North,
     Photo,
     Shot,
     Tally,
+    ViewBuilder,
     field_of_view,
     picture_shot,
     read_pictures,
@@ -207,6 +207,7 @@ class Workbench:
         shot = picture_shot(content, name)
         width, height = shot.size or (0, 0)
         panorama = shot.focal is None and width == PANORAMA_RATIO * height
+        # A picture of this ratio without a focal length is taken for a full panorama.
         if panorama:
             shot = replace(shot, camera="equirectangular")
         fov = field_of_view(shot)
@@ -241,6 +242,7 @@ class Workbench:
         photos = {str(photo.get("name")): photo for photo in body.get("photos") or []}
         shots = {key: _shot(photo) for key, photo in photos.items()}
         stems = {PurePosixPath(key).stem: key for key in photos}
+        # The readers of detections expect files, with the labels of YOLO next to the boxes.
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, name)
             file.write_text(str(body.get("text") or ""), encoding="utf-8")
@@ -251,16 +253,17 @@ class Workbench:
             except SemsigError as error:
                 raise InputError(str(error).replace(f"{folder}/", "")) from error
         tally = Tally()
-        detector = Detector(
+        builder = ViewBuilder(
             labels=LabelMap.open(body.get("labels") or (), self.taxonomy),
             taxonomy=self.taxonomy,
             shots=shots | {stem: shots[key] for stem, key in stems.items()},
         )
         marks: dict[str, list[dict[str, Any]]] = {}
         for picture in pictures:
+            # Files of detectors name pictures with other folders and suffixes.
             key = stems.get(PurePosixPath(picture.name).stem)
             if key is not None:
-                marks.setdefault(key, []).extend(self._marks(detector, picture, tally))
+                marks.setdefault(key, []).extend(self._marks(builder, picture, tally))
         if not marks:
             listed = ", ".join(sorted({picture.name for picture in pictures})[:3]) or "no picture"
             raise InputError(
@@ -276,11 +279,11 @@ class Workbench:
         notes = [f"Left out: {count:,} boxes {reason}." for count, reason in ignored if count]
         return {"photos": marks, "notes": notes}
 
-    def _marks(self, detector: Detector, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
+    def _marks(self, builder: ViewBuilder, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
         """Return the boxes of a picture as marks of the page."""
-        sightings = detector.sightings(picture, tally)
+        boxes = builder.located_boxes(picture, tally)
         names = {item.code: item.name for item in self.taxonomy.classes}
-        turn = sightings.shot.heading or 0.0
+        turn = boxes.shot.heading or 0.0
         return [
             {
                 "box": [round(side, 1) for side in corners],
@@ -291,12 +294,12 @@ class Workbench:
                 "range_error": None if math.isnan(metres) else round(error, 3),
             }
             for corners, code, scores, bearing, metres, error in zip(
-                sightings.corners.tolist(),
-                sightings.codes.tolist(),
-                sightings.scores,
-                sightings.bearings.tolist(),
-                sightings.ranges.tolist(),
-                sightings.range_errors.tolist(),
+                boxes.corners.tolist(),
+                boxes.codes.tolist(),
+                boxes.scores,
+                boxes.bearings.tolist(),
+                boxes.ranges.tolist(),
+                boxes.range_errors.tolist(),
                 strict=True,
             )
         ]
@@ -452,6 +455,7 @@ class Workbench:
             )
             sight = replace(sight, photo=photo)
             look = {"sectors": [[low, high % FULL_TURN] for low, high in photo.sectors] or None}
+        # The true view, then the errors of a detector with this noise.
         noise = body.get("noise")
         chain = []
         if noise is not None:
