@@ -205,7 +205,7 @@ class QueryOptions:
 
     def query(self, dataset: SignatureDatabase | PartitionedDatabase, *, others: str = "") -> View:
         """Return the query of the options; `others` says what else may be given."""
-        from semsig_gis.observation import parse_view, said_row
+        from semsig_gis.observation import parse_view, text_row
 
         taxonomy = dataset.taxonomy
         told: dict[str, Any] = {
@@ -227,15 +227,15 @@ class QueryOptions:
                     f"{self.seen!r} was given with --types; describe what was seen in one "
                     "of these ways."
                 )
-            told |= said_row(sentence, taxonomy)
+            told |= text_row(sentence, taxonomy)
         return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
 
     def usual_noise(self, taxonomy: Taxonomy) -> str:
         """Return the noise of what was seen: a person who says it in words leaves much out."""
-        from semsig_gis.observation import said_row
+        from semsig_gis.observation import text_row
 
         sentence = self._parts[0]
-        return "by-hand" if sentence and "see" in said_row(sentence, taxonomy) else "generic"
+        return "by-hand" if sentence and "see" in text_row(sentence, taxonomy) else "generic"
 
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase

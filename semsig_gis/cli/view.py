@@ -119,9 +119,9 @@ def view(
 ) -> None:
     """Turn the boxes of an object detector into views for semsig localize."""
     from semsig_gis.observation import (
-        Detector,
         LabelMap,
         Shot,
+        ViewBuilder,
         north_sigma,
         read_pictures,
         read_shots,
@@ -149,7 +149,7 @@ def view(
     beside = [
         one for folder in around for one in (folder, folder / "images", folder.parent / "images")
     ]
-    detector = Detector(
+    detector = ViewBuilder(
         labels=LabelMap.open(labels or (), taxonomy),
         taxonomy=taxonomy,
         min_score=min_score,

@@ -133,7 +133,7 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
     return _columns_view(values, taxonomy, radius)
 
 
-def said_row(text: str, taxonomy: Taxonomy) -> Row:
+def text_row(text: str, taxonomy: Taxonomy) -> Row:
     """Return a person's text as a row: ``types`` if it consists of symbols, otherwise ``see``.
 
     One word consists of symbols if all its letters are symbols and it is not a word for a class, or

@@ -19,9 +19,9 @@ from semsig_gis.observation import (
     Camera,
     Leg,
     View,
+    locate_boxes,
     mappings,
     parse_view,
-    placed,
 )
 
 if TYPE_CHECKING:
@@ -239,7 +239,9 @@ def _detections(
     )
     edges = np.clip(edges, 0.0, [camera.width, camera.height] * 2)
     sizes = np.array(heights).reshape(-1, 2)
-    offsets, ranges, errors = placed(camera, edges, heights=sizes, whole=~np.isnan(sizes[:, 0]))
+    offsets, ranges, errors = locate_boxes(
+        camera, edges, heights=sizes, whole=~np.isnan(sizes[:, 0])
+    )
     return [
         {
             "class": mark.get("class", "?"),

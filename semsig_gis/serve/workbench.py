@@ -52,12 +52,12 @@ from semsig_gis.maps import (
     to_metres,
 )
 from semsig_gis.observation import (
-    Detector,
     LabelMap,
     North,
     Photo,
     Shot,
     Tally,
+    ViewBuilder,
     field_of_view,
     picture_shot,
     read_pictures,
@@ -251,7 +251,7 @@ class Workbench:
             except SemsigError as error:
                 raise InputError(str(error).replace(f"{folder}/", "")) from error
         tally = Tally()
-        detector = Detector(
+        builder = ViewBuilder(
             labels=LabelMap.open(body.get("labels") or (), self.taxonomy),
             taxonomy=self.taxonomy,
             shots=shots | {stem: shots[key] for stem, key in stems.items()},
@@ -260,7 +260,7 @@ class Workbench:
         for picture in pictures:
             key = stems.get(PurePosixPath(picture.name).stem)
             if key is not None:
-                marks.setdefault(key, []).extend(self._marks(detector, picture, tally))
+                marks.setdefault(key, []).extend(self._marks(builder, picture, tally))
         if not marks:
             listed = ", ".join(sorted({picture.name for picture in pictures})[:3]) or "no picture"
             raise InputError(
@@ -276,11 +276,11 @@ class Workbench:
         notes = [f"Left out: {count:,} boxes {reason}." for count, reason in ignored if count]
         return {"photos": marks, "notes": notes}
 
-    def _marks(self, detector: Detector, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
+    def _marks(self, builder: ViewBuilder, picture: Any, tally: Tally) -> list[dict[str, Any]]:  # noqa: ANN401
         """Return the boxes of a picture as marks of the page."""
-        sightings = detector.sightings(picture, tally)
+        boxes = builder.located_boxes(picture, tally)
         names = {item.code: item.name for item in self.taxonomy.classes}
-        turn = sightings.shot.heading or 0.0
+        turn = boxes.shot.heading or 0.0
         return [
             {
                 "box": [round(side, 1) for side in corners],
@@ -291,12 +291,12 @@ class Workbench:
                 "range_error": None if math.isnan(metres) else round(error, 3),
             }
             for corners, code, scores, bearing, metres, error in zip(
-                sightings.corners.tolist(),
-                sightings.codes.tolist(),
-                sightings.scores,
-                sightings.bearings.tolist(),
-                sightings.ranges.tolist(),
-                sightings.range_errors.tolist(),
+                boxes.corners.tolist(),
+                boxes.codes.tolist(),
+                boxes.scores,
+                boxes.bearings.tolist(),
+                boxes.ranges.tolist(),
+                boxes.range_errors.tolist(),
                 strict=True,
             )
         ]

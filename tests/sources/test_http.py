@@ -289,38 +289,29 @@ def test_redirect_to_another_host_or_nowhere_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("source", "target", "allowed"),
+    ("source", "target", "token", "allowed"),
     [
-        ("http://a.example/x", "https://a.example/y", True),
-        ("http://a.example:80/x", "https://a.example:443/y", True),
-        ("https://a.example/x", "http://a.example/y", False),
-        ("http://a.example:8080/x", "https://a.example/y", False),
-        ("https://a.example/x", "https://b.a.example/y", False),
-        ("https://a.example/x", "https://a.example:444/y", False),
-        ("https://a.example/x", "https://a.example:port/y", False),
-        ("https://a.example/x", "file:///etc/hostname", False),
+        ("http://a.example/x", "https://a.example/y", None, True),
+        ("http://a.example:80/x", "https://a.example:443/y", None, True),
+        ("https://a.example/x", "http://a.example/y", None, False),
+        ("http://a.example:8080/x", "https://a.example/y", None, False),
+        ("https://a.example/x", "https://b.a.example/y", None, False),
+        ("https://a.example/x", "https://a.example:444/y", None, False),
+        ("https://a.example/x", "https://a.example:port/y", None, False),
+        ("https://a.example/x", "file:///etc/hostname", None, False),
+        # Of other hosts, only a listed one is allowed, and never with a token.
+        ("https://a.example/x", "https://listed.example/y", None, True),
+        ("https://a.example/x", "http://listed.example/y", None, False),
+        ("https://a.example/x", "https://listed.example/y", AccessToken("word"), False),
+        ("https://a.example/x", "https://c.example/y", None, False),
     ],
 )
-def test_redirect_may_change_http_to_https_only(source: str, target: str, *, allowed: bool) -> None:
-    with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
-        _check_redirect(source, target, HttpSpec())
-
-
-@pytest.mark.parametrize(
-    ("target", "token", "allowed"),
-    [
-        ("https://b.example/y", None, True),
-        ("http://b.example/y", None, False),
-        ("https://b.example/y", AccessToken("word"), False),
-        ("https://c.example/y", None, False),
-    ],
-)
-def test_redirect_may_lead_to_a_listed_host_without_a_token(
-    target: str, token: AccessToken | None, *, allowed: bool
+def test_redirect_needs_the_same_or_a_listed_host_and_never_a_weaker_scheme(
+    source: str, target: str, token: AccessToken | None, *, allowed: bool
 ) -> None:
-    spec = HttpSpec(hosts=frozenset({"b.example"}), token=token)
+    spec = HttpSpec(hosts=frozenset({"listed.example"}), token=token)
     with nullcontext() if allowed else refused(SourceError, "a.example", " redirects to "):
-        _check_redirect("https://a.example/x", target, spec)
+        _check_redirect(source, target, spec)
 
 
 @pytest.mark.parametrize(

@@ -36,8 +36,8 @@ POINT = {"type": "Point", "coordinates": [2, 48]}
 BENCH = {"amenity": "bench"}
 
 
-def feature(**properties: object) -> dict[str, object]:
-    return {"type": "Feature", "geometry": POINT, "properties": properties}
+def encoded(content: object) -> bytes:
+    return json.dumps(content).encode()
 
 
 class Case(NamedTuple):
@@ -53,79 +53,42 @@ class Case(NamedTuple):
     crs: str = "EPSG:4326"  # of the layer, if the user states EPSG:2154
 
 
+NO_OVERPASS = "is not JSON as Overpass servers send it"
 NO_GEOPARQUET = "cannot be read as GeoParquet"
 NO_ANSWER = "is not an answer of Mapillary about map features"
-CASES = {
-    "osm_file": Case(
-        file.read_layers,
-        OSM,
-        "a.osm",
-        b'<osm version="0.6"><node id="1" version="1" lat="48" lon="2">'
-        b'<tag k="amenity" v="bench"/></node></osm>',
-        "it is damaged or not the kind of file",
-    ),
-    "overpass": Case(
-        overpass.read_layers,
-        OSM,
-        "a.json",
-        json.dumps(
-            {"elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2, "tags": BENCH}]}
-        ).encode(),
-        "is not JSON as Overpass servers send it",
-        "cannot be read (No such file",
-        "cannot be read (Is a directory",
-    ),
-    "osm_features": Case(
-        features.read_layers,
-        OSM,
-        "a.geojson",
-        json.dumps({"type": "FeatureCollection", "features": [feature(**BENCH)]}).encode(),
-        "cannot be read",
-    ),
-    "mapillary": Case(
-        mapillary.read_layers,
-        PLAIN,
-        "a.json",
-        json.dumps({"data": [{"id": "1", "object_value": "x", "geometry": POINT}]}).encode(),
-        NO_ANSWER,
-        NO_ANSWER,
-        NO_ANSWER,
-    ),
-    "overture": Case(
-        overture.read_layers,
-        OVERTURE,
-        "a.parquet",
-        parquet(id=["1"], geometry=WKB, **{"class": ["bench"]}),
-        NO_GEOPARQUET,
-        NO_GEOPARQUET,
-        NO_GEOPARQUET,
-    ),
-    "service JSON": Case(
-        services.read_layers,
-        PLAIN,
-        "a.json",
-        json.dumps([{"geo_point_2d": [48, 2]}]).encode(),
-        "is not whole JSON",
-        crs="EPSG:2154",
-    ),
-    "service GML": Case(
-        services.read_layers,
-        PLAIN,
-        "a.gml",
-        b'<FeatureCollection xmlns:gml="g"><member><a><p><gml:Point><gml:pos>2 48</gml:pos>'
-        b"</gml:Point></p></a></member></FeatureCollection>",
-        "is not whole GML",
-        crs="EPSG:2154",
-    ),
-    "service Parquet": Case(
-        services.read_layers,
-        PLAIN,
-        "a.parquet",
-        parquet(geo_shape=WKB),
-        "is not a whole Parquet",
-        crs="EPSG:2154",
-    ),
+OSM_XML = (
+    b'<osm version="0.6"><node id="1" version="1" lat="48" lon="2">'
+    b'<tag k="amenity" v="bench"/></node></osm>'
+)
+OVERPASS = {"elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2, "tags": BENCH}]}
+GEOJSON = {
+    "type": "FeatureCollection",
+    "features": [{"type": "Feature", "geometry": POINT, "properties": BENCH}],
 }
+MAP_FEATURES = {"data": [{"id": "1", "object_value": "x", "geometry": POINT}]}
+GML = (
+    b'<FeatureCollection xmlns:gml="g"><member><a><p><gml:Point><gml:pos>2 48</gml:pos>'
+    b"</gml:Point></p></a></member></FeatureCollection>"
+)
+OVERTURE_COLUMNS: dict[str, list[Any]] = {"id": ["1"], "geometry": WKB, "class": ["bench"]}
+CASES = {
+    "osm_file": Case(file.read_layers, OSM, "a.osm", OSM_XML, "it is damaged or not the kind"),
+    "overpass": Case(overpass.read_layers, OSM, "a.json", encoded(OVERPASS), NO_OVERPASS,
+                     "cannot be read (No such file", "cannot be read (Is a directory"),
+    "osm_features": Case(features.read_layers, OSM, "a.geojson", encoded(GEOJSON),
+                         "cannot be read"),
+    "mapillary": Case(mapillary.read_layers, PLAIN, "a.json", encoded(MAP_FEATURES),
+                      NO_ANSWER, NO_ANSWER, NO_ANSWER),
+    "overture": Case(overture.read_layers, OVERTURE, "a.parquet", parquet(**OVERTURE_COLUMNS),
+                     NO_GEOPARQUET, NO_GEOPARQUET, NO_GEOPARQUET),
+    "service JSON": Case(services.read_layers, PLAIN, "a.json",
+                         encoded([{"geo_point_2d": [48, 2]}]), "is not whole JSON",
+                         crs="EPSG:2154"),
+    "service GML": Case(services.read_layers, PLAIN, "a.gml", GML, "is not whole GML",
+                        crs="EPSG:2154"),
+    "service Parquet": Case(services.read_layers, PLAIN, "a.parquet", parquet(geo_shape=WKB),
+                            "is not a whole Parquet", crs="EPSG:2154"),
+}  # fmt: skip
 # Files that a reader refuses: their name, content and the words of the error.
 REPORT = b"<ExceptionReport><ExceptionText>No.</ExceptionText></ExceptionReport>"
 TIMED_OUT = b'{"elements": [], "remark": "runtime error: Query timed out after 91 seconds."}'
@@ -136,7 +99,7 @@ WRONG_FILES: dict[str, list[tuple[str, bytes, str]]] = {
         ("a.osm", b'<osm version="0.6"><node id="1" lat="north" lon="2"/></osm>', "north"),
     ],
     "overpass": [
-        *(("a.json", content, "is not JSON as Overpass servers send it")
+        *(("a.json", content, NO_OVERPASS)
           for content in (b"", b"\xff\xfe", b"null", b"[" * 100_000)),
         ("a.json", TIMED_OUT, "is incomplete (runtime error: Query timed out"),
     ],
@@ -178,7 +141,7 @@ WRONG_FILES: dict[str, list[tuple[str, bytes, str]]] = {
 }  # fmt: skip
 
 
-@pytest.fixture(params=CASES.values(), ids=CASES.keys())
+@pytest.fixture(params=CASES.values(), ids=list(CASES))
 def case(request: pytest.FixtureRequest) -> Case:
     result: Case = request.param
     return result

@@ -1,4 +1,4 @@
-"""Cameras: where in a picture things of the world appear, and where in the world boxes stand."""
+"""Camera models: convert directions to pixels, and boxes in pixels to bearings and heights."""
 
 from __future__ import annotations
 
@@ -18,30 +18,29 @@ if TYPE_CHECKING:
 Projection = Literal["pinhole", "equirectangular", "cylindrical", "fisheye"]
 
 USUAL_FOV: dict[str, float] = {"equirectangular": 360.0, "cylindrical": 360.0, "fisheye": 180.0}
-"""Of pictures whose field of view nobody says; a pinhole's is never known."""
+"""Default fields of view in degrees; a pinhole camera has none."""
 
 MOST_PIXELS = 1_000_000
-MOST_FOV = {"pinhole": 175.0}  # a flat picture cannot hold half a turn
+MOST_FOV = {"pinhole": 175.0}  # a flat picture cannot show half a turn
 
-# Bearings at which the edges of a picture are looked for, and how often each is then halved.
-STEPS, HALVINGS = 1440, 20
+# Search for the edges of a picture: bearings of the first pass, and bisections of each edge.
+EDGE_STEPS, BISECTIONS = 1440, 20
 
-# Of a search for the upright thing whose outline has a given box.
-ROUNDS = 20
-NUDGE = 1e-6
-MOST_STEP = 0.3
-MOST_MISFIT = 0.1
-HEIGHTS, SIDES = 9, 3
+# Gauss-Newton fit of an upright object to a box.
+FIT_ITERATIONS = 20
+DIFFERENCE_STEP = 1e-6  # for numerical derivatives
+LARGEST_STEP = 0.3
+LARGEST_MISFIT = 0.1  # share of the size of the box
+OUTLINE_HEIGHTS, OUTLINE_SIDES = 9, 3  # points of an outline
 MIN_DEPTH = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
-    """Upright things as a camera sees them; each array has shape (n,).
+class UprightObjects:
+    """Upright objects as a camera sees them; each array has shape (n,).
 
-    `bearings` are degrees clockwise from where the camera looks, in [-180, 180). `rises` are their
-    heights by their distance, NaN where the picture does not tell; `pixels` how tall they are in
-    the picture.
+    `bearings` are in degrees clockwise from the camera's axis, in [-180, 180). `rises` are their
+    heights divided by their distances, NaN if unknown; `pixels` are their heights in the picture.
     """
 
     bearings: NDArray[np.float64]
@@ -51,7 +50,7 @@ class Standing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """How a picture shows the world.
+    """A camera model: size, field of view and projection of a picture.
 
     Parameters
     ----------
@@ -60,11 +59,11 @@ class Camera:
     fov : float
         Field of view over its width in degrees: up to 175 for a pinhole camera, else up to 360.
     projection : {"pinhole", "equirectangular", "cylindrical", "fisheye"}
-        A photograph with straight lines; panoramas with degrees, or heights, as rows; a picture in
-        which distance from the centre is the angle (equidistant).
+        A photograph with straight lines; panoramas with rows by angle (equirectangular) or by
+        height (cylindrical); a fisheye picture with the angle as the distance from the centre
+        (equidistant).
     pitch, roll : float, default 0
-        How far the camera looks up, and how far it is turned clockwise about where it looks, in
-        degrees.
+        Angle of the camera above the horizon, and clockwise rotation about its axis, in degrees.
 
     Raises
     ------
@@ -74,7 +73,7 @@ class Camera:
     Examples
     --------
     >>> phone = Camera(width=4000, height=3000, fov=67)
-    >>> phone.standing([[1900, 1000, 2100, 1800]]).bearings.round(2).tolist()
+    >>> phone.upright_objects([[1900, 1000, 2100, 1800]]).bearings.round(2).tolist()
     [0.0]
     >>> phone.sectors()
     ((-33.5, 33.5),)
@@ -108,14 +107,14 @@ class Camera:
 
     @property
     def focal(self) -> float:
-        """Pixels to a radian, or of a pinhole's focal length."""
+        """Pixels per radian, or the focal length of a pinhole camera in pixels."""
         if self.projection == "pinhole":
             return self.width / 2.0 / math.tan(math.radians(self.fov) / 2.0)
         return self.width / math.radians(self.fov)
 
     @property
     def _turn(self) -> NDArray[np.float64]:
-        """Matrix that takes directions of the camera (right, down, ahead) to the world's."""
+        """Rotation matrix from camera directions (right, down, ahead) to those without tilt."""
         pitch, roll = math.radians(self.pitch), math.radians(self.roll)
         tilt = [
             [1.0, 0.0, 0.0],
@@ -130,10 +129,10 @@ class Camera:
         return np.asarray(np.asarray(tilt) @ np.asarray(spin))
 
     def pixels(self, directions: ArrayLike) -> NDArray[np.float64]:
-        """Return where directions appear, (..., 2): columns and rows, NaN behind a pinhole.
+        """Return the columns and rows of directions, shape (..., 2), NaN behind a pinhole.
 
-        Directions, shape (..., 3), are lengths to the right of where the camera looks, down, and
-        ahead; the camera's pitch and roll do not turn them.
+        Directions, shape (..., 3), are lengths to the right, down and ahead of a camera without
+        pitch and roll.
         """
         right, down, ahead = np.moveaxis(np.asarray(directions) @ self._turn, -1, 0)
         focal = self.focal
@@ -141,8 +140,8 @@ class Camera:
             depth = np.where(ahead > MIN_DEPTH * np.hypot(right, down), ahead, np.nan)
             across, along = focal * right / depth, focal * down / depth
         elif self.projection == "fisheye":
-            aside = np.hypot(right, down)
-            scale = focal * np.arctan2(aside, ahead) / np.where(aside > 0, aside, 1.0)
+            radial = np.hypot(right, down)
+            scale = focal * np.arctan2(radial, ahead) / np.where(radial > 0, radial, 1.0)
             across, along = scale * right, scale * down
         else:
             flat = np.hypot(right, ahead)
@@ -173,26 +172,27 @@ class Camera:
         return np.asarray(np.stack([right, down, ahead], axis=-1) @ self._turn.T)
 
     def sectors(self) -> tuple[Sector, ...]:
-        """Return which bearings are in the picture, from where the camera looks; none for all.
+        """Return the sectors of bearings in the picture, from the camera's axis; none for all.
 
-        They are those at the height of the camera or, where that is not in the picture, of what
-        is in its middle.
+        The bearings are at the height of the camera or, if it is not in the picture, at the height
+        of the centre of the picture.
         """
         middle = self.directions([self.width / 2.0, self.height / 2.0])
         ahead = math.degrees(math.atan2(middle[0], middle[2]))
-        sides = ahead + np.arange(STEPS) * (FULL_TURN / STEPS)
+        sides = ahead + np.arange(EDGE_STEPS) * (FULL_TURN / EDGE_STEPS)
         rise = 0.0
-        if not (seen := self._shows(sides, rise)).any():
+        if not (shown := self._shows(sides, rise)).any():
             rise = float(-middle[1] / max(math.hypot(middle[0], middle[2]), MIN_DEPTH))
-            seen = self._shows(sides, rise)
-            seen[0] = True
-        if seen.all():
+            shown = self._shows(sides, rise)
+            shown[0] = True
+        if shown.all():
             return ()
-        first, last = seen & ~np.roll(seen, 1), seen & ~np.roll(seen, -1)
-        step = FULL_TURN / STEPS
+        # The first and last bearing of each run in the picture, then the exact edges.
+        first, last = shown & ~np.roll(shown, 1), shown & ~np.roll(shown, -1)
+        step = FULL_TURN / EDGE_STEPS
         low = self._edge(sides[first], sides[first] - step, rise)
         high = self._edge(sides[last], sides[last] + step, rise)
-        if high[0] < low[0]:  # the last one goes on where the bearings begin
+        if high[0] < low[0]:  # the last sector continues at the first bearing
             high = np.roll(high, -1)
         low -= FULL_TURN * np.round(low / FULL_TURN)
         width = np.mod(high - low, FULL_TURN)
@@ -202,6 +202,7 @@ class Camera:
         )
 
     def _shows(self, bearings: NDArray[Any], rise: float) -> NDArray[np.bool_]:
+        """Return a mask of the bearings that are in the picture at a height by distance."""
         angles = np.radians(bearings)
         down = np.full_like(angles, -rise)
         column, row = np.moveaxis(
@@ -213,38 +214,38 @@ class Camera:
     def _edge(
         self, inside: NDArray[Any], outside: NDArray[Any], rise: float
     ) -> NDArray[np.float64]:
-        """Return the bearings of the picture's edge between some inside and some outside."""
-        for _ in range(HALVINGS):
+        """Return the bearings of the edges between bearings inside and outside, by bisection."""
+        for _ in range(BISECTIONS):
             middle = (inside + outside) / 2.0
             shown = self._shows(middle, rise)
             inside, outside = np.where(shown, middle, inside), np.where(shown, outside, middle)
         return inside
 
-    def standing(self, boxes: ArrayLike) -> Standing:
-        """Return the upright things that have these boxes as outlines.
+    def upright_objects(self, boxes: ArrayLike) -> UprightObjects:
+        """Return the upright objects with these boxes as outlines.
 
-        Boxes, shape (n, 4), are left, top, right and bottom in pixels. A thing is taken for a flat
-        one that faces the camera: its bearing, width, and where it begins and ends by its distance
-        are what gives the box, also where a tilted camera or a panorama bends uprights.
+        Boxes, shape (n, 4), are left, top, right and bottom in pixels. The model of an object is a
+        flat upright rectangle that faces the camera. Its bearing, width, foot and head, divided by
+        its distance, are fitted to the box, so that tilted cameras and panoramas are exact.
         """
         boxes = np.asarray(boxes, dtype=np.float64).reshape(-1, 4)
         guess = self._guess(boxes)
-        found = self._fitted(guess, boxes)
-        misfit = np.abs(self._outline(found, boxes) - boxes).max(axis=1)
+        objects = self._fit(guess, boxes)
+        misfit = np.abs(self._outline(objects, boxes) - boxes).max(axis=1)
         size = (boxes[:, 2:] - boxes[:, :2]).max(axis=1)
-        fits = misfit <= np.maximum(1.0, MOST_MISFIT * size)  # false for NaN
-        bearing, _, foot, head = found.T
-        told = fits & (head > foot)
-        ends = self._near(self._points(found)[:, [0, -1], SIDES // 2], boxes)
+        fits = misfit <= np.maximum(1.0, LARGEST_MISFIT * size)  # false for NaN
+        bearing, _, foot, head = objects.T
+        has_height = fits & (head > foot)
+        ends = self._unwrap(self._points(objects)[:, [0, -1], OUTLINE_SIDES // 2], boxes)
         pixels = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        return Standing(
+        return UprightObjects(
             bearings=signed_degrees(np.degrees(np.where(fits, bearing, guess[:, 0]))),
-            rises=np.where(told, head - foot, np.nan),
-            pixels=np.where(told, pixels, np.nan),
+            rises=np.where(has_height, head - foot, np.nan),
+            pixels=np.where(has_height, pixels, np.nan),
         )
 
     def _guess(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return bearing, half width, foot and head, by the distance, from the middles of sides."""
+        """Estimate bearing, half width, foot and head, by distance, from the middles of sides."""
         left, top, right, bottom = boxes.T
         column, row = (left + right) / 2.0, (top + bottom) / 2.0
         sides = [(column, row), (left, row), (right, row), (column, bottom), (column, top)]
@@ -257,52 +258,56 @@ class Camera:
         ends = np.sort(rises[3:], axis=0)
         return np.stack([bearings[0], half, ends[0], ends[1]], axis=-1)
 
-    def _fitted(
-        self, first: NDArray[np.float64], boxes: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the things, of those near `first`, whose outlines are nearest to the boxes."""
-        found = first.copy()
-        for _ in range(ROUNDS):
-            outline = self._outline(found, boxes)
+    def _fit(self, guess: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Fit objects to boxes by Gauss-Newton iterations from a guess."""
+        objects = guess.copy()
+        for _ in range(FIT_ITERATIONS):
+            outline = self._outline(objects, boxes)
+            # Numerical derivatives of the outline by each parameter.
             columns = []
             for number in range(4):
-                moved = found.copy()
-                moved[:, number] += NUDGE
-                columns.append((self._outline(moved, boxes) - outline) / NUDGE)
+                shifted = objects.copy()
+                shifted[:, number] += DIFFERENCE_STEP
+                columns.append((self._outline(shifted, boxes) - outline) / DIFFERENCE_STEP)
             slopes = np.stack(columns, axis=-1)
-            lost = ~np.isfinite(slopes).all(axis=(1, 2)) | ~np.isfinite(outline).all(axis=1)
-            slopes[lost], outline[lost] = np.eye(4), boxes[lost]
+            # Objects behind the camera do not change.
+            invalid = ~np.isfinite(slopes).all(axis=(1, 2)) | ~np.isfinite(outline).all(axis=1)
+            slopes[invalid], outline[invalid] = np.eye(4), boxes[invalid]
             step = np.einsum("nij,nj->ni", np.linalg.pinv(slopes), boxes - outline)
-            largest = np.abs(step).max(axis=1, keepdims=True, initial=MOST_STEP)
-            found += step * (MOST_STEP / largest)
-            found[:, 1] = np.maximum(found[:, 1], 0.0)
-            if np.abs(step).max(initial=0.0) < NUDGE:
+            largest = np.abs(step).max(axis=1, keepdims=True, initial=LARGEST_STEP)
+            objects += step * (LARGEST_STEP / largest)
+            objects[:, 1] = np.maximum(objects[:, 1], 0.0)
+            if np.abs(step).max(initial=0.0) < DIFFERENCE_STEP:
                 break
-        return found
+        return objects
 
-    def _points(self, things: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return where the points of flat upright things appear, shape (n, heights, 3, 2)."""
-        bearing, half, foot, head = (column[:, None, None] for column in things.T)
-        aside = half * np.linspace(-1.0, 1.0, SIDES)[None, None, :]
-        rise = foot + (head - foot) * np.linspace(0.0, 1.0, HEIGHTS)[None, :, None]
-        right = np.sin(bearing) + aside * np.cos(bearing)
-        ahead = np.cos(bearing) - aside * np.sin(bearing)
+    def _points(self, objects: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pixels of points of flat upright objects, shape (n, heights, 3, 2)."""
+        bearing, half, foot, head = (column[:, None, None] for column in objects.T)
+        across = half * np.linspace(-1.0, 1.0, OUTLINE_SIDES)[None, None, :]
+        rise = foot + (head - foot) * np.linspace(0.0, 1.0, OUTLINE_HEIGHTS)[None, :, None]
+        right = np.sin(bearing) + across * np.cos(bearing)
+        ahead = np.cos(bearing) - across * np.sin(bearing)
         return self.pixels(np.stack(np.broadcast_arrays(right, -rise, ahead), axis=-1))
 
-    def _near(self, points: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points of a panorama on the side of its seam on which the box of each is."""
+    def _unwrap(
+        self, points: NDArray[np.float64], boxes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return points of a panorama on the same side of its seam as their boxes."""
         if self.projection in {"pinhole", "fisheye"}:
             return points
         period = math.tau * self.focal
         shape = (-1, *[1] * (points.ndim - 2))
         away = points[..., 0] - ((boxes[:, 0] + boxes[:, 2]) / 2.0).reshape(shape)
-        nearer = points.copy()
-        nearer[..., 0] -= period * np.round(away / period)
-        return nearer
+        unwrapped = points.copy()
+        unwrapped[..., 0] -= period * np.round(away / period)
+        return unwrapped
 
     def _outline(
-        self, things: NDArray[np.float64], boxes: NDArray[np.float64]
+        self, objects: NDArray[np.float64], boxes: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the boxes of flat upright things, shape (n, 4)."""
-        points = self._near(self._points(things), boxes).reshape(len(things), HEIGHTS * SIDES, 2)
+        """Return the boxes of flat upright objects, shape (n, 4)."""
+        points = self._unwrap(self._points(objects), boxes).reshape(
+            len(objects), OUTLINE_HEIGHTS * OUTLINE_SIDES, 2
+        )
         return np.concatenate([points.min(axis=1), points.max(axis=1)], axis=-1)

@@ -1,4 +1,4 @@
-"""What a photograph's file says of how it was taken: its EXIF."""
+"""Read the EXIF of photographs: camera, heading, position and time."""
 
 from __future__ import annotations
 
@@ -19,27 +19,26 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 COMPASS_ERROR = 10.0
-"""Standard deviation of the headings that phones write, in degrees: what is usual in streets."""
+"""Standard deviation of the headings of phones, in degrees, usual in streets."""
 
 FILM_MM = math.hypot(36.0, 24.0)
 UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
-SHOWN = ("JPEG", "PNG", "WEBP", "GIF")
-"""Formats that browsers show."""
+BROWSER_FORMATS = ("JPEG", "PNG", "WEBP", "GIF")
 HEIC_BRANDS = frozenset({b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"})
 THUMBNAIL = (256, 256)
 UNREADABLE = (OSError, ValueError, SyntaxError, struct.error, Image.DecompressionBombError)
-CLOCK = 3  # hours, minutes and seconds
-SIDEWAYS = frozenset({5, 6, 7, 8})  # orientations that change width and height
+CLOCK_NUMBERS = 3  # hours, minutes and seconds
+SIDEWAYS = frozenset({5, 6, 7, 8})  # orientations that exchange width and height
 
 
 def read_exif(path: str | Path) -> Shot:
-    """Return what a picture's file says of how it was taken, upright as it is shown.
+    """Read the EXIF of a picture; width and height are of the picture in its shown orientation.
 
-    InputError if the file is no picture.
+    InputError if the file is not a picture.
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about sizes, and tags that are damaged
+            warnings.simplefilter("ignore")  # about sizes and damaged tags
             with Image.open(path) as image:
                 return _shot_of(image)
     except UNREADABLE as error:
@@ -50,18 +49,21 @@ def read_exif(path: str | Path) -> Shot:
 
 
 def picture_shot(content: bytes, name: str) -> Shot:
-    """Return what a picture that a browser can show says of how it was taken, as `read_exif` does.
+    """Return the result of `read_exif` for the content of a picture that a browser can show.
 
-    It is decoded, too: InputError if it is of another format, damaged, or larger than Pillow takes.
+    The picture is decoded: InputError if it has another format, is damaged, or is too large for
+    Pillow.
     """
     if content[4:8] == b"ftyp" and content[8:12] in HEIC_BRANDS:
         raise InputError(f"{name} is a HEIC picture, which is not supported; save it as JPEG.")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with Image.open(io.BytesIO(content), formats=SHOWN) as image:
+            with Image.open(io.BytesIO(content), formats=BROWSER_FORMATS) as image:
                 shot = _shot_of(image)
-                image.draft("L", THUMBNAIL)  # of JPEG; all of it is read in any case
+                image.draft(
+                    "L", THUMBNAIL
+                )  # decodes a JPEG faster; the whole content is still read
                 image.load()
     except Image.DecompressionBombError as error:
         raise InputError(
@@ -92,9 +94,10 @@ def _shot_of(image: Image.Image) -> Shot:
 
 
 def _focal(tags: Any, width: int, height: int) -> float | None:  # noqa: ANN401 - of any tags
-    """Return the focal length in lengths of the longer side.
+    """Return the focal length divided by the length of the longer side.
 
-    It is that of film of the same diagonal, which nearly all write, or else of the sensor.
+    It is from the equivalent for 35 mm film, which nearly all cameras write, otherwise from the
+    size of the sensor.
     """
     longer = max(width, height)
     film = _number(tags.get(Base.FocalLengthIn35mmFilm))
@@ -105,14 +108,14 @@ def _focal(tags: Any, width: int, height: int) -> float | None:  # noqa: ANN401 
     unit = UNIT_MM.get(tags.get(Base.FocalPlaneResolutionUnit, 2))
     if not length or not across or not unit:
         return None
-    # The sensor's pixels, of which the picture may be a smaller copy.
-    taken = [_number(tags.get(tag)) for tag in (Base.ExifImageWidth, Base.ExifImageHeight)]
-    return length * across / unit / max(*(side or 0.0 for side in taken), longer)
+    # The picture may be a smaller copy of the pixels of the sensor.
+    sides = [_number(tags.get(tag)) for tag in (Base.ExifImageWidth, Base.ExifImageHeight)]
+    return length * across / unit / max(*(side or 0.0 for side in sides), longer)
 
 
 def _position(gps: Any) -> tuple[float, float] | None:  # noqa: ANN401 - of any tags
     """Return latitude and longitude in degrees."""
-    found = []
+    position = []
     pairs = (
         (GPS.GPSLatitude, GPS.GPSLatitudeRef, "S"),
         (GPS.GPSLongitude, GPS.GPSLongitudeRef, "W"),
@@ -125,17 +128,17 @@ def _position(gps: Any) -> tuple[float, float] | None:  # noqa: ANN401 - of any 
         if None in numbers:
             return None
         degrees = sum((part or 0.0) / 60**place for place, part in enumerate(numbers))
-        found.append(-degrees if _text(gps.get(side)) == below else degrees)
-    return found[0], found[1]
+        position.append(-degrees if _text(gps.get(side)) == below else degrees)
+    return position[0], position[1]
 
 
 def _time(tags: Any, gps: Any) -> str | None:  # noqa: ANN401 - of any tags
-    """Return when a picture was taken: by GPS, or else by a clock that tells its zone."""
+    """Return the time of a picture from GPS, otherwise from a clock with a time zone."""
     parts = gps.get(GPS.GPSTimeStamp)
     numbers = [_number(part) for part in parts] if isinstance(parts, tuple) else []
     day, zone = _text(gps.get(GPS.GPSDateStamp)), "+00:00"
     clock = ":".join(f"{int(part or 0):02}" for part in numbers)
-    if len(numbers) != CLOCK or None in numbers or not day:
+    if len(numbers) != CLOCK_NUMBERS or None in numbers or not day:
         day, _, clock = _text(tags.get(Base.DateTimeOriginal)).partition(" ")
         zone = _text(tags.get(Base.OffsetTimeOriginal))
     text = f"{day.replace(':', '-')}T{clock}{zone}"
@@ -147,7 +150,7 @@ def _time(tags: Any, gps: Any) -> str | None:  # noqa: ANN401 - of any tags
 
 
 def _number(value: Any) -> float | None:  # noqa: ANN401 - of any tag
-    """Return a finite number that is 0 or more, or None."""
+    """Return a finite number from 0, or None."""
     try:
         number = float(value)
     except (TypeError, ValueError, ZeroDivisionError):

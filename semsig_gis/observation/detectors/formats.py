@@ -1,4 +1,4 @@
-"""Files of detectors: COCO, YOLO, Label Studio, CVAT and Mapillary."""
+"""Read files of detections: COCO, YOLO, Label Studio, CVAT and Mapillary."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import yaml
 
 from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.mapillary import mapillary_images, mapillary_pictures
-from semsig_gis.observation.detectors.pictures import Picture, Shot, bounds, box_of, turned
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, bounds, box_of, turned
 from semsig_gis.storage import parse_json, read_text
 
 if TYPE_CHECKING:
@@ -23,40 +23,40 @@ if TYPE_CHECKING:
 SUFFIXES = frozenset({".json", ".xml", ".txt"})
 NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
 NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
-"""What lists the names of YOLO's classes, beside the labels or in the folder above them."""
+"""Files with class names of YOLO, in the folder of the labels or in its parent folder."""
 
-BOX = 5  # values on a line of YOLO: class and box; more are a score, or a polygon
+YOLO_BOX_VALUES = 5  # class and box; lines with more values have a score or a polygon
 PERCENT = 100.0
 ACCEPTED = (
     "give JSON (COCO, Label Studio, Mapillary), CVAT XML for images, YOLO .txt, or a folder of them"
 )
-MISSHAPEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
+INVALID = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
 
 
-def read_pictures(paths: Iterable[str | Path]) -> list[Picture]:
-    """Read the pictures and boxes of files of detectors, told apart by what they hold.
+def read_pictures(paths: Iterable[str | Path]) -> list[AnnotatedPicture]:
+    """Read pictures and boxes from files of detections; the format is detected from the content.
 
-    A folder stands for the .json, .xml and .txt files in it. Of YOLO, a file of class names
-    (.yaml, .names, classes.txt) is among the files, beside them or above them; of COCO's bare
-    results, the file with their images and categories is among the files. InputError if a file
-    cannot be read or is of no such format.
+    A folder means its .json, .xml and .txt files. YOLO labels need a file of class names (.yaml,
+    .names, classes.txt) among the files, in the same folder or its parent. COCO results need a file
+    of images and categories among the files. InputError if a file cannot be read or has another
+    format.
     """
     files = [file for path in paths for file in _files(Path(path))]
-    names = next((file for file in files if _lists_names(file)), None)
+    names = next((file for file in files if _has_class_names(file)), None)
     documents = {file: _json(file) for file in files if file.suffix.lower() == ".json"}
-    images = next((one for one in documents.values() if _is_coco(one)), None)
-    results = [file for file, one in documents.items() if _is_results(one)]
-    pictures: list[Picture] = []
+    images = next((document for document in documents.values() if _is_coco(document)), None)
+    results = [file for file, document in documents.items() if _is_coco_results(document)]
+    pictures: list[AnnotatedPicture] = []
     for file in files:
         suffix = file.suffix.lower()
-        if _lists_names(file):
+        if _has_class_names(file):
             continue
         if suffix == ".txt":
             pictures.append(_yolo(file, names))
         elif suffix == ".xml":
             pictures += _cvat(file)
         elif suffix == ".json" and not (results and documents[file] is images):
-            pictures += _of_json(documents[file], str(file), images)
+            pictures += _json_pictures(documents[file], str(file), images)
         elif suffix != ".json":
             raise InputError(f"{file} is not in a supported format; {ACCEPTED}.")
     return pictures
@@ -65,13 +65,13 @@ def read_pictures(paths: Iterable[str | Path]) -> list[Picture]:
 def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
-    found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
-    if not found:
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+    if not files:
         raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
-    return found
+    return files
 
 
-def _lists_names(file: Path) -> bool:
+def _has_class_names(file: Path) -> bool:
     return file.suffix.lower() in NAME_SUFFIXES or file.name in NAME_FILES
 
 
@@ -92,23 +92,23 @@ def _json(file: Path) -> Any:  # noqa: ANN401 - any JSON
         raise InputError(f"{file} is not JSON ({error}); {ACCEPTED}.") from error
 
 
-def _of_json(document: Any, source: str, images: Any) -> list[Picture]:  # noqa: ANN401 - any JSON
-    """Return the pictures of a JSON document, of whichever format it is."""
+def _json_pictures(document: Any, source: str, images: Any) -> list[AnnotatedPicture]:  # noqa: ANN401
+    """Return the pictures of a JSON document in any known format."""
     try:
         if _is_coco(document):
             return _coco(document, document.get("annotations", []), source)
-        if _is_results(document):
+        if _is_coco_results(document):
             if images is None:
                 raise InputError(
                     f"{source} contains COCO results without images and categories; give the file "
                     "of its annotations as well, which has them."
                 )
             return _coco(images, document, source)
-        if _is_label_studio(document):
+        if _is_list_with(document, "data"):
             return [_label_studio(task, source) for task in document]
         if (shots := mapillary_images(document)) is not None:
             return mapillary_pictures(shots, source)
-    except MISSHAPEN as error:
+    except INVALID as error:
         if isinstance(error, InputError):
             raise
         lacks = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
@@ -122,12 +122,8 @@ def _is_coco(document: Any) -> bool:  # noqa: ANN401 - any JSON
     return isinstance(document, dict) and {"images", "categories"} <= document.keys()
 
 
-def _is_results(document: Any) -> bool:  # noqa: ANN401 - any JSON
+def _is_coco_results(document: Any) -> bool:  # noqa: ANN401 - any JSON
     return _is_list_with(document, "image_id", "category_id")
-
-
-def _is_label_studio(document: Any) -> bool:  # noqa: ANN401 - any JSON
-    return _is_list_with(document, "data")
 
 
 def _is_list_with(document: Any, *keys: str) -> bool:  # noqa: ANN401 - any JSON
@@ -142,7 +138,7 @@ def _size(width: Any, height: Any) -> tuple[int, int] | None:  # noqa: ANN401 - 
     return (round(float(width)), round(float(height))) if width and height else None
 
 
-def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list[Picture]:
+def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list[AnnotatedPicture]:
     names = {item["id"]: item["name"] for item in document["categories"]}
     boxes: dict[Any, list[Box]] = {item["id"]: [] for item in document["images"]}
     others = dict.fromkeys(boxes, 0)
@@ -154,7 +150,7 @@ def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list
             raise InputError(
                 f"{where} is of the {what}, which is not listed; give the file that lists it."
             )
-        # A crowd is a heap of objects, and a mask without a box may be any part of one.
+        # Crowds contain several objects, and a mask without a box may be a part of an object.
         if item.get("iscrowd") or not item.get("bbox"):
             others[image] += 1
             continue
@@ -162,7 +158,7 @@ def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list
         corners = left, top, left + width, top + height
         boxes[image].append(box_of(names[category], corners, where, score=item.get("score")))
     return [
-        Picture(
+        AnnotatedPicture(
             name=str(item.get("file_name", item["id"])),
             boxes=tuple(boxes[item["id"]]),
             others=others[item["id"]],
@@ -172,7 +168,7 @@ def _coco(document: dict[str, Any], annotations: list[Any], source: str) -> list
     ]
 
 
-def _yolo(file: Path, names: Path | None) -> Picture:
+def _yolo(file: Path, names: Path | None) -> AnnotatedPicture:
     lines = [line.split() for line in _text(file).splitlines()]
     labels = _yolo_names(file, names) if any(lines) else {}
     boxes = []
@@ -180,7 +176,7 @@ def _yolo(file: Path, names: Path | None) -> Picture:
         if not values:
             continue
         where = f"{file}, line {number}"
-        if len(values) < BOX or not values[0].isdecimal():
+        if len(values) < YOLO_BOX_VALUES or not values[0].isdecimal():
             raise InputError(
                 f"{where} is not a line of YOLO labels; write class, x, y, width, height (and "
                 "score)."
@@ -191,11 +187,11 @@ def _yolo(file: Path, names: Path | None) -> Picture:
             )
         corners, score = _yolo_corners(values[1:], where)
         boxes.append(box_of(labels[int(values[0])], corners, where, score=score))
-    return Picture(name=file.stem, boxes=tuple(boxes), shares=True)
+    return AnnotatedPicture(name=file.stem, boxes=tuple(boxes), shares=True)
 
 
 def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
-    """Return the corners, in shares of the picture, and the score of a line: a box or a polygon."""
+    """Return the corners, in shares of the picture, and the score of a YOLO box or polygon."""
     try:
         values = [float(text) for text in texts]
     except ValueError as error:
@@ -203,7 +199,7 @@ def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None
             f"{where} has a value that is not a number; write class, x, y, width, height."
         ) from error
     score = texts[-1] if len(texts) % 2 else None
-    if len(texts) <= BOX:
+    if len(texts) <= YOLO_BOX_VALUES:
         x, y, width, height = values[:4]
         corners = x - width / 2, y - height / 2, x + width / 2, y + height / 2
     else:
@@ -217,29 +213,29 @@ def _yolo_corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None
 
 def _yolo_names(file: Path, names: Path | None) -> dict[int, str]:
     """Return the names of classes by number."""
-    beside = [folder / name for folder in (file.parent, file.parent.parent) for name in NAME_FILES]
-    listed = names or next((path for path in beside if path.is_file()), None)
-    if listed is None:
+    nearby = [folder / name for folder in (file.parent, file.parent.parent) for name in NAME_FILES]
+    source = names or next((path for path in nearby if path.is_file()), None)
+    if source is None:
         raise InputError(
             f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
         )
-    text = _text(listed)
-    if listed.suffix.lower() not in {".yaml", ".yml"}:
+    text = _text(source)
+    if source.suffix.lower() not in {".yaml", ".yml"}:
         return dict(enumerate(text.split("\n")))
     try:
-        found = yaml.safe_load(text)["names"]
-        pairs = found.items() if isinstance(found, dict) else enumerate(found)
+        classes = yaml.safe_load(text)["names"]
+        pairs = classes.items() if isinstance(classes, dict) else enumerate(classes)
         return {int(number): str(name) for number, name in pairs}
-    except (yaml.YAMLError, RecursionError, *MISSHAPEN) as error:
+    except (yaml.YAMLError, RecursionError, *INVALID) as error:
         raise InputError(
-            f"{listed} has no list of class names; give a YAML file with 'names'."
+            f"{source} has no list of class names; give a YAML file with 'names'."
         ) from error
 
 
-def _label_studio(task: dict[str, Any], source: str) -> Picture:
+def _label_studio(task: dict[str, Any], source: str) -> AnnotatedPicture:
     where = f"{source}, task {task.get('id', '?')}"
-    drawn = [one for one in task.get("annotations") or [] if not one.get("was_cancelled")]
-    last = (drawn or task.get("predictions") or [{"result": []}])[-1]
+    annotations = [item for item in task.get("annotations") or [] if not item.get("was_cancelled")]
+    last = (annotations or task.get("predictions") or [{"result": []}])[-1]
     boxes: list[Box] = []
     size, others = None, 0
     for item in last["result"]:
@@ -253,7 +249,9 @@ def _label_studio(task: dict[str, Any], source: str) -> Picture:
         boxes.append(box_of(label, corners, where, score=item.get("score")))
     values = [text for text in task["data"].values() if isinstance(text, str)]
     name = _picture_name(str(task["data"].get("image") or next(iter(values), task.get("id", "?"))))
-    return Picture(name=name, boxes=tuple(boxes), shares=True, others=others, shot=Shot(size=size))
+    return AnnotatedPicture(
+        name=name, boxes=tuple(boxes), shares=True, others=others, shot=Shot(size=size)
+    )
 
 
 def _label_studio_corners(value: dict[str, Any], size: tuple[int, int]) -> Corners:
@@ -264,28 +262,26 @@ def _label_studio_corners(value: dict[str, Any], size: tuple[int, int]) -> Corne
         left, top = float(value["x"]), float(value["y"])
         corners = left, top, left + float(value["width"]), top + float(value["height"])
         if angle := float(value.get("rotation") or 0.0):
-            # About the corner that is left and top before it is turned, in pixels.
+            # The rotation is about the left top corner, in pixels.
             wide, high = size
             scaled = corners[0] * wide, corners[1] * high, corners[2] * wide, corners[3] * high
-            round_it = turned(scaled, angle, (left * wide, top * high))
-            corners = (
-                round_it[0] / wide, round_it[1] / high, round_it[2] / wide, round_it[3] / high
-            )  # fmt: skip
+            box = turned(scaled, angle, (left * wide, top * high))
+            corners = box[0] / wide, box[1] / high, box[2] / wide, box[3] / high
     first, second, third, fourth = (number / PERCENT for number in corners)
     return first, second, third, fourth
 
 
 def _picture_name(address: str) -> str:
-    """Return the name of the file that an address of Label Studio stands for."""
+    """Return the file name in an address of Label Studio."""
     parts = urlsplit(address)
     path = (parse_qs(parts.query).get("d") or [parts.path])[0]
-    # Uploads get eight letters of their own before their names.
+    # Uploads have a prefix of eight hexadecimal digits.
     return re.sub(r"^[0-9a-f]{8}-", "", PurePosixPath(path).name) or address
 
 
-def _cvat(file: Path) -> list[Picture]:
+def _cvat(file: Path) -> list[AnnotatedPicture]:
     text = _text(file)
-    if "<!DOCTYPE" in text:  # which may define texts that swell
+    if "<!DOCTYPE" in text:  # to prevent expansion of entities
         raise InputError(f"{file} defines its own document type; export it as CVAT for images 1.1.")
     try:
         root = ET.fromstring(text)  # noqa: S314 - without a document type
@@ -298,7 +294,7 @@ def _cvat(file: Path) -> list[Picture]:
         raise InputError(f"{file} {what}; export it as CVAT for images 1.1.")
     try:
         return [_cvat_picture(image, str(file)) for image in root.iter("image")]
-    except MISSHAPEN as error:
+    except INVALID as error:
         if isinstance(error, InputError):
             raise
         lacks = f"an image or shape lacks {error}" if isinstance(error, KeyError) else str(error)
@@ -307,7 +303,7 @@ def _cvat(file: Path) -> list[Picture]:
         ) from error
 
 
-def _cvat_picture(image: ET.Element, source: str) -> Picture:
+def _cvat_picture(image: ET.Element, source: str) -> AnnotatedPicture:
     name = image.attrib["name"]
     boxes, others = [], 0
     for number, shape in enumerate(image, start=1):
@@ -321,17 +317,17 @@ def _cvat_picture(image: ET.Element, source: str) -> Picture:
         else:
             others += shape.tag != "tag"
             continue
-        said = {one.get("name"): one.text for one in shape.iter("attribute")}
+        attributes = {item.get("name"): item.text for item in shape.iter("attribute")}
         box = box_of(
             shape.attrib["label"],
             corners,
             f"{source}, image {name!r}, shape {number}",
-            score=said.get("score", said.get("confidence")),
+            score=attributes.get("score", attributes.get("confidence")),
             whole=shape.get("occluded", "0") != "1",
         )
         boxes.append(box)
     size = _size(image.get("width"), image.get("height"))
-    return Picture(name=name, boxes=tuple(boxes), others=others, shot=Shot(size=size))
+    return AnnotatedPicture(name=name, boxes=tuple(boxes), others=others, shot=Shot(size=size))
 
 
 CVAT_CORNERS = ("xtl", "ytl", "xbr", "ybr")

@@ -1,4 +1,4 @@
-"""Label maps: TOML files that say which classes the labels of a detector stand for."""
+"""Label maps: TOML files with the classes of the labels of a detector."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What a label stands for: classes by name, each with its chance; none for no street object.
+    """The meaning of a label: names of classes with probabilities; empty for no street object.
 
-    What the chances lack to 1 is any class. `height` is how tall the boxes of the label are and its
-    deviation, in metres, where that differs from the class; `part` tells that they hold a part of
-    the object, of unknown height.
+    The rest of the probability, up to 1, is for any class. `height` is the height of the objects
+    and its standard deviation, in metres, if it differs from the class; `part` means that boxes
+    contain a part of the object, of unknown height.
     """
 
     classes: tuple[tuple[str, float], ...]
@@ -50,18 +50,18 @@ NO_OBJECT = Meaning(())
 
 @dataclass(frozen=True)
 class LabelMap:
-    """What the labels of detectors stand for.
+    """The meanings of the labels of detectors.
 
-    Labels are compared without capitals, a blank being as good as an underscore; ``*`` and ``?``
-    in a map stand for any letters, or one. A label that is written out goes before a pattern, and
-    the first of several decides; one of no map that is a word for a class stands for it.
+    Labels are compared without case, and blanks equal underscores. In a map, ``*`` is any number of
+    characters and ``?`` is one. Exact labels have priority over patterns, then earlier entries over
+    later ones. A label in no map that is a word for a class means this class.
 
     Parameters
     ----------
     meanings : tuple of (str, Meaning)
-        Labels, or patterns, and what they stand for.
+        Labels, or patterns, and their meanings.
     taxonomies : tuple of Taxonomy
-        The classes that words stand for, those of the first one first.
+        The classes for words, in order of priority.
 
     Examples
     --------
@@ -76,18 +76,19 @@ class LabelMap:
 
     @classmethod
     def open(cls, maps: Iterable[str | Path], taxonomy: Taxonomy) -> LabelMap:
-        """Return several maps as one, by their names (see `label_maps`) or files; all if none.
+        """Merge maps, given by name (see `label_maps`) or file; without any, all built-in maps.
 
-        The first that knows a label decides. UnknownNameError if there is none of a name;
-        CatalogError or InputError if a file is wrong or cannot be read.
+        Earlier maps have priority. UnknownNameError if a name is unknown; CatalogError or
+        InputError if a file is invalid or cannot be read.
         """
-        chosen = list(maps) or list(label_maps())
+        sources = list(maps) or list(label_maps())
         taxonomies = taxonomy, built_in_taxonomy()
-        classes = {item.name for one in taxonomies for item in one.classes}
-        return cls(tuple(pair for one in chosen for pair in _meanings(one, classes)), taxonomies)
+        classes = {item.name for part in taxonomies for item in part.classes}
+        meanings = tuple(pair for source in sources for pair in _meanings(source, classes))
+        return cls(meanings, taxonomies)
 
     def find(self, label: str) -> Meaning | None:
-        """Return what a label stands for, None if that is not known."""
+        """Return the meaning of a label; None if it is unknown."""
         plain = _plain(label)
         if plain in self._exact:
             return self._exact[plain]
@@ -109,7 +110,9 @@ class LabelMap:
         wild = {r"\*": ".*", r"\?": "."}
         return [
             (
-                re.compile(re.sub(r"\\[*?]", lambda one: wild[one[0]], re.escape(_plain(label)))),
+                re.compile(
+                    re.sub(r"\\[*?]", lambda match: wild[match[0]], re.escape(_plain(label)))
+                ),
                 meaning,
             )
             for label, meaning in self.meanings
@@ -119,10 +122,10 @@ class LabelMap:
 
 def label_maps() -> tuple[str, ...]:
     """Return the names of the label maps that come with the package, sorted."""
-    return tuple(sorted(_shipped()))
+    return tuple(sorted(_built_in_maps()))
 
 
-def _shipped() -> dict[str, Traversable]:
+def _built_in_maps() -> dict[str, Traversable]:
     return {
         Path(item.name).stem: item
         for item in (data_folder() / "labels").iterdir()
@@ -134,47 +137,48 @@ def _plain(label: str) -> str:
     return re.sub(r"[\s_]+", " ", label).strip().casefold()
 
 
-def _meanings(one: str | Path, classes: set[str]) -> list[tuple[str, Meaning]]:
-    """Return what a map says of each label."""
-    shipped = _shipped()
+def _meanings(source: str | Path, classes: set[str]) -> list[tuple[str, Meaning]]:
+    """Return the labels of a map, given by name or file, and their meanings."""
+    name, built_in = str(source), _built_in_maps()
     try:
-        if str(one) in shipped:
-            text = shipped[str(one)].read_text(encoding="utf-8")
-        elif Path(one).suffix.lower() == ".toml":
-            text = read_text(one)
+        if name in built_in:
+            text = built_in[name].read_text(encoding="utf-8")
+        elif Path(source).suffix.lower() == ".toml":
+            text = read_text(source)
         else:
-            known = ", ".join(shipped)
             raise UnknownNameError(
-                f"label map {str(one)!r} is unknown{nearest_name(str(one), shipped)}; give {known} "
-                "or a TOML file."
+                f"label map {name!r} is unknown{nearest_name(name, built_in)}; give "
+                f"{', '.join(built_in)} or a TOML file."
             )
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(f"label map {one} cannot be read ({reason}); give a TOML file.") from error
-    where = f"label map {one}"
+        raise InputError(
+            f"label map {name} cannot be read ({reason}); give a TOML file."
+        ) from error
+    where = f"label map {name}"
     content = parse_toml(text, where)
     check_keys(content, MAP_KEYS, where)
-    said = [
+    meanings = [
         (label, _meaning(value, f"{where}, label {label!r}", classes))
         for label, value in content.get("labels", {}).items()
     ]
     left_out = texts(content.get("left_out", []), "left_out", where)
-    return said + [(label, NO_OBJECT) for label in left_out]
+    return meanings + [(label, NO_OBJECT) for label in left_out]
 
 
 def _meaning(value: object, where: str, classes: set[str]) -> Meaning:
-    """Return what a map says of one label."""
+    """Return the meaning of an entry of a map."""
     item: Mapping[str, Any] = value if isinstance(value, dict) else {"class": value}
     check_keys(item, MEANING_KEYS, where, ("class",))
-    named = item["class"]
-    shares = {named: 1.0} if isinstance(named, str) else named
+    entry = item["class"]
+    shares = {entry: 1.0} if isinstance(entry, str) else entry
     numbers = isinstance(shares, dict) and all(
         isinstance(share, int | float) and not isinstance(share, bool) and 0 < share <= 1
         for share in shares.values()
     )
     if not shares or not numbers or sum(shares.values()) > 1 + ROUNDING:
         raise CatalogError(
-            f"{where} has class = {named!r}; write the name of a class, or a table of classes with "
+            f"{where} has class = {entry!r}; write the name of a class, or a table of classes with "
             "their chances, which sum to 1 at most."
         )
     for name in shares:

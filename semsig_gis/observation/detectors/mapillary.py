@@ -1,4 +1,4 @@
-"""Detections of Mapillary: images with their cameras, and outlines in vector tiles."""
+"""Read detections of Mapillary: images with cameras, and outlines in vector tiles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import binascii
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import InputError
-from semsig_gis.observation.detectors.pictures import Picture, Shot, bounds, box_of
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, bounds, box_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,10 +22,10 @@ CAMERAS: dict[str, Projection] = {
     "equirectangular": "equirectangular",
     "spherical": "equirectangular",
 }
-# Degrees: a heading that structure from motion has corrected, and that of a phone's compass.
+# Errors in degrees of headings from structure from motion, and from the compass of a phone.
 COMPUTED_ERROR, COMPASS_ERROR = 3.0, 10.0
 
-# Of the wire format: kinds of value, and which fields of a tile, a layer and a feature matter.
+# Protocol buffers: kinds of value, and field numbers of a tile, a layer and a feature.
 VARINT, WIDE, BYTES, NARROW = 0, 1, 2, 5
 LAYER, FEATURE, GEOMETRY, EXTENT = 3, 2, 4, 5
 MOVE, LINE = 1, 2
@@ -33,14 +33,18 @@ USUAL_EXTENT = 4096
 
 
 def mapillary_images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN401 - any JSON
-    """Return the images of a document with their detections; None if it is not of Mapillary.
+    """Return the images of a document with their detections; None if it is not from Mapillary.
 
-    It is an image with its ``detections``, several of them, or detections, perhaps each with its
-    ``image``.
+    The document is one image with its ``detections``, a list of images, or a list of detections,
+    each with or without its ``image``.
     """
     items = document["data"] if isinstance(document, dict) and "data" in document else document
     items = [items] if isinstance(items, dict) else items
-    if not isinstance(items, list) or not items or not all(isinstance(one, dict) for one in items):
+    if (
+        not isinstance(items, list)
+        or not items
+        or not all(isinstance(item, dict) for item in items)
+    ):
         return None
     if all("detections" in item for item in items):
         return items
@@ -49,20 +53,20 @@ def mapillary_images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN
     images: dict[str, dict[str, Any]] = {}
     for item in items:
         image = item.get("image") or {}
-        known = images.setdefault(str(image.get("id", "")), {**image, "detections": {"data": []}})
-        known["detections"]["data"].append(item)
+        entry = images.setdefault(str(image.get("id", "")), {**image, "detections": {"data": []}})
+        entry["detections"]["data"].append(item)
     return list(images.values())
 
 
-def mapillary_pictures(images: list[dict[str, Any]], source: str) -> list[Picture]:
-    """Return the pictures of what `mapillary_images` gives."""
+def mapillary_pictures(images: list[dict[str, Any]], source: str) -> list[AnnotatedPicture]:
+    """Return the pictures of the result of `mapillary_images`."""
     return [_picture(image, source) for image in images]
 
 
-def _picture(image: dict[str, Any], source: str) -> Picture:
+def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
     name = str(image.get("id") or "") or source
-    found = image["detections"]
-    detections = found["data"] if isinstance(found, dict) else found
+    detections = image["detections"]
+    detections = detections["data"] if isinstance(detections, dict) else detections
     size = (int(image["width"]), int(image["height"])) if image.get("width") else None
     boxes = []
     for number, item in enumerate(detections, start=1):
@@ -77,7 +81,7 @@ def _picture(image: dict[str, Any], source: str) -> Picture:
             corners = left / size[0], top / size[1], right / size[0], bottom / size[1]
         boxes.append(box_of(item["value"], corners, where))
     shot = _shot(image, size)
-    return Picture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
+    return AnnotatedPicture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
 
 
 def _shot(image: dict[str, Any], size: tuple[int, int] | None) -> Shot:
@@ -98,7 +102,7 @@ def _shot(image: dict[str, Any], size: tuple[int, int] | None) -> Shot:
 
 
 def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401 - any JSON
-    """Return the box of an outline, and whether it is in shares of the picture, not in pixels."""
+    """Return the box of an outline, and whether it is in shares of the picture or in pixels."""
     if isinstance(geometry, str):
         try:
             return bounds(_tile_points(base64.b64decode(geometry, validate=True))), True
@@ -112,7 +116,7 @@ def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401
 
 
 def _points(values: Any) -> Iterator[list[Any]]:  # noqa: ANN401 - any JSON
-    """Give the points of lists of lists of points."""
+    """Yield the points of nested lists."""
     if isinstance(values[0], list):
         for value in values:
             yield from _points(value)
@@ -123,7 +127,7 @@ def _points(values: Any) -> Iterator[list[Any]]:  # noqa: ANN401 - any JSON
 def _tile_points(tile: bytes) -> list[tuple[float, float]]:
     """Return the points of all outlines of a vector tile, in shares of its extent.
 
-    See the Mapbox vector tile specification, 2.1; rows count downwards, as in the picture.
+    See the Mapbox vector tile specification, 2.1; rows increase downwards, as in the picture.
     """
     points: list[tuple[float, float]] = []
     for layer in _values(tile, LAYER):
@@ -135,54 +139,55 @@ def _tile_points(tile: bytes) -> list[tuple[float, float]]:
 
 
 def _outline(geometry: bytes) -> Iterator[tuple[int, int]]:
-    """Give the points of a geometry: commands with their counts, and steps from the last point."""
+    """Yield the points of a geometry, which has commands with counts and steps between points."""
     numbers = iter(_varints(geometry))
     x = y = 0
     for command in numbers:
         if command & 7 in {MOVE, LINE}:
             for _ in range(command >> 3):
-                x, y = x + _signed(next(numbers)), y + _signed(next(numbers))
+                x, y = x + _zigzag(next(numbers)), y + _zigzag(next(numbers))
                 yield x, y
 
 
-def _signed(number: int) -> int:
+def _zigzag(number: int) -> int:
+    """Decode a signed number."""
     return (number >> 1) ^ -(number & 1)
 
 
 def _varints(data: bytes) -> Iterator[int]:
-    place = 0
-    while place < len(data):
-        number, place = _varint(data, place)
+    position = 0
+    while position < len(data):
+        number, position = _varint(data, position)
         yield number
 
 
-def _varint(data: bytes, place: int) -> tuple[int, int]:
-    """Return a number of seven bits a byte, least first, and where it ends."""
+def _varint(data: bytes, position: int) -> tuple[int, int]:
+    """Return a number with seven bits per byte, lowest bits first, and the position after it."""
     number = shift = 0
     while True:
-        byte = data[place]
+        byte = data[position]
         number |= (byte & 127) << shift
-        place, shift = place + 1, shift + 7
-        if byte < 128:  # noqa: PLR2004 - the bit that says that more follow
-            return number, place
+        position, shift = position + 1, shift + 7
+        if byte < 128:  # noqa: PLR2004 - the continuation bit
+            return number, position
 
 
 def _values(message: Any, field: int) -> Iterator[Any]:  # noqa: ANN401 - bytes or a number
-    """Give the values of one field of a protocol buffer message."""
-    place = 0
-    while place < len(message):
-        key, place = _varint(message, place)
+    """Yield the values of one field of a protocol buffer message."""
+    position = 0
+    while position < len(message):
+        key, position = _varint(message, position)
         kind = key & 7
         value: Any
         if kind == VARINT:
-            value, place = _varint(message, place)
+            value, position = _varint(message, position)
         elif kind == BYTES:
-            length, place = _varint(message, place)
-            value, place = message[place : place + length], place + length
-            if place > len(message):
+            length, position = _varint(message, position)
+            value, position = message[position : position + length], position + length
+            if position > len(message):
                 raise ValueError("it ends early")
         elif kind in {WIDE, NARROW}:
-            value, place = None, place + (8 if kind == WIDE else 4)
+            value, position = None, position + (8 if kind == WIDE else 4)
         else:
             raise ValueError(f"{kind} is an unknown kind of value")
         if key >> 3 == field:

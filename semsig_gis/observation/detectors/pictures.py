@@ -1,4 +1,4 @@
-"""Pictures with the boxes that a detector or a person drew in them, from files of any format."""
+"""Pictures with boxes from a detector or a person, in any file format."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Corners = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box:
-    """An object in a picture: its label, its corners, and how sure a detector is of it.
+    """An object in a picture: its label, its corners, and the score of the detector.
 
-    `whole` is false where it is said that a part of the object is hidden.
+    `whole` is false if a part of the object is marked as hidden.
     """
 
     label: str
@@ -33,11 +33,11 @@ class Box:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """What is known of how and where a picture was taken; None where it is not.
+    """Camera, direction, place and time of a picture; None for unknown values.
 
-    `focal` is the focal length in lengths of the picture's longer side, `position` are latitude and
-    longitude, `time` is when it was, with its zone (ISO 8601), `north` says what the heading counts
-    from, and pictures of one `place` are one view.
+    `focal` is the focal length divided by the longer side of the picture, `position` latitude and
+    longitude, `time` in ISO 8601 with a time zone, and `north` the name of the north of the
+    heading. Pictures with the same `place` are one view.
     """
 
     camera: Projection | None = None
@@ -54,29 +54,25 @@ class Shot:
     place: str | None = None
 
     def filled(self, other: Shot) -> Shot:
-        """Return the same, with what is not known here taken from another.
+        """Return a copy with unknown values taken from another.
 
-        A field of view here goes before a focal length there; the error and the north of a heading
-        are those of whoever says the heading.
+        A field of view has priority over the other's focal length. The error and the north of a
+        heading are from the same source as the heading.
         """
-        known = {one.name: getattr(self, one.name) for one in fields(self)}
         fixed = {"focal"} if self.fov is not None else set()
         if self.heading is not None:
             fixed |= {"heading_error", "north"}
-        more = {
-            name: getattr(other, name)
-            for name, value in known.items()
-            if value is None and name not in fixed
-        }
-        return replace(self, **more)
+        names = {item.name for item in fields(self)} - fixed
+        values = {name: getattr(other, name) for name in names if getattr(self, name) is None}
+        return replace(self, **values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Picture:
-    """A picture: its name, its boxes, and what its file says of how it was taken.
+class AnnotatedPicture:
+    """A picture with its name, its boxes, and the shot data of its file.
 
-    With `shares`, corners are shares of its width and height, else pixels. `others` counts shapes
-    that are no boxes, such as points.
+    With `shares`, corners are shares of its width and height, otherwise pixels. `others` is the
+    number of shapes that are not boxes, such as points.
     """
 
     name: str
@@ -89,33 +85,33 @@ class Picture:
 def box_of(
     label: object, corners: Iterable[Any], where: str, *, score: object = None, whole: bool = True
 ) -> Box:
-    """Return a checked box; InputError says where the wrong one stands."""
+    """Return a box; InputError with the place `where` if it is invalid."""
     try:
-        left, top, right, bottom = (float(value) for value in corners)
-        sure = 1.0 if score is None else float(str(score))
+        left, top, right, bottom = (float(corner) for corner in corners)
+        value = 1.0 if score is None else float(str(score))
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{where} has a box or a score that is not a number; correct it or take it out."
         ) from error
     numbers = left, top, right, bottom
-    near = all(abs(number) <= MOST_PIXELS for number in numbers)  # false for NaN
-    if not near or right < left or bottom < top:
+    in_range = all(abs(number) <= MOST_PIXELS for number in numbers)  # false for NaN
+    if not in_range or right < left or bottom < top:
         raise InputError(
             f"{where} has the box {numbers}; give four numbers, none of its sides below 0."
         )
-    if not 0 <= sure <= 1:
-        raise InputError(f"{where} has the score {sure:g}; give a number from 0 to 1.")
-    return Box(label=str(label), corners=numbers, score=sure, whole=whole)
+    if not 0 <= value <= 1:
+        raise InputError(f"{where} has the score {value:g}; give a number from 0 to 1.")
+    return Box(label=str(label), corners=numbers, score=value, whole=whole)
 
 
 def bounds(points: Iterable[Iterable[Any]]) -> Corners:
-    """Return the corners of the box around points, each of a column and a row."""
+    """Return the corners of the bounding box of points (column, row)."""
     columns, rows = zip(*((float(x), float(y)) for x, y in points), strict=True)
     return min(columns), min(rows), max(columns), max(rows)
 
 
 def turned(corners: Corners, degrees: float, about: tuple[float, float]) -> Corners:
-    """Return the box around one that is turned clockwise about a point."""
+    """Return the bounding box of a box that is rotated clockwise about a point."""
     left, top, right, bottom = corners
     angle = math.radians(degrees)
     cosine, sine = math.cos(angle), math.sin(angle)

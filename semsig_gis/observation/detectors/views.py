@@ -1,4 +1,4 @@
-"""From pictures with boxes, and what is known of the camera, to views."""
+"""Convert pictures with boxes, and data of their cameras, to views."""
 
 from __future__ import annotations
 
@@ -34,27 +34,27 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from semsig_gis.observation.detectors.labels import LabelMap, Meaning
-    from semsig_gis.observation.detectors.pictures import Box, Picture
+    from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Box
     from semsig_gis.storage import Row
 
 Places = Literal["each", "gps", "all"]
-"""Which pictures are of one place: none, those within a few metres, or all."""
+"""Pictures of one place: none, pictures within a few metres, or all."""
 
 SAME_PLACE_M = 5.0
 METRES_PER_DEGREE = 111_320.0
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".JPG", ".JPEG", ".PNG")
 
-# A box so near to the picture's edge goes on beyond it: pixels, and share of the side.
+# A box this near to the edge of the picture is cut off: pixels, and share of the side.
 EDGE_PIXELS, EDGE_SHARE = 1.0, 0.002
 EDGE_ERROR_PIXELS = 1.0
-"""By how much the height of a box is off, the deviation of both its ends."""
+"""Standard deviation of the height of a box, from both its ends."""
 
 SCORE_DIGITS, DEGREE_DIGITS, METRE_DIGITS, ERROR_DIGITS = 4, 2, 2, 3
 
 
 @dataclass(slots=True)
 class Tally:
-    """What became of the pictures and boxes of some files."""
+    """Counts of the pictures and boxes of files, used and left out."""
 
     photos: int = 0
     objects: int = 0
@@ -67,7 +67,7 @@ class Tally:
     unknown_heading: int = 0
     north: Counter[str] = field(default_factory=Counter)
     times: dict[str, str] = field(default_factory=dict)
-    """When the first picture of a view was taken, by the name of the view, where that is known."""
+    """Time of the first picture of a view, by the name of the view, if it is known."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the counts for JSON."""
@@ -88,12 +88,12 @@ class Tally:
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class Sightings:
-    """What stands in a picture, box by box.
+class LocatedBoxes:
+    """The boxes of a picture with bearings, ranges and classes.
 
-    `corners`, shape (n, 4), are in pixels, `bearings` in degrees clockwise from where the camera
-    looks, `ranges` in metres with their relative `range_errors`, NaN where they are not known, and
-    `scores`, shape (n, 256), the chance of each class code.
+    `corners`, shape (n, 4), are in pixels, `bearings` in degrees clockwise from the camera's axis,
+    `ranges` in metres with relative `range_errors`, NaN if unknown, and `scores`, shape (n, 256),
+    the probabilities of the class codes.
     """
 
     camera: Camera
@@ -106,30 +106,30 @@ class Sightings:
 
     @property
     def codes(self) -> NDArray[np.uint8]:
-        """The likeliest class of each, any class where none is named."""
-        named = self.scores[:, 1:]
-        codes = np.where(named.any(axis=1), 1 + named.argmax(axis=1), WILDCARD)
+        """The likeliest class of each box; any class if it has no other."""
+        by_class = self.scores[:, 1:]
+        codes = np.where(by_class.any(axis=1), 1 + by_class.argmax(axis=1), WILDCARD)
         return codes.astype(np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Detector:
-    """What turns pictures with boxes into views.
+class ViewBuilder:
+    """Options to convert pictures with boxes to views.
 
     Parameters
     ----------
     labels : LabelMap
-        What the labels stand for.
+        The meanings of the labels.
     taxonomy : Taxonomy
-        Classes that are meant; others are left out and counted.
+        The classes of the city; boxes of others are left out and counted.
     min_score : float, default 0.3
-        Boxes that the detector is less sure of are left out and counted.
+        Boxes with lower scores are left out and counted.
     shot : Shot, optional
-        What is known of all pictures.
+        Data of all pictures.
     shots : mapping of str to Shot, optional
-        What is known of single ones, by the name of their file.
+        Data of single pictures, by file name.
     folders : sequence of Path, optional
-        Where the pictures lie, whose EXIF tells more.
+        Folders of the pictures, to read their EXIF.
     """
 
     labels: LabelMap
@@ -140,20 +140,29 @@ class Detector:
     folders: Sequence[Path] = ()
 
     def views(
-        self, pictures: Iterable[Picture], *, places: Places = "each"
+        self, pictures: Iterable[AnnotatedPicture], *, places: Places = "each"
     ) -> tuple[list[tuple[str, View]], Tally]:
-        """Return the view of each place with the name of its first picture, and what was counted.
+        """Return the view of each place, with the name of its first picture, and the counts.
 
-        Pictures that are of one place by their table are one view anyway. InputError if the size or
-        the field of view of a picture is not known, a number is out of its range, or what is known
-        of single pictures is of none of these.
+        Pictures with the same place in `shots` are one view in any case. InputError if the size or
+        the field of view of a picture is unknown, a number is out of its range, or `shots` contains
+        none of the pictures.
         """
         pictures = list(pictures)
-        self._require_known(pictures)
+        if (
+            self.shots
+            and pictures
+            and not self.shots.keys() & {name for picture in pictures for name in _names(picture)}
+        ):
+            # Otherwise a table of other pictures would leave every heading unknown.
+            raise InputError(
+                f"--photos names {next(iter(self.shots))}, but none of the pictures with boxes; "
+                f"name them as {pictures[0].name}."
+            )
         tally = Tally()
         groups: dict[str, list[View]] = {}
         names: dict[str, str] = {}
-        placed: list[tuple[tuple[float, float], str]] = []
+        positions: list[tuple[tuple[float, float], str]] = []
         for number, picture in enumerate(pictures):
             shot = self._shot(picture)
             tally.no_boxes += picture.others
@@ -164,9 +173,14 @@ class Detector:
             elif places == "all":
                 key = "all"
             elif places == "gps" and shot.position is not None:
-                near = (one for at, one in placed if _metres(at, shot.position) <= SAME_PLACE_M)
+                # The group of the first picture within a few metres, otherwise a new one.
+                near = (
+                    other
+                    for position, other in positions
+                    if _metres(position, shot.position) <= SAME_PLACE_M
+                )
                 key = next(near, key)
-                placed += [(shot.position, key)] if key not in groups else []
+                positions += [(shot.position, key)] if key not in groups else []
             if key not in names:
                 names[key] = picture.name if shot.place is None else shot.place
                 tally.times |= {} if shot.time is None else {names[key]: shot.time}
@@ -177,20 +191,8 @@ class Detector:
         ]
         return views, tally
 
-    def _require_known(self, pictures: Sequence[Picture]) -> None:
-        """Refuse a table of other pictures, without which every heading would be unknown."""
-        if (
-            self.shots
-            and pictures
-            and not self.shots.keys() & {name for picture in pictures for name in _names(picture)}
-        ):
-            raise InputError(
-                f"--photos names {next(iter(self.shots))}, but none of the pictures with boxes; "
-                f"name them as {pictures[0].name}."
-            )
-
-    def _shot(self, picture: Picture) -> Shot:
-        """Return all that is known of how a picture was taken."""
+    def _shot(self, picture: AnnotatedPicture) -> Shot:
+        """Return the data of a picture from all sources, in order of priority."""
         own = next((self.shots[name] for name in _names(picture) if name in self.shots), Shot())
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
@@ -199,7 +201,7 @@ class Detector:
             shot = shot.filled(read_exif(file))
         return shot.filled(Shot(size=self.shot.size))
 
-    def _camera(self, picture: Picture, shot: Shot) -> Camera:
+    def _camera(self, picture: AnnotatedPicture, shot: Shot) -> Camera:
         if shot.size is None:
             raise InputError(
                 f"the size of the picture {picture.name} is not known; give the folder of the "
@@ -221,56 +223,56 @@ class Detector:
             roll=shot.roll or 0.0,
         )
 
-    def sightings(self, picture: Picture, tally: Tally) -> Sightings:
-        """Return what stands in a picture, and count it; raises as `views` does."""
+    def located_boxes(self, picture: AnnotatedPicture, tally: Tally) -> LocatedBoxes:
+        """Return the boxes of a picture with a known class, and count them; raises as `views`."""
         shot = self._shot(picture)
         camera = self._camera(picture, shot)
-        kept = [(box, meaning) for box in picture.boxes if (meaning := self._kept(box, tally))]
+        boxes = [(box, meaning) for box in picture.boxes if (meaning := self._meaning(box, tally))]
         scale = np.array([camera.width, camera.height] * 2, dtype=float)
-        corners = np.array([box.corners for box, _ in kept], dtype=float).reshape(-1, 4)
+        corners = np.array([box.corners for box, _ in boxes], dtype=float).reshape(-1, 4)
         corners = np.clip(corners * (scale if picture.shares else 1.0), 0.0, scale)
-        bearings, ranges, errors = placed(
+        bearings, ranges, errors = locate_boxes(
             camera,
             corners,
-            heights=np.array([self._height(meaning) for _, meaning in kept]).reshape(-1, 2),
-            whole=np.array([box.whole for box, _ in kept], dtype=bool),
+            heights=np.array([self._height(meaning) for _, meaning in boxes]).reshape(-1, 2),
+            whole=np.array([box.whole for box, _ in boxes], dtype=bool),
         )
         tally.photos += 1
-        tally.objects += len(kept)
+        tally.objects += len(boxes)
         tally.ranges += int(np.isfinite(ranges).sum())
-        return Sightings(
+        return LocatedBoxes(
             camera=camera,
             shot=shot,
             corners=corners,
             bearings=bearings,
             ranges=ranges,
             range_errors=errors,
-            scores=np.array([self._scores(*one) for one in kept]).reshape(-1, CLASSES),
+            scores=np.array([self._scores(*pair) for pair in boxes]).reshape(-1, CLASSES),
         )
 
-    def _view(self, picture: Picture, tally: Tally) -> View:
-        """Return what is in a picture."""
-        seen = self.sightings(picture, tally)
-        ranges, errors, scores = seen.ranges, seen.range_errors, seen.scores
-        heading, error = seen.shot.heading, seen.shot.heading_error
+    def _view(self, picture: AnnotatedPicture, tally: Tally) -> View:
+        """Return the view of one picture."""
+        boxes = self.located_boxes(picture, tally)
+        ranges, errors, scores = boxes.ranges, boxes.range_errors, boxes.scores
+        heading, error = boxes.shot.heading, boxes.shot.heading_error
         if heading is None:
             tally.unknown_heading += 1
             heading, error = 0.0, math.inf
-        elif seen.shot.north is not None:
-            tally.north[seen.shot.north] += 1
-        sure = bool((scores.max(axis=1, initial=0.0) == 1.0).all())
+        elif boxes.shot.north is not None:
+            tally.north[boxes.shot.north] += 1
+        certain = bool((scores.max(axis=1, initial=0.0) == 1.0).all())
         any_range = bool(np.isfinite(ranges).any())
-        bearings = wrap_degrees(heading + seen.bearings)
+        bearings = wrap_degrees(heading + boxes.bearings)
         bearings = np.round(bearings, DEGREE_DIGITS) % FULL_TURN
         sectors = [
-            (float(wrap_degrees(low + heading)), high - low) for low, high in seen.camera.sectors()
+            (float(wrap_degrees(low + heading)), high - low) for low, high in boxes.camera.sectors()
         ]
         return View(
-            seen.codes,
+            boxes.codes,
             bearings,
             ranges=np.round(ranges, METRE_DIGITS) if any_range else None,
             range_errors=np.round(errors, ERROR_DIGITS) if any_range else None,
-            scores=None if sure else scores,
+            scores=None if certain else scores,
             photos=(
                 Photo(
                     sectors=tuple((low, low + width) for low, width in sectors), north_sigma=error
@@ -278,8 +280,8 @@ class Detector:
             ),
         ).turned(0.0)
 
-    def _kept(self, box: Box, tally: Tally) -> Meaning | None:
-        """Return what a box stands for, or None where it is left out, and count that."""
+    def _meaning(self, box: Box, tally: Tally) -> Meaning | None:
+        """Return the meaning of a box, or count it and return None if it is left out."""
         if box.score < self.min_score:
             tally.below_min_score += 1
             return None
@@ -295,14 +297,14 @@ class Detector:
         return None
 
     def _code(self, name: str) -> int:
-        """Return the code of a class, that of any class where the city has none of that name."""
+        """Return the code of a class, or the code of any class if the city does not have it."""
         try:
             return self.taxonomy.by_name(name).code
         except UnknownNameError:
             return WILDCARD
 
     def _scores(self, box: Box, meaning: Meaning) -> NDArray[np.float64]:
-        """Return the chance of each class code, shape (256,); what is not sure is any class."""
+        """Return the probability of each class code, shape (256,); the rest is any class."""
         scores = np.zeros(CLASSES)
         for name, share in meaning.classes:
             scores[self._code(name)] += round(share * box.score, SCORE_DIGITS)
@@ -311,17 +313,17 @@ class Detector:
         return scores
 
     def _height(self, meaning: Meaning) -> tuple[float, float]:
-        """Return how tall the boxes of a label are and the deviation of that, or NaN."""
-        known = meaning.height
-        if known is None and not meaning.part and len(meaning.classes) == 1:
+        """Return the height of the objects of a label and its standard deviation, or NaN."""
+        height = meaning.height
+        if height is None and not meaning.part and len(meaning.classes) == 1:
             item = self.taxonomy.by_name(meaning.classes[0][0])
             if item.height_m is not None and item.height_sigma is not None:
-                known = item.height_m, item.height_sigma
-        return known or (math.nan, math.nan)
+                height = item.height_m, item.height_sigma
+        return height or (math.nan, math.nan)
 
 
 def field_of_view(shot: Shot) -> float | None:
-    """Return over how many degrees the width of a picture reaches, None where nobody says."""
+    """Return the horizontal field of view of a picture in degrees; None if it is unknown."""
     projection = shot.camera or "pinhole"
     if shot.fov is None and shot.focal and shot.size and projection in {"pinhole", "fisheye"}:
         half = shot.size[0] / 2.0 / (shot.focal * max(shot.size))
@@ -330,50 +332,53 @@ def field_of_view(shot: Shot) -> float | None:
     return shot.fov or USUAL_FOV.get(projection)
 
 
-def placed(
+def locate_boxes(
     camera: Camera,
     corners: NDArray[np.float64],
     *,
     heights: NDArray[np.float64],
     whole: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return where the things in boxes stand: bearings, ranges and their relative errors.
+    """Return bearings, ranges and relative range errors of the objects in boxes.
 
-    `corners`, shape (n, 4), are in pixels; `heights`, shape (n, 2), how tall the things are and the
-    deviation of that in metres, NaN where that is not known; `whole` tells which boxes hide
-    nothing. Bearings are degrees clockwise from where the camera looks. Ranges are NaN where the
-    picture does not tell.
+    `corners`, shape (n, 4), are in pixels; `heights`, shape (n, 2), are the heights of the objects
+    and their standard deviations in metres, NaN if unknown; `whole` marks boxes of objects that are
+    not partly hidden. Bearings are in degrees clockwise from the camera's axis. Ranges are NaN if
+    unknown.
     """
-    standing = camera.standing(corners)
+    objects = camera.upright_objects(corners)
+    # Boxes at the edge of the picture are cut off: no range.
     scale = np.array([camera.width, camera.height] * 2, dtype=float)
     margin = np.maximum(EDGE_PIXELS, EDGE_SHARE * scale)
     whole = whole & ((corners > margin) | (np.arange(4) >= 2)).all(axis=1)  # noqa: PLR2004
     whole &= ((corners < scale - margin) | (np.arange(4) < 2)).all(axis=1)  # noqa: PLR2004
-    ranges: NDArray[np.float64] = np.where(whole, heights[:, 0] / standing.rises, np.nan)
+    ranges: NDArray[np.float64] = np.where(whole, heights[:, 0] / objects.rises, np.nan)
     ranges[~(ranges <= MAX_RANGE_M)] = np.nan
     errors: NDArray[np.float64] = np.hypot(
-        heights[:, 1] / heights[:, 0], EDGE_ERROR_PIXELS / standing.pixels
+        heights[:, 1] / heights[:, 0], EDGE_ERROR_PIXELS / objects.pixels
     )
     errors = np.where(np.isnan(ranges), np.nan, np.minimum(errors, MOST_RANGE_ERROR))
-    return standing.bearings, ranges, errors
+    return objects.bearings, ranges, errors
 
 
 def with_heights(taxonomy: Taxonomy) -> Taxonomy:
-    """Return classes with the heights of the built-in ones of their names, where not said."""
-    tall = {item.name: (item.height_m, item.height_sigma) for item in built_in_taxonomy().classes}
+    """Return the taxonomy with missing heights from built-in classes of the same name."""
+    heights = {
+        item.name: (item.height_m, item.height_sigma) for item in built_in_taxonomy().classes
+    }
     classes = []
     for item in taxonomy.classes:
         own = item.height_m, item.height_sigma
-        height, sigma = tall.get(item.name, own) if item.height_m is None else own
+        height, sigma = heights.get(item.name, own) if item.height_m is None else own
         classes.append(replace(item, height_m=height, height_sigma=sigma))
     return Taxonomy(tuple(classes))
 
 
 def read_shots(path: str | Path) -> dict[str, Shot]:
-    """Read what is known of single pictures from a CSV or JSON lines file, by name.
+    """Read data of single pictures from a CSV or JSON lines file, by name.
 
-    The columns are ``image``, the name of its file, and any of ``camera``, ``fov``, ``heading``,
-    ``heading_error``, ``pitch``, ``roll`` and ``place``. InputError if a row cannot be used.
+    The columns are ``image``, the name of the file, and any of ``camera``, ``fov``, ``heading``,
+    ``heading_error``, ``pitch``, ``roll`` and ``place``. InputError if a row is invalid.
     """
     shots: dict[str, Shot] = {}
     for _, (name, shot) in read_rows(path, _shot_of, what="picture"):
@@ -407,7 +412,7 @@ def _shot_of(row: Row) -> tuple[str, Shot]:
 
 
 def north_sigma(error: str | float) -> float:
-    """Return the error of a heading in degrees, infinite for ``unknown``."""
+    """Return the standard deviation of a heading in degrees, infinite for ``unknown``."""
     try:
         return math.inf if error == "unknown" else float(error)
     except ValueError as fault:
@@ -416,27 +421,27 @@ def north_sigma(error: str | float) -> float:
         ) from fault
 
 
-def _names(picture: Picture) -> tuple[str, str, str]:
-    """Return the names by which others may call a picture."""
+def _names(picture: AnnotatedPicture) -> tuple[str, str, str]:
+    """Return the names of a picture: as given, without folders, and without the extension."""
     path = PurePosixPath(picture.name)
     return picture.name, path.name, path.stem
 
 
 def _file_of(name: str, folders: Iterable[Path]) -> Path | None:
-    """Return the picture of a name in some folders, None if it is in none."""
+    """Return the file of a picture in some folders; None if no folder has it."""
     path = PurePosixPath(name)
     endings = ("", *PICTURE_SUFFIXES) if path.suffix == "" else ("",)
-    places = (
-        folder / f"{one}{ending}"
+    files = (
+        folder / f"{stem}{ending}"
         for folder in folders
-        for one in (path, path.name)
+        for stem in (path, path.name)
         for ending in endings
     )
-    return next((place for place in places if place.is_file()), None)
+    return next((file for file in files if file.is_file()), None)
 
 
-def _metres(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Return about how far two places in degrees of latitude and longitude are apart."""
-    north = one[0] - other[0]
-    east = (one[1] - other[1]) * math.cos(math.radians(one[0]))
+def _metres(first: tuple[float, float], second: tuple[float, float]) -> float:
+    """Return the approximate distance of two places in degrees of latitude and longitude."""
+    north = first[0] - second[0]
+    east = (first[1] - second[1]) * math.cos(math.radians(first[0]))
     return METRES_PER_DEGREE * math.hypot(north, east)

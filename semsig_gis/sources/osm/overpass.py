@@ -143,21 +143,18 @@ def read_layers(
                     position = positions.position(element, layer.spec)
                     accepted = layer.add(kind, f"{kind}/{number}", tags, position)
                     centre_counts[layer.spec.name] += accepted and _has_only_centre(element)
-    raw = (layer.raw(crs) for layer in layers)
-    return tuple(_with_note(layer, centre_counts[layer.spec.name]) for layer in raw)
+    raw = [layer.raw(crs) for layer in layers]
+    for number, raw_layer in enumerate(raw):
+        centres = centre_counts[raw_layer.spec.name]
+        if centres and raw_layer.spec.role == "objects":
+            note = f"{centres:,} elements have only the middle of their box; ask for `out geom`"
+            raw[number] = dataclasses.replace(raw_layer, notes=(*raw_layer.notes, note))
+    return tuple(raw)
 
 
 def _has_only_centre(element: dict[str, Any]) -> bool:
     parts = (element, *element.get("members", ()))
     return "center" in element and not any("geometry" in part for part in parts)
-
-
-def _with_note(layer: RawLayer, centres: int) -> RawLayer:
-    """Add a note to a layer with elements that have no geometry, only a centre."""
-    if not centres or layer.spec.role != "objects":
-        return layer
-    note = f"{centres:,} elements have only the middle of their box; ask for `out geom`"
-    return dataclasses.replace(layer, notes=(*layer.notes, note))
 
 
 class _ElementPositions:
@@ -225,7 +222,7 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
         raise InputError("the name of the place is empty; write one such as 'Helsinki'.")
     host = host_of(endpoint)
 
-    fetched = fetch(
+    file = fetch(
         f"{endpoint.rstrip('/')}/search",
         params={"q": name, "format": "jsonv2", "polygon_geojson": 1, "limit": 10},
         cache=cache,
@@ -233,7 +230,7 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
         accept=JSON,
         check=lambda path: _places(path, host),
     )
-    places = _places(fetched.path, host)
+    places = _places(file.path, host)
     for place in places:
         outline = _outline(place)
         if outline is not None:
@@ -299,8 +296,7 @@ def _filter(key: str, values: tuple[str, ...]) -> str:
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+    return '"{}"'.format(text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n"))
 
 
 def fetch_layers(
@@ -380,7 +376,13 @@ class _Servers:
             )
             failures = [TooLargeError(msg)]
             break
-        if not last and any(_may_be_size(failure) for failure in failures):
+        # Offline, the cache may have only the quarters of a tile.
+        too_large = (
+            isinstance(failure, TooLargeError | NotCachedError)
+            or (isinstance(failure, HttpError) and failure.status == TOO_SLOW)
+            for failure in failures
+        )
+        if not last and any(too_large):
             return None
         if len(failures) == 1:
             raise failures[0]
@@ -431,10 +433,3 @@ def waiting_time(status: str) -> float:
         return 0.0
     later = re.findall(r"^Slot available after: .*?, in (-?\d+) seconds", status, re.MULTILINE)
     return max(0.0, min(map(float, later), default=0.0))
-
-
-def _may_be_size(failure: SourceError) -> bool:
-    # Offline, the cache may have only the quarters of a tile.
-    return isinstance(failure, TooLargeError | NotCachedError) or (
-        isinstance(failure, HttpError) and failure.status == TOO_SLOW
-    )

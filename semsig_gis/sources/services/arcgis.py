@@ -95,8 +95,8 @@ def _address(client: Client) -> str:
         layer = next(iter(layers))
     number = next((n for n, name in layers.items() if layer in {n, name}), None)
     if number is None:
-        listed = [f"{number} ({name})" for number, name in layers.items()]
-        raise client.unknown_dataset(listed, what="layer", name=layer)
+        known_layers = [f"{number} ({name})" for number, name in layers.items()]
+        raise client.unknown_dataset(known_layers, what="layer", name=layer)
     return f"{service}/{number}"
 
 

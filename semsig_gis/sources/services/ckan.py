@@ -125,10 +125,10 @@ def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]
     best = min((suffix for _, suffix in candidates), key=order.index)
     candidates = [pair for pair in candidates if pair[1] == best]
     if len(candidates) > 1 and not matches:
-        listed = ", ".join(_shown(item) for item, _ in candidates)
+        file_names = ", ".join(_shown(item) for item, _ in candidates)
         raise CatalogError(
             f"dataset {client.dataset!r} of layer {client.layer.name!r} has several resources "
-            f"({listed}); name the one that is meant in `files`, by a pattern such as "
+            f"({file_names}); name the one that is meant in `files`, by a pattern such as "
             f"{_file_name(candidates[0][0])!r}."
         )
 
@@ -153,10 +153,10 @@ def _matches(resource: Resource, patterns: tuple[str, ...]) -> bool:
 def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:
     """Fetch the rows of a resource from the datastore, in its order."""
     query = _action(client, "datastore_search", resource_id=resource)
-    described = client.document(
+    description = client.document(
         query.with_params(limit=0), lambda content: _result(content, client)
     )
-    names = tuple(str(item.get("id")) for item in described.get("fields") or ())
+    names = tuple(str(item.get("id")) for item in description.get("fields") or ())
     fields = client.fields(names)
     if fields:
         table = ServiceTable(names, lambda _: iter(()))

@@ -23,8 +23,8 @@ from semsig_gis.sources.rows import (
     BadFeatureError,
     RowRules,
     Rows,
+    choose_crs,
     raw_layer,
-    settle_crs,
 )
 from semsig_gis.sources.services.table import open_table
 from semsig_gis.sources.vector import file as vector_file
@@ -50,10 +50,10 @@ def fold(name: str) -> str:
 def find_field(name: str, spec: LayerSpec, fields: Sequence[str]) -> str | None:
     """Return the field with a name or one of its aliases, exact or folded, or None."""
     names = (name, *dict(spec.aliases).get(name, ()))
-    folded = {fold(field): field for field in reversed(fields) if fold(field)}
+    by_folded_name = {fold(field): field for field in reversed(fields) if fold(field)}
     exact = (candidate for candidate in names if candidate in fields)
-    similar = (folded[fold(candidate)] for candidate in names if fold(candidate) in folded)
-    return next(exact, None) or next(similar, None)
+    similar = (by_folded_name.get(fold(candidate)) for candidate in names)
+    return next(exact, None) or next(filter(None, similar), None)
 
 
 def settle_fields(spec: LayerSpec, fields: Sequence[str]) -> LayerSpec:
@@ -242,17 +242,17 @@ class Download:
         first, *others = (file.path for file in self.files)
         if first.suffix.lower() in VECTOR_SUFFIXES:
             return _read_vector(first, self.spec, filters=filters, crs=None)
-        table = open_table(first)
+        first_table = open_table(first)
 
         def records(names: Sequence[str]) -> Iterator[ServiceRecord | str]:
-            yield from table.records(names)
+            yield from first_table.records(names)
             for path in others:
                 yield from open_table(path).records(names)
 
-        joined = dataclasses.replace(table, records=records, rest=0)
+        table = dataclasses.replace(first_table, records=records, rest=0)
         if self.fields:
-            joined = dataclasses.replace(joined, fields=self.fields, empty=False)
-        (layer,) = _read_table(joined, [self.spec], first, filters=filters, crs=None)
+            table = dataclasses.replace(table, fields=self.fields, empty=False)
+        (layer,) = _read_table(table, [self.spec], first, filters=filters, crs=None)
         return layer if self.area is None else _with_axes_corrected(layer, self.area)
 
 
@@ -262,11 +262,11 @@ def _with_axes_corrected(layer: RawLayer, area: Area) -> RawLayer:
     box = shapely.box(*area.bounds)
     if layer.table.crs != WGS84 or shapely.intersects(shapes, box).any():
         return layer
-    swapped = shapely.transform(shapes, lambda xy: xy[:, ::-1])
-    if not shapely.intersects(swapped, box).any():
+    new_shapes = shapely.transform(shapes, lambda xy: xy[:, ::-1])
+    if not shapely.intersects(new_shapes, box).any():
         return layer
     note = "the service sends latitude as x and longitude as y; exchanged here"
-    table = layer.table.set_geometry(gpd.GeoSeries(swapped, layer.table.index, crs=WGS84))
+    table = layer.table.set_geometry(gpd.GeoSeries(new_shapes, layer.table.index, crs=WGS84))
     return dataclasses.replace(layer, table=table, notes=(*layer.notes, note))
 
 
@@ -312,8 +312,8 @@ class _TableLayer:
         self._spec = spec
         where = f"layer {spec.name!r} ({path})"
         own, implicit = table.crs or WGS84, table.crs is None
-        self._crs, self._notes = settle_crs(
-            own, implicit=implicit, expected=spec.crs, given=crs, where=where
+        self._crs, self._notes = choose_crs(
+            own, implicit=implicit, expected=spec.crs, requested=crs, where=where
         )
         self._notes = (*table.notes, *self._notes)
         self._by_file = not implicit

@@ -84,8 +84,8 @@ def _collection(client: Client) -> tuple[dict[str, Any], str]:
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        listed = client.json(ServiceQuery(f"{client.endpoint}/collections"), accept=JSON)
-        names = [str(item.get("id")) for item in listed.get("collections") or ()]
+        reply = client.json(ServiceQuery(f"{client.endpoint}/collections"), accept=JSON)
+        names = [str(item.get("id")) for item in reply.get("collections") or ()]
         raise client.unknown_dataset(names, what="collection") from error
 
 

@@ -57,11 +57,7 @@ def _field_types(address: str, client: Client) -> Mapping[str, str]:
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        raise CatalogError(
-            f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
-            f"layer {client.layer.name!r}; look for it at {client.endpoint}/explore and correct "
-            "`dataset` in the catalogue."
-        ) from error
+        raise client.absent_dataset("explore") from error
 
 
 def _parse_description(reply: bytes) -> dict[str, str]:

@@ -203,12 +203,20 @@ class Client:
     def unknown_dataset(self, names: Iterable[str], *, what: str, name: str = "") -> CatalogError:
         """Return the error for a dataset that the service lacks, with the ones it has."""
         names, name = list(names), name or self.dataset
-        listed = ", ".join(names[:NAMES_LISTED]) or "none"
+        known_names = ", ".join(names[:NAMES_LISTED]) or "none"
         rest = f" and {len(names) - NAMES_LISTED:,} more" if len(names) > NAMES_LISTED else ""
         return CatalogError(
             f"{host_of(self.endpoint)} has no {what} {name!r}, which the catalogue names for layer "
-            f"{self.layer.name!r}{nearest_name(name, names)}; it has {listed}{rest}; correct "
+            f"{self.layer.name!r}{nearest_name(name, names)}; it has {known_names}{rest}; correct "
             "`dataset` in the catalogue."
+        )
+
+    def absent_dataset(self, page: str) -> CatalogError:
+        """Return the error for a dataset that a portal lacks, with the page for searching it."""
+        return CatalogError(
+            f"{self.endpoint} has no dataset {self.dataset!r}, which the catalogue names for layer "
+            f"{self.layer.name!r}; look for it at {self.endpoint}/{page} and correct `dataset` in "
+            "the catalogue."
         )
 
     def fields(self, fields: Sequence[str]) -> list[str]:
@@ -257,9 +265,9 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
     except ValueError as error:
         what = "sent JSON that is not whole"
         raise TransientError(what) from error
-    failed = reply.get("error") if isinstance(reply, dict) else None
-    if failed:
-        code = failed.get("code") if isinstance(failed, dict) else None
+    failure = reply.get("error") if isinstance(reply, dict) else None
+    if failure:
+        code = failure.get("code") if isinstance(failure, dict) else None
         status = code if isinstance(code, int) else 0
         what = f"answered with the error {error_text(content) or status}"
         if status in RETRY_STATUSES:

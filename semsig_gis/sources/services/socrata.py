@@ -7,7 +7,7 @@ import functools
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from semsig_gis.core import CatalogError, SourceError
+from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
 from semsig_gis.sources.services.pages import (
@@ -55,7 +55,7 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     if not fields and len(places) > 1:
         fields = [name for name in types if name not in places]
     position_fields = filter(None, (place, *_coordinates(client, list(types))))
-    listed = dict.fromkeys([*fields, *position_fields])
+    columns = dict.fromkeys([*fields, *position_fields])
     files: tuple[Fetched, ...] = ()
     for box in area.boxes if area is not None else (None,):
         where = _where(client, types, place, box)
@@ -65,7 +65,7 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
             lambda content: _count(content, client),
         )
         if fields:
-            params["$select"] = ",".join(listed)
+            params["$select"] = ",".join(columns)
         params |= {"$order": ":id", "$limit": PAGE_ROWS}
         files += _fetch_pages(client, ServiceQuery(f"{address}.{kind}", params), total=total)
     return Download(spec=layer, files=files, fields=tuple(types))
@@ -78,11 +78,7 @@ def _about(client: Client) -> dict[str, Any]:
     except HttpError as error:
         if error.status != NOT_FOUND:
             raise
-        raise CatalogError(
-            f"{client.endpoint} has no dataset {client.dataset!r}, which the catalogue names for "
-            f"layer {client.layer.name!r}; look for it at {client.endpoint}/browse and correct "
-            "`dataset` in the catalogue."
-        ) from error
+        raise client.absent_dataset("browse") from error
 
 
 def _types(about: Mapping[str, Any]) -> dict[str, str]:
@@ -109,28 +105,28 @@ def _coordinates(client: Client, fields: list[str]) -> tuple[str | None, str | N
 def _where(
     client: Client, types: Mapping[str, str], place: str | None, box: Box | None
 ) -> str | None:
-    """Return the condition for an area and the layer's filter."""
+    """Return the condition for a box and the layer's filter; None without both.
+
+    A dataset without columns of positions is not limited to the box.
+    """
     conditions = [client.layer.server_where] if client.layer.server_where else []
     if box is not None:
-        conditions += _inside(client, types, place, box)
+        west, south, east, north = (f"{number:.7f}" for number in box)
+        if place is None:
+            # Two columns of coordinates, which may be text.
+            names = _coordinates(client, list(types))
+            conditions += [
+                f"{name}{'::number' * (types[name] == TEXT)} between {least} and {most}"
+                for name, least, most in zip(names, (west, south), (east, north), strict=True)
+                if name is not None
+            ]
+        elif types[place] in POINTS:
+            conditions.append(f"within_box({place}, {north}, {west}, {south}, {east})")
+        else:
+            corners = [(west, south), (east, south), (east, north), (west, north), (west, south)]
+            ring = ", ".join(f"{x} {y}" for x, y in corners)
+            conditions.append(f"intersects({place}, 'POLYGON (({ring}))')")
     return " AND ".join(f"({condition})" for condition in conditions) or None
-
-
-def _inside(client: Client, types: Mapping[str, str], place: str | None, box: Box) -> list[str]:
-    """Return the conditions that a row is in a box; empty without columns of positions."""
-    west, south, east, north = (f"{number:.7f}" for number in box)
-    if place is not None and types[place] in POINTS:
-        return [f"within_box({place}, {north}, {west}, {south}, {east})"]
-    if place is not None:
-        corners = [(west, south), (east, south), (east, north), (west, north), (west, south)]
-        ring = ", ".join(f"{x} {y}" for x, y in corners)
-        return [f"intersects({place}, 'POLYGON (({ring}))')"]
-    names = _coordinates(client, list(types))
-    return [
-        f"{name}{'::number' * (types[name] == TEXT)} between {least} and {most}"
-        for name, least, most in zip(names, (west, south), (east, north), strict=True)
-        if name is not None
-    ]
 
 
 def _fetch_pages(client: Client, query: ServiceQuery, *, total: int | None) -> tuple[Fetched, ...]:

@@ -47,7 +47,7 @@ def test_boxes_of_a_rendered_scene_give_its_bearings_and_ranges(
     boxes = scene.boxes(camera)
     whole = np.flatnonzero(np.isfinite(boxes).all(axis=1))
     scene = scene.select(whole)
-    found = camera.standing(np.round(boxes[whole]))  # as detectors give them
+    found = camera.upright_objects(np.round(boxes[whole]))  # as detectors give them
     assert (angular_distance(found.bearings, scene.bearings) < 0.1).all()
     off = np.abs(scene.heights / found.rises / scene.distances - 1)
     # Both ends are off by half a pixel, and in a tilted picture the sides, too.
@@ -65,14 +65,14 @@ def test_a_box_as_a_detector_draws_it_need_not_be_of_any_upright_thing() -> None
     # Too narrow for something tall in a tilted picture, in a corner, or of no height at all.
     camera = Camera(width=4000, height=3000, fov=70, roll=20)
     boxes = [[2000, 500, 2010, 2500], [0, 0, 5, 5], [2000, 1500, 2100, 1500], [3990, 0, 4000, 3000]]
-    found = camera.standing(boxes)
+    found = camera.upright_objects(boxes)
     middles = [[(left + right) / 2, (top + bottom) / 2] for left, top, right, bottom in boxes]
     rays = camera.directions(middles)
     assert np.isfinite(found.bearings).all()
     expected = np.degrees(np.arctan2(rays[:, 0], rays[:, 2]))
     assert (angular_distance(found.bearings, expected) < 12).all()
     assert math.isnan(found.rises[2])
-    assert len(camera.standing([]).bearings) == 0
+    assert len(camera.upright_objects([]).bearings) == 0
 
 
 WIDE = math.degrees(2 * math.atan(0.75 * math.tan(math.radians(30))))

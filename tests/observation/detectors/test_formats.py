@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from semsig_gis.observation import Picture
+    from semsig_gis.observation import AnnotatedPicture
 
 # Of a picture of 800 x 400 pixels: a bench, and a sign of which the detector is less sure.
 CORNERS = [(80, 100, 240, 200), (400, 40, 440, 80)]
@@ -187,7 +187,7 @@ def mapillary(folder: Path) -> list[Path]:
     return [folder / "images.json"]
 
 
-def pixels(picture: Picture) -> list[list[float]]:
+def pixels(picture: AnnotatedPicture) -> list[list[float]]:
     scale = (800, 400, 800, 400) if picture.shares else (1, 1, 1, 1)
     corners = [box.corners for box in picture.boxes]
     return [[side * one for side, one in zip(box, scale, strict=True)] for box in corners]

@@ -14,12 +14,12 @@ from sentences import refused
 
 from semsig_gis.core import InputError
 from semsig_gis.observation import (
+    AnnotatedPicture,
     Box,
-    Detector,
     LabelMap,
-    Picture,
     Shot,
     View,
+    ViewBuilder,
     parse_queries,
     read_shots,
 )
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 TAXONOMY = built_in_taxonomy()
-DETECTOR = Detector(
+DETECTOR = ViewBuilder(
     labels=LabelMap.open([], TAXONOMY), taxonomy=TAXONOMY, shot=Shot(fov=90.0, heading=350.0)
 )
 BENCH = TAXONOMY.by_name("bench")
 SIZE = Shot(size=(1000, 800))  # with 90 degrees, 500 pixels to the focal length
 
 
-def picture(*boxes: Box, name: str = "a.jpg", **known: Any) -> Picture:  # noqa: ANN401
-    return Picture(name=name, boxes=boxes, shot=replace(SIZE, **known))
+def picture(*boxes: Box, name: str = "a.jpg", **known: Any) -> AnnotatedPicture:  # noqa: ANN401
+    return AnnotatedPicture(name=name, boxes=boxes, shot=replace(SIZE, **known))
 
 
 def box(label: str = "bench", left: float = 490, top: float = 400, **more: Any) -> Box:  # noqa: ANN401
     return Box(label=label, corners=(left, top, left + 20, top + 50), **more)
 
 
-def one(detector: Detector, *pictures: Picture, **more: Any) -> View:  # noqa: ANN401
+def one(detector: ViewBuilder, *pictures: AnnotatedPicture, **more: Any) -> View:  # noqa: ANN401
     ((_, view),), _ = detector.views(pictures, **more)
     return view
 
@@ -185,7 +185,7 @@ def test_what_is_written_is_read_as_it_was() -> None:
 
 def test_the_file_of_a_picture_tells_its_size(tmp_path: Path) -> None:
     Image.new("L", (1000, 800)).save(tmp_path / "a.jpg")
-    bare = Picture(
+    bare = AnnotatedPicture(
         name="a", boxes=(Box(label="bench", corners=(0.49, 0.5, 0.51, 0.6)),), shares=True
     )
     with refused(InputError, "the size of the picture a is not known"):
@@ -198,7 +198,7 @@ def test_the_file_of_a_picture_tells_its_size(tmp_path: Path) -> None:
 def test_a_size_that_is_said_is_for_pictures_of_unknown_size(tmp_path: Path) -> None:
     Image.new("L", (1000, 800)).save(tmp_path / "a.jpg")
     detector = replace(DETECTOR, shot=Shot(fov=90.0, size=(100, 80)))
-    known, bare = picture(box()), Picture(name="a", boxes=(box(),))
+    known, bare = picture(box()), AnnotatedPicture(name="a", boxes=(box(),))
     for taken, folders in ((known, []), (bare, [tmp_path])):
         view = one(replace(detector, folders=folders), taken)
         assert view.bearings is not None
