@@ -18,7 +18,7 @@ from .database import visible_objects_in as visible_objects_in
 from .file import INPUTS as INPUTS
 from .file import MANIFEST as MANIFEST
 from .file import Manifest as Manifest
-from .file import Part as Part
+from .file import PartFile as PartFile
 from .file import PartitionedDatabase as PartitionedDatabase
 from .file import database_of as database_of
 from .file import database_specs as database_specs
@@ -50,13 +50,13 @@ from .store import store_path as store_path
 from .summary import database_summary as database_summary
 from .tiles import TilePlan as TilePlan
 from .tiles import TileSpec as TileSpec
-from .tiles import begin as begin
+from .tiles import begin_run as begin_run
 from .tiles import build_tile as build_tile
 from .tiles import build_tiles as build_tiles
-from .tiles import describe as describe
+from .tiles import describe_part as describe_part
 from .tiles import finished_tiles as finished_tiles
 from .tiles import plan_tiles as plan_tiles
-from .tiles import publish as publish
+from .tiles import publish_tiles as publish_tiles
 from .tiles import touched_tiles as touched_tiles
 from .update import CellChanges as CellChanges
 from .update import UpdateReport as UpdateReport

@@ -1,4 +1,4 @@
-"""A city: a signature database with what lies beside its file, opened as one thing."""
+"""A city: a signature database with its object store and added columns, opened together."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ ADDED = "added"
 GEOMETRY = "geometry"
 
 
-_Part = TypeVar("_Part")
+_Value = TypeVar("_Value")
 
 
 class City(Displayed):
-    """A signature database with what lies beside its file; made by `open_city`.
+    """A signature database with its object store and added columns, made by `open_city`.
 
-    Each part is opened when it is first looked at, and then kept.
+    Each of them is read at the first access.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class City(Displayed):
 
     @cached_property
     def dataset(self) -> SignatureDatabase | PartitionedDatabase:
-        """The database; in parts, where it lies in parts (see `open_dataset`)."""
+        """The database; if it is in parts, without reading them all (see `open_dataset`)."""
         return open_dataset(self.path) if self.path.is_dir() else self.database
 
     @property
@@ -98,7 +98,7 @@ class City(Displayed):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file of the database, or those of its parts; DatabaseError if one is missing."""
+        """The file of the database, or the files of its parts; DatabaseError if one is missing."""
         if self.path.is_dir():
             return part_files(self.path)
         require_file(self.path)
@@ -112,13 +112,13 @@ class City(Displayed):
 
     @property
     def digest(self) -> str:
-        """SHA-256 digest of the database; columns that were put into its file do not change it."""
+        """SHA-256 digest of the database; columns added to a single file do not change it."""
         files = self.files
         return built_digest(*files) if len(files) == 1 else digest(*files)
 
     @property
     def store_path(self) -> Path:
-        """The folder of the object store, whether it is there or not."""
+        """The folder of the object store, which may not exist."""
         return self.path / INPUTS if self.path.is_dir() else current_store(self.path)
 
     @property
@@ -128,13 +128,13 @@ class City(Displayed):
 
     @cached_property
     def store(self) -> ObjectStore:
-        """The object store; DatabaseError if there is none that can be used."""
+        """The object store; DatabaseError if it is missing or cannot be used."""
         return self._read(open_store)
 
-    def _read(self, part: Callable[[Path], _Part]) -> _Part:
-        """Read a part; DatabaseError if the file is another than that of a part read before."""
+    def _read(self, read: Callable[[Path], _Value]) -> _Value:
+        """Read from the path; DatabaseError if the file has been replaced since the first read."""
         before = self._read_state or file_state(self.path)
-        value = part(self.path)
+        value = read(self.path)
         if file_state(self.path) != before:
             raise DatabaseError(
                 f"another program has changed {self.path} in the meantime; run the same command "
@@ -145,7 +145,7 @@ class City(Displayed):
 
     @property
     def objects(self) -> StreetObjects | None:
-        """The objects that the database was built from; None where its store cannot be used."""
+        """The objects that the database was built from; None if its store cannot be used."""
         try:
             return self.store.objects
         except DatabaseError:
@@ -153,18 +153,18 @@ class City(Displayed):
 
     @property
     def object_counts(self) -> dict[int, int] | None:
-        """How many objects there are by class code; None where the store cannot be used."""
+        """Number of objects by class code; None if the store cannot be used."""
         return None if self.objects is None else self.objects.class_counts
 
     @property
     def has_columns(self) -> bool:
-        """Whether columns were put into the file, or a part."""
+        """Whether columns were added to the file or a part."""
         return any(read_specs(file).get(ADDED) for file in self.files)
 
     def columns(self, name: str) -> tuple[pa.Table, dict[str, Any]] | None:
-        """Return columns that were put into the database under a name, and their facts.
+        """Return the columns that were added to the database under a name, and their facts.
 
-        The table has ``cell_id``, ascending, and the columns; the parts must agree on them.
+        The table has ``cell_id``, ascending, and the columns. DatabaseError if the parts differ.
         """
         files = self.files
         entries = [read_specs(file).get(ADDED, {}).get(name) for file in files]
@@ -181,16 +181,16 @@ class City(Displayed):
     def put_columns(
         self, name: str, columns: pa.Table, *, cell_ids: NDArray[np.int64], facts: dict[str, Any]
     ) -> None:
-        """Put columns into the database, in the place of those that bear this name.
+        """Add columns to the database, replacing columns stored under the same name.
 
-        `columns` has a row for each of `cell_ids`, which ascend and are all cells of the database;
-        `facts` describe them, as plain values for JSON. The file, or the folder of parts, is
-        replaced as a whole. DatabaseError if it has other cells.
+        `columns` has a row for each of `cell_ids`, ascending, which are all cells of the database;
+        `facts` describe the columns, as plain values for JSON. The file, or the folder of parts, is
+        replaced as a whole. DatabaseError if the database has other cells.
         """
         added = {name: {"columns": columns.column_names, "facts": facts}}
         if not self.path.is_dir():
             self._read(file_state)
-            _extend(self.path, self.path, columns, cell_ids, added)
+            _write_with_columns(self.path, self.path, columns, cell_ids, added)
             self._read_state = None
             return
         files, manifest = self.files, read_manifest(self.path)
@@ -198,7 +198,7 @@ class City(Displayed):
             parts = []
             for file, part in zip(files, manifest.parts, strict=True):
                 new = partial / file.name
-                _extend(file, new, columns, cell_ids, added)
+                _write_with_columns(file, new, columns, cell_ids, added)
                 parts.append(replace(part, bytes=new.stat().st_size, sha256=digest(new)))
             Manifest(manifest.recipe, tuple(parts)).write(partial)
             if self.has_store:
@@ -206,7 +206,7 @@ class City(Displayed):
 
 
 def open_city(path: str | Path) -> City:
-    """Open a signature database with all that lies beside its file.
+    """Open a signature database with its object store and added columns.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def open_city(path: str | Path) -> City:
     Returns
     -------
     City
-        The city; each part of it is read when it is first looked at.
+        The city; its database, store and columns are read at the first access.
 
     Raises
     ------
@@ -238,10 +238,10 @@ def open_city(path: str | Path) -> City:
     return City(path)
 
 
-def _extend(
+def _write_with_columns(
     path: Path, out: Path, columns: pa.Table, cell_ids: NDArray[np.int64], added: dict[str, Any]
 ) -> None:
-    """Write the file of a database, or of a part of it, with columns put into it."""
+    """Copy the file of a database or of a part with added columns."""
     table, specs, _ = read_geoparquet(path, kind=KIND)
     cells = table["cell_id"].to_numpy()
     rows = np.minimum(np.searchsorted(cell_ids, cells), len(cell_ids) - 1)
@@ -250,7 +250,7 @@ def _extend(
             f"the cells of {path} have changed since it was opened; open the database again."
         )
     before = specs.get(ADDED, {})
-    replaced = [name for one in before.keys() & added for name in before[one]["columns"]]
+    replaced = [name for key in before.keys() & added for name in before[key]["columns"]]
     # The geometry stays the last column.
     geometry = table[GEOMETRY]
     table = table.drop_columns([*replaced, GEOMETRY])

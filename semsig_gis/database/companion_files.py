@@ -1,4 +1,4 @@
-"""What lies beside a database: its object store, and what nobody needs any more."""
+"""Companions of a database: its object store, and files next to it that are no longer needed."""
 
 from __future__ import annotations
 
@@ -19,19 +19,18 @@ if TYPE_CHECKING:
 
     from semsig_gis.database.city import City
 
-INDEX = "likelihood index of an older version"
+OLD_INDEX = "likelihood index of an older version"
 STORE = "street objects"
-LEFT_STORE = "street objects of a build that was killed"
-LEFT = "files left by a run that was killed"
-AT_WORK = "files that a run is writing"
+ABANDONED_STORE = "street objects of a build that was killed"
+ABANDONED = "files left by a run that was killed"
+IN_USE = "files that a run is writing"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Companion:
-    """A file or folder beside a database.
+    """A file or folder next to a database.
 
-    `what` says what it is, `bytes` is its size with all that is in it, and `needed` tells whether
-    something still reads it.
+    `what` is its kind, `bytes` its total size, and `needed` is whether something still reads it.
     """
 
     path: Path
@@ -50,70 +49,75 @@ class Companion:
 
 
 def companions(database: str | Path) -> tuple[Companion, ...]:
-    """Return what lies beside a database, in a file or in parts.
+    """Return the companions of a database, in a file or in parts.
 
-    DatabaseError if there is none.
+    DatabaseError if there is no database.
     """
     return tuple(
-        Companion(path=one, what=what, bytes=_size(one), needed=what in {STORE, AT_WORK})
-        for one, what in _found(open_city(database))
+        Companion(path=path, what=what, bytes=_size(path), needed=what in {STORE, IN_USE})
+        for path, what in _paths(open_city(database))
     )
 
 
 def remove_companions(
     database: str | Path, *, objects: bool = False, dry_run: bool = False
 ) -> tuple[Companion, ...]:
-    """Remove what lies beside a database and nobody needs, and return what that was.
+    """Remove the companions of a database that are not needed, and return them.
 
-    The street objects are needed to update it, to refine places between the middles of cells, and
-    to name objects; they go with `objects` alone. A dry run removes nothing. InputError if
-    something cannot be removed.
+    The street objects are needed for updates, for places between the centres of cells, and for the
+    names of objects; only `objects` removes them. A dry run removes nothing. InputError if a
+    companion cannot be removed.
     """
-    chosen = tuple(
-        one for one in companions(database) if not one.needed or (objects and one.what == STORE)
+    unneeded = tuple(
+        companion
+        for companion in companions(database)
+        if not companion.needed or (objects and companion.what == STORE)
     )
-    if dry_run or not chosen:
-        return chosen
-    # A store that another program was just putting in place is there no more after the wait.
+    if dry_run or not unneeded:
+        return unneeded
+    # After the wait, a store that another program was moving to its final folder is gone.
     with folder_locked(Path(os.path.realpath(database)).parent):
-        removed = tuple(one for one in chosen if os.path.lexists(one.path))
-        for one in removed:
+        removed = tuple(companion for companion in unneeded if os.path.lexists(companion.path))
+        for companion in removed:
             try:
-                _remove(one)
+                _remove(companion)
             except OSError as error:
                 raise InputError(
-                    f"{one.path} cannot be removed ({reason(error)}); ask its owner for access."
+                    f"{companion.path} cannot be removed ({reason(error)}); ask its owner for "
+                    "access."
                 ) from error
     return removed
 
 
-def _found(city: City) -> Iterator[tuple[Path, str]]:
-    """Give all that lies beside a database, and what it is."""
+def _paths(city: City) -> Iterator[tuple[Path, str]]:
+    """Yield the files and folders of companions and their kinds."""
     file = Path(os.path.realpath(city.path))
     current = city.store_path
     for place in (current,) if file.is_dir() else (store_path(file), waiting_store(file)):
         if place.is_dir():
-            yield place, STORE if place == current else LEFT_STORE
-    for name in sorted({str(city.path.absolute()), str(file)}):  # a link had its own
+            yield place, STORE if place == current else ABANDONED_STORE
+    # Older versions wrote an index for a link to a database too.
+    for name in sorted({str(city.path.absolute()), str(file)}):
         for index in sorted(glob.glob(f"{glob.escape(name)}.*.likelihood")):  # noqa: PTH207
-            yield Path(index), INDEX
+            yield Path(index), OLD_INDEX
     for folder in sorted(file.parent.glob(f"{TEMPORARY_PREFIX}*")):
         if folder.is_dir():
-            yield folder, LEFT if is_abandoned(folder) else AT_WORK
+            yield folder, ABANDONED if is_abandoned(folder) else IN_USE
 
 
 def _size(path: Path) -> int:
-    """Return how many bytes a file holds, or all files in a folder."""
+    """Return the size in bytes of a file, or of all files in a folder."""
     if path.is_symlink() or not path.is_dir():
         return path.lstat().st_size
     files = (Path(folder, name) for folder, _, names in os.walk(path) for name in names)
     return sum(file.lstat().st_size for file in files)
 
 
-def _remove(one: Companion) -> None:
-    if one.what == LEFT:
-        remove_abandoned(one.path.parent)  # puts back what was put aside
-    elif one.path.is_dir() and not one.path.is_symlink():
-        shutil.rmtree(one.path)
+def _remove(companion: Companion) -> None:
+    path = companion.path
+    if companion.what == ABANDONED:
+        remove_abandoned(path.parent)  # which moves replaced files back first
+    elif path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
     else:
-        one.path.unlink()
+        path.unlink()

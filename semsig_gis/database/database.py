@@ -263,7 +263,7 @@ class SignatureDatabase(Displayed):
     def to_geodataframe(self, *, geometry: CellGeometry = "polygon") -> gpd.GeoDataFrame:
         """Return the cells as a table in the CRS of the database, squares or points.
 
-        The columns are those that `export_database` writes: ``cell_id``, ``x`` and ``y``
+        The columns are as in `export_database`: ``cell_id``, ``x`` and ``y``
         (viewpoint), ``length`` (objects), ``types`` (symbols), ``bearings``, ``levels`` and
         ``distances`` (text, one number per object), and ``type_group_size`` and
         ``angle_group_size`` (number of cells with the same sequence).
@@ -337,11 +337,10 @@ def require_same_place(database: SignatureDatabase, xy: NDArray[np.float64], wha
     Far means outside the box of the cells, widened by the longest visibility range. An empty array
     of places is accepted. `what` is the name of the places in the message.
     """
-    low = database.xy.min(axis=0) - database.reach
-    high = database.xy.max(axis=0) + database.reach
+    low, high = database.bounds[:2] - database.reach, database.bounds[2:] + database.reach
     if len(xy) and not ((low <= xy) & (xy <= high)).all(axis=1).any():
         raise InputError(
-            f"none of the {len(xy):,} {what} is where the cells are; give those of the same city."
+            f"none of the {len(xy):,} {what} is where the cells are; give data of the same city."
         )
 
 

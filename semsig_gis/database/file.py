@@ -45,25 +45,23 @@ if TYPE_CHECKING:
     from pyproj import CRS
 
 KIND = "signature database"
-# Raised whenever a file of before would be read wrongly.
-FORMAT = 2
-# Readers of Parquet folders, such as pyarrow, leave out what begins so.
+FORMAT = 2  # increased when older files would be read incorrectly
+# Readers of Parquet folders, such as pyarrow, ignore names with a leading underscore.
 MANIFEST = "_manifest.json"
-# Copies of the objects, buildings and streets that a database in parts was built from.
-INPUTS = "_inputs"
+INPUTS = "_inputs"  # copies of the objects, buildings and streets of a database in parts
 PARTS_KIND = "signature database in parts"
 CHUNK = 1 << 20
 
 
 def save_database(database: SignatureDatabase, path: str | Path) -> None:
-    """Save a database as one GeoParquet file: a row a cell, the specs in its metadata.
+    """Save a database as one GeoParquet file, with one row per cell and the specs as metadata.
 
     Parameters
     ----------
     database : SignatureDatabase
         What to save.
     path : str or Path
-        File to write; it appears whole, by rename.
+        File to write; it appears complete, by rename.
 
     Notes
     -----
@@ -92,17 +90,16 @@ def save_database(database: SignatureDatabase, path: str | Path) -> None:
             "geometry": points_to_wkb(database.xy),
         }
     )
-    bounds = [*database.xy.min(axis=0), *database.xy.max(axis=0)]
     write_geoparquet(
         table,
         path,
-        geo=geo_metadata(database.crs, geometry_types=["Point"], bounds=bounds),
+        geo=geo_metadata(database.crs, geometry_types=["Point"], bounds=database.bounds.tolist()),
         specs=database_specs(database),
     )
 
 
 def database_specs(database: SignatureDatabase) -> dict[str, Any]:
-    """Return all but the cells of a database, as plain values for JSON; notes only if any."""
+    """Return the specs of a database as plain values for JSON; notes only if there are any."""
     notes = {NOTES: list(database.notes)} if database.notes else {}
     return {
         "kind": KIND,
@@ -134,7 +131,7 @@ def open_database(path: str | Path) -> SignatureDatabase:
     Raises
     ------
     DatabaseError
-        If the file or a part is missing, damaged, or holds something else.
+        If the file or a part is missing, damaged, or not a signature database.
 
     Examples
     --------
@@ -153,9 +150,9 @@ def open_database(path: str | Path) -> SignatureDatabase:
 def database_of(
     table: pa.Table, specs: dict[str, Any], crs: CRS, *, path: str | Path
 ) -> SignatureDatabase:
-    """Return the database that columns (see `save_database`) and `database_specs` hold.
+    """Return a database from its columns (see `save_database`) and `database_specs`.
 
-    Raise DatabaseError, which names `path`, if they are damaged or from another version.
+    Raise DatabaseError, with `path`, if they are damaged or from another version.
     """
     if specs.get("format") != FORMAT:
         raise DatabaseError(
@@ -191,9 +188,9 @@ def database_of(
         )
     except (KeyError, TypeError, ValueError, SemsigError) as error:
         raise DatabaseError(f"{path} is damaged ({error}); build the database again.") from error
-    # What every signature keeps to; a sum of bytes would not find columns that were swapped.
-    follows = np.ones(len(symbols), bool)
-    follows[offsets[:-1]] = False
+    # Properties of every signature; a checksum would not detect columns that were swapped.
+    same_cell = np.ones(len(symbols), bool)
+    same_cell[offsets[:-1]] = False
     consistent = (
         np.array_equal(offsets, bearing_offsets)
         and np.array_equal(offsets, distance_offsets)
@@ -201,7 +198,7 @@ def database_of(
         and (np.diff(cells) > 0).all()
         and database.codes.all()
         and (bearing_units < BEARING_UNITS).all()
-        and not (follows[1:] & (bearing_units[1:] < bearing_units[:-1])).any()
+        and not (same_cell[1:] & (bearing_units[1:] < bearing_units[:-1])).any()
     )
     if not consistent:
         raise DatabaseError(
@@ -212,20 +209,20 @@ def database_of(
 
 def _text(column: pa.ChunkedArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """Return the flat bytes and offsets of an Arrow column of strings."""
-    array = _whole(column, pa.string())
+    array = _as_array(column, pa.string())
     _, ends, flat = array.buffers()
     offsets = np.frombuffer(ends, np.int32)[array.offset : array.offset + len(array) + 1]
-    return np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]], _from_zero(offsets)
+    return np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]], _rebased(offsets)
 
 
 def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return the flat array and offsets of an Arrow column of lists of numbers."""
-    array = _whole(column, pa.list_(kind))
-    return whole_numbers(array.flatten()), _from_zero(whole_numbers(array.offsets))
+    array = _as_array(column, pa.list_(kind))
+    return whole_numbers(array.flatten()), _rebased(whole_numbers(array.offsets))
 
 
-def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
-    """Return a column of some type as one array without missing values."""
+def _as_array(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
+    """Return a column as one array; ValueError for another type, missing values or no rows."""
     if column.null_count or column.type != kind or not len(column):
         raise ValueError(
             f"a column contains {len(column)} values of {column.type}, {column.null_count} missing"
@@ -233,12 +230,12 @@ def _whole(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
     return column.combine_chunks()
 
 
-def _from_zero(offsets: NDArray[Any]) -> NDArray[np.int64]:
+def _rebased(offsets: NDArray[Any]) -> NDArray[np.int64]:
     return offsets.astype(np.int64) - np.int64(offsets[0])
 
 
 def digest(*paths: Path) -> str:
-    """Return the SHA-256 digest, in hexadecimal, of the content of files one after the other."""
+    """Return the hexadecimal SHA-256 digest of the contents of files, in their order."""
     total = hashlib.sha256()
     for path in paths:
         with path.open("rb") as file:
@@ -248,45 +245,45 @@ def digest(*paths: Path) -> str:
 
 
 def damaged_files(folder: Path, digests: Mapping[str, str]) -> list[str]:
-    """Return the names of the files that are not in a folder with such a digest."""
+    """Return the names of the files of a folder that are missing or have another digest."""
     damaged = []
     for name, expected in digests.items():
         try:
-            whole = digest(folder / name) == expected
+            intact = digest(folder / name) == expected
         except OSError:
-            whole = False
-        if not whole:
+            intact = False
+        if not intact:
             damaged.append(name)
     return damaged
 
 
 def read_specs(path: str | Path) -> dict[str, Any]:
-    """Return what a database file, or a part file, says of itself."""
+    """Return the specs in the metadata of a database file or part file."""
     return read_geoparquet(path, kind=KIND, columns=[])[1]
 
 
 def is_folder(path: str | Path) -> bool:
-    """Return whether a path is that of a folder, as of a database in parts.
+    """Whether a path is a folder, for example of a database in parts.
 
-    One that a killed run had put aside is put back.
+    A folder that a killed run had moved away is moved back.
     """
     if not os.path.lexists(path):
         remove_abandoned(Path(path).parent)
-    return os.path.isdir(path)  # noqa: PTH112 - it answers where Path.is_dir raises
+    return os.path.isdir(path)  # noqa: PTH112 - Path.is_dir may raise
 
 
 def require_file(path: str | Path) -> None:
-    """Raise DatabaseError if a path is not that of a file."""
-    if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
+    """Raise DatabaseError if a path is not a file."""
+    if not os.path.isfile(path):  # noqa: PTH113 - Path.is_file may raise
         raise DatabaseError(f"{path} does not exist; give a signature database file.")
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Part:
-    """One part file, which holds the cells of one tile.
+class PartFile:
+    """A part file of a database: the cells of one tile.
 
     `tile` is its column and row, counted in tiles from grid column 0 and row 0. `entries` is the
-    sum of the lengths of all signatures; `bytes` and `sha256` are the size and digest of the file.
+    total length of the signatures; `bytes` and `sha256` are the size and digest of the file.
     """
 
     tile: tuple[int, int]
@@ -297,19 +294,19 @@ class Part:
 
     @property
     def file(self) -> str:
-        """Name of the file in the folder."""
+        """Name of the file."""
         return part_name(self.tile)
 
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """A signature database in parts, ordered by tile.
+    """The contents of a signature database in parts, ordered by tile.
 
-    `recipe` says how it was built: the specs and the digests of the inputs, as JSON values.
+    `recipe` has the specs and the digests of the inputs, as JSON values.
     """
 
     recipe: dict[str, Any]
-    parts: tuple[Part, ...]
+    parts: tuple[PartFile, ...]
 
     @property
     def cells(self) -> int:
@@ -318,21 +315,21 @@ class Manifest:
 
     @property
     def entries(self) -> int:
-        """Sum of the lengths of all signatures."""
+        """Total length of the signatures in all parts."""
         return sum(part.entries for part in self.parts)
 
     def write(self, folder: Path) -> None:
-        """Write the manifest into the folder of the parts; it appears whole, by rename."""
+        """Write the manifest to the folder of the parts; it appears complete, by rename."""
         content: dict[str, Any] = {
             "kind": PARTS_KIND,
             "recipe": self.recipe,
             "parts": [{"file": part.file, **asdict(part)} for part in self.parts],
         }
-        content["sum"] = _sum(content)
+        content["sum"] = _checksum(content)
         write_whole(folder / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
-def _sum(content: dict[str, Any]) -> int:
+def _checksum(content: dict[str, Any]) -> int:
     """Return the CRC-32 of values for JSON."""
     return zlib.crc32(json.dumps(content).encode())
 
@@ -343,21 +340,22 @@ def part_name(tile: tuple[int, int]) -> str:
 
 
 def read_manifest(folder: str | Path) -> Manifest:
-    """Read what a database in parts consists of; DatabaseError without a whole manifest."""
+    """Read the manifest of a database in parts; DatabaseError if it is missing or damaged."""
     path = Path(folder) / MANIFEST
     try:
         content = parse_json(read_whole(path), finite=True)
-        if "sum" in content and content.pop("sum") != _sum(content):  # those of before have none
+        # Manifests of older versions have no checksum.
+        if "sum" in content and content.pop("sum") != _checksum(content):
             raise ValueError(path)  # noqa: TRY301
         parts = tuple(
-            Part(
-                tile=(int(one["tile"][0]), int(one["tile"][1])),
-                cells=int(one["cells"]),
-                entries=int(one["entries"]),
-                bytes=int(one["bytes"]),
-                sha256=str(one["sha256"]),
+            PartFile(
+                tile=(int(part["tile"][0]), int(part["tile"][1])),
+                cells=int(part["cells"]),
+                entries=int(part["entries"]),
+                bytes=int(part["bytes"]),
+                sha256=str(part["sha256"]),
             )
-            for one in content["parts"]
+            for part in content["parts"]
         )
         recipe = dict(content["recipe"])
         kind = content["kind"]
@@ -379,7 +377,7 @@ def read_manifest(folder: str | Path) -> Manifest:
 
 
 def part_files(folder: str | Path) -> tuple[Path, ...]:
-    """Return the part files of a database, ordered by tile; DatabaseError if it is not whole."""
+    """Return the part files of a database, ordered by tile; DatabaseError if it is incomplete."""
     manifest = read_manifest(folder)
     folder = Path(folder)
     for part in manifest.parts:
@@ -404,12 +402,12 @@ def part_files(folder: str | Path) -> tuple[Path, ...]:
 
 @dataclass(frozen=True, repr=False, slots=True)
 class PartitionedDatabase(Displayed):
-    """A signature database of which one part at a time is in memory.
+    """A signature database in parts, with only one part at a time in memory.
 
     Parameters
     ----------
     files : tuple of Path
-        The part files; no cell is in two of them.
+        The part files; they have no common cell.
     cells : int
         Number of cells in all parts.
 
@@ -435,7 +433,7 @@ class PartitionedDatabase(Displayed):
         return {"cells": self.cells, "parts": len(self.files)}
 
     def parts(self) -> Iterator[SignatureDatabase]:
-        """Open the parts one after the other; DatabaseError where they were made differently."""
+        """Yield the parts one by one; DatabaseError if they were built with different settings."""
         first = None
         for file in self.files:
             part = open_database(file)
@@ -446,17 +444,17 @@ class PartitionedDatabase(Displayed):
 
     @property
     def taxonomy(self) -> Taxonomy:
-        """The classes that the parts know."""
+        """The classes of the parts."""
         return next(self.parts()).taxonomy
 
     @property
     def spec(self) -> SignatureSpec:
-        """How the signatures of the parts were made."""
+        """Visibility range and angle levels of the parts."""
         return next(self.parts()).spec
 
     @property
     def crs(self) -> CRS:
-        """The metric coordinate reference system of the parts."""
+        """Metric coordinate reference system of the parts."""
         return next(self.parts()).crs
 
     @property
@@ -466,7 +464,7 @@ class PartitionedDatabase(Displayed):
         return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
     def row_numbers(self, cell_ids: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the rows that cells have in the database that `open_database` returns."""
+        """Return the rows of cells in the database that `open_database` returns."""
         rows = np.zeros(len(cell_ids), np.int64)
         for file in self.files:
             table, _, _ = read_geoparquet(file, kind=KIND, columns=["cell_id"])
@@ -475,7 +473,7 @@ class PartitionedDatabase(Displayed):
 
 
 def open_dataset(folder: str | Path) -> PartitionedDatabase:
-    """Open a folder that holds a database in parts, without reading the parts into memory.
+    """Open a database in parts without reading the parts into memory.
 
     Parameters
     ----------
@@ -490,7 +488,7 @@ def open_dataset(folder: str | Path) -> PartitionedDatabase:
     Raises
     ------
     DatabaseError
-        If it is no such folder, or a part is missing or is not the one that was built.
+        If the folder is not a database in parts, or a part is missing or has changed.
 
     Examples
     --------

@@ -1,14 +1,14 @@
-"""Merging the databases of two places into one, so that a region grows city by city."""
+"""Merge the databases of two areas into one, so that a region can grow city by city."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import geopandas as gpd
 import numpy as np
 import pandas as pd
-import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core import (
@@ -23,12 +23,12 @@ from semsig_gis.core import (
 from semsig_gis.database.build import build_cells
 from semsig_gis.database.city import open_city
 from semsig_gis.database.database import join_databases, require_same
+from semsig_gis.database.occlusion import MARGIN_M, footprints_around
 from semsig_gis.database.store import ObjectStore, save_with_store
-from semsig_gis.database.tiles import MARGIN_M
 from semsig_gis.objects import StreetObjects, compare_objects, join_licences, licenses_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -38,10 +38,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class MergeReport(Displayed):
-    """What two databases came to.
+    """Counts of the cells and objects of a merged database.
 
-    `cells` and `objects` are those of the result. `shared_cells` and `shared_objects` were in both
-    databases; `recomputed` cells lie where both have something near.
+    `shared_cells` and `shared_objects` were in both databases; `recomputed` cells are near objects,
+    buildings or streets of both.
     """
 
     cells: int
@@ -73,27 +73,27 @@ def merge_databases(
         Files of the databases, or folders of their tiles: of one CRS, grid, range, viewpoints and
         classes, and both with buildings or both without.
     out : str or Path
-        File to write; its object store is put beside it.
+        File to write; its object store is written to the same folder.
     progress : callable, optional
-        Called with the number of cells done and in all, of those that are computed again.
+        Called with the number of finished cells and of all cells that are recomputed.
 
     Returns
     -------
     MergeReport
-        What they came to.
+        Counts of the result.
 
     Raises
     ------
     DatabaseError
-        If the databases were made in different ways, or one has no object store; nothing is
-        written then.
+        If the databases were built with different settings, or one has no object store; then
+        nothing is written.
 
     Notes
     -----
-    Objects of one class at exactly the same place in both, and the same buildings and streets, are
-    taken once, as the first database has them. Cells where both have something near, those that
-    both hold among them, are computed again from all of it; the others stay as they are. So the
-    result is what `build_database` makes of the objects, buildings and streets of both.
+    Objects of one class at exactly the same place in both, and equal buildings and streets, are
+    taken once, from the first database. Cells near objects, buildings or streets of both databases
+    are recomputed from all of them; the others are copied. So the result is what `build_database`
+    makes of the objects, buildings and streets of both.
 
     Examples
     --------
@@ -110,11 +110,11 @@ def merge_databases(
     databases = [city.database for city in cities]
     require_same(*databases)
     stores = [city.store for city in cities]
-    one = databases[0]
-    along = one.viewpoints.mode == "streets"
+    template = databases[0]
+    needs_streets = template.viewpoints.mode == "streets"
     for city, store in zip(cities, stores, strict=True):
-        if (store.footprints is None and one.occlusion is not None) or (
-            store.streets is None and along
+        if (store.footprints is None and template.occlusion is not None) or (
+            store.streets is None and needs_streets
         ):
             raise DatabaseError(
                 f"{city.path} lacks the buildings or streets that it was built with; build the "
@@ -124,32 +124,32 @@ def merge_databases(
     facts: dict[str, Any] = {
         "licenses": (
             *map(str, store.objects.licenses),
-            *licenses_of(store.footprints, store.streets if along else None),
+            *licenses_of(store.footprints, store.streets if needs_streets else None),
         ),
         "notes": store.objects.notes,
         "version": __version__,
     }
-    # Outside of this box, all that decides about a cell is of one database.
-    widest = _widest(store, one) if along else 0.0
+    # Cells outside of this box depend on only one of the databases.
+    widest = _widest(store, template) if needs_streets else 0.0
     boxes = [_bounds(part) for part in stores]
-    around = max(one.reach, widest) + MARGIN_M
+    around = max(template.reach, widest) + MARGIN_M
     low = np.maximum(*(box[:2] for box in boxes)) - around
     high = np.minimum(*(box[2:] for box in boxes)) + around
-    fresh = _built(one, store, low, high, progress=progress)
+    recomputed = _build_box(template, store, low, high, progress=progress)
     parts = [part.select(~_within(part.xy, low, high)) for part in databases]
-    merged = replace(join_databases([*parts, fresh]), **facts)
+    merged = replace(join_databases([*parts, recomputed]), **facts)
     save_with_store(merged, store, out)
     return MergeReport(
         cells=len(merged),
         objects=len(store.objects),
-        shared_cells=int(np.isin(one.cell_ids, databases[1].cell_ids).sum()),
+        shared_cells=int(np.isin(template.cell_ids, databases[1].cell_ids).sum()),
         shared_objects=shared,
-        recomputed=len(fresh),
+        recomputed=len(recomputed),
     )
 
 
 def _merged_store(first: ObjectStore, second: ObjectStore) -> tuple[ObjectStore, int]:
-    """Return what both stores hold, once, and how many objects were in both."""
+    """Return a store of the objects and shapes of both, and the number of shared objects."""
     twins = compare_objects(first.objects, second.objects).same[:, 1]
     others = second.objects.table.drop(index=second.objects.table.index[twins])
     table = pd.concat([first.objects.table, others], ignore_index=True)
@@ -163,23 +163,23 @@ def _merged_store(first: ObjectStore, second: ObjectStore) -> tuple[ObjectStore,
     )
     store = ObjectStore(
         objects=objects,
-        footprints=_joined(first.footprints, second.footprints),
-        streets=_joined(first.streets, second.streets),
+        footprints=_union(first.footprints, second.footprints),
+        streets=_union(first.streets, second.streets),
     )
     return store, len(twins)
 
 
-def _joined(
+def _union(
     first: gpd.GeoDataFrame | None, second: gpd.GeoDataFrame | None
 ) -> gpd.GeoDataFrame | None:
-    """Return the shapes of both tables, those that both have once."""
+    """Return the shapes of both tables; equal shapes appear once."""
     if first is None or second is None:
         return first if second is None else second
-    known = pd.Index(first.geometry.to_wkb())
-    others = second[~pd.Index(second.geometry.to_wkb()).isin(known)]
-    joined = gpd.GeoDataFrame(pd.concat([first, others], ignore_index=True), crs=first.crs)
-    joined.attrs[LICENSES] = list(licenses_of(first, second))
-    return joined
+    shapes = pd.Index(first.geometry.to_wkb())
+    others = second[~pd.Index(second.geometry.to_wkb()).isin(shapes)]
+    union = gpd.GeoDataFrame(pd.concat([first, others], ignore_index=True), crs=first.crs)
+    union.attrs[LICENSES] = list(licenses_of(first, second))
+    return union
 
 
 def _widest(store: ObjectStore, database: SignatureDatabase) -> float:
@@ -190,7 +190,7 @@ def _widest(store: ObjectStore, database: SignatureDatabase) -> float:
 
 
 def _bounds(store: ObjectStore) -> NDArray[np.float64]:
-    """Return ``xmin, ymin, xmax, ymax`` in metres of all that a store holds."""
+    """Return ``xmin, ymin, xmax, ymax`` in metres of all shapes of a store."""
     tables = (store.objects.table, store.footprints, store.streets)
     bounds = np.stack([table.total_bounds for table in tables if table is not None])
     return np.append(np.nanmin(bounds[:, :2], axis=0), np.nanmax(bounds[:, 2:], axis=0))
@@ -203,46 +203,42 @@ def _within(
     return inside
 
 
-def _built(
-    database: SignatureDatabase,
+def _build_box(
+    template: SignatureDatabase,
     store: ObjectStore,
     low: NDArray[np.float64],
     high: NDArray[np.float64],
     *,
     progress: Callable[[int, int], None] | None,
 ) -> SignatureDatabase:
-    """Return the cells in a box, computed from all that a store holds."""
-    reach, grid = database.reach, database.grid
+    """Return the cells in a box, computed from a store with the settings of a database."""
+    reach, grid = template.reach, template.grid
     near = _within(store.objects.xy, low - reach, high + reach)
     if not near.any():
-        return database.select(slice(0))
+        return template.select(slice(0))
     objects = replace(store.objects, table=store.objects.table[near])
     columns, rows = cells_near(objects.xy, grid=grid, radius=reach)
     inside = _within(grid.viewpoints(columns, rows), low, high)
+    footprints = store.footprints
+    if footprints is not None:
+        around = [*(low - reach), *(high + reach)]
+        footprints = footprints_around(partial(_meeting, footprints), around)
     return build_cells(
         objects,
         columns[inside],
         rows[inside],
         grid=grid,
-        spec=database.spec,
-        viewpoints=database.viewpoints,
-        footprints=None
-        if store.footprints is None
-        else _near(store.footprints, np.append(low - reach, high + reach)),
+        spec=template.spec,
+        viewpoints=template.viewpoints,
+        footprints=footprints,
         streets=store.streets,
         partial=True,
         progress=progress,
     )
 
 
-def _near(footprints: gpd.GeoDataFrame, box: NDArray[np.float64]) -> gpd.GeoDataFrame:
-    """Return the footprints that meet a box, and all neighbours of those that do."""
-    bounds = footprints.bounds.to_numpy()
-    chosen = shapely.box(*bounds.T)
-    near = shapely.intersects(chosen, shapely.box(*box))
-    if near.any():
-        low, high = bounds[near, :2].min(axis=0), bounds[near, 2:].max(axis=0)
-        near = shapely.intersects(chosen, shapely.box(*(low - MARGIN_M), *(high + MARGIN_M)))
-        # Flat ones are left out there too, but there may be no others.
-        near[near] = shapely.area(shapely.make_valid(footprints.geometry.to_numpy()[near])) > 0
-    return footprints[near]
+def _meeting(footprints: gpd.GeoDataFrame, box: Sequence[float]) -> gpd.GeoDataFrame:
+    """Return the footprints with bounds that meet a box."""
+    west, south, east, north = footprints.bounds.to_numpy().T
+    meets = (west <= box[2]) & (south <= box[3]) & (east >= box[0]) & (north >= box[1])
+    return footprints[meets]

@@ -12,8 +12,9 @@ import numpy as np
 from semsig_gis.core import Displayed, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    import geopandas as gpd
     import shapely
     from numpy.typing import ArrayLike, NDArray
 else:
@@ -22,6 +23,8 @@ else:
 TOLERANCE_M = 0.5
 GAP_M = 0.05  # buildings nearer to each other than twice this are joined
 TOUCHING_M = 1.0  # more than the tolerance, and than a gap between joined buildings
+# Added to a range: more than rounding errors, the tolerance and the gap between joined buildings.
+MARGIN_M = 2.0
 PAIRS_PER_BLOCK = 1 << 17
 POLYGON_DIMENSIONS = 2
 
@@ -251,3 +254,22 @@ def buildings_near(
         touching = tree.query(polygons[rows], predicate="dwithin", distance=TOUCHING_M)[1]
         rows = np.unique(touching[~mask[touching]])
     return np.flatnonzero(mask)
+
+
+def footprints_around(
+    read: Callable[[Sequence[float]], gpd.GeoDataFrame], box: Sequence[float]
+) -> gpd.GeoDataFrame:
+    """Return the footprints that meet a box, and their neighbours, without flat ones.
+
+    `read` returns the footprints that meet a box ``xmin, ymin, xmax, ymax`` in metres.
+    """
+    near = read(box)
+    if len(near):
+        low, high = near.total_bounds[:2], near.total_bounds[2:]
+        near = read(
+            (*(np.minimum(low, box[:2]) - MARGIN_M), *(np.maximum(high, box[2:]) + MARGIN_M))
+        )
+    # `Footprints` ignores flat polygons too, but raises if there are no others.
+    flat = shapely.area(near.geometry.to_numpy()) == 0
+    flat[flat] = shapely.area(shapely.make_valid(near.geometry.to_numpy()[flat])) == 0
+    return near[~flat]

@@ -158,30 +158,29 @@ def _stored(table: gpd.GeoDataFrame, crs: CRS, *names: str) -> gpd.GeoDataFrame:
 
 
 def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str | Path) -> None:
-    """Save a database and the store that belongs to it.
+    """Save a database and its object store.
 
     Parameters
     ----------
     database : SignatureDatabase
-        What to save.
+        The database.
     store : ObjectStore
-        What it was built from.
+        Its object store.
     path : str or Path
-        File of the database; the store is put beside it (see `store_path`).
+        File of the database; the store is written next to it (see `store_path`).
 
     Raises
     ------
     InputError
-        If the files cannot be written; those that were there are unchanged then.
+        If the files cannot be written; existing files are then unchanged.
 
     Notes
     -----
-    Both are written whole in a hidden folder first. Then the new store gets its place under
-    another name, the database is renamed into its place, and at last the store into its own. The
-    store names the digest of its database, so whoever opens the two sees how far an interrupted
-    run came: `open_store` takes the new store as soon as the new database is there, and the old one
-    until then. Any number of programs may read meanwhile; of two that write at once, the later one
-    wins.
+    Both are first written to a hidden folder. Then the new store is moved next to the database
+    under another name, the database is renamed to its final name, and last the store to its own.
+    The store contains the digest of its database. So `open_store` opens the new store as soon as
+    the new database is in place, and the old store before that, also after an interrupted run. Any
+    number of programs may read at the same time; if two write, the later one wins.
 
     Examples
     --------
@@ -197,12 +196,13 @@ def save_with_store(database: SignatureDatabase, store: ObjectStore, path: str |
         with whole_file(path) as partial:
             try:
                 save_database(database, partial)
-            except InputError as error:  # which knows nothing of the place that was asked for
+            except InputError as error:  # its message has the temporary path
                 raise InputError(str(error).replace(str(partial), str(path))) from error
             new = partial.with_name(final.name)
             _write(store, new, fingerprint=digest(partial))
             stack.enter_context(folder_locked(final.parent))
-            _settle(Path(path))  # what waits there may be needed until the new database is in place
+            # Until the new database is in place, the old one may need a store that still waits.
+            _settle(Path(path))
             move_folder(new, _waiting(final))
         move_folder(_waiting(final), final)
 
@@ -215,7 +215,7 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     database : str or Path
         File of the database, or folder of its parts.
     folder : str or Path, optional
-        The store, where it does not lie beside the database; one in parts has it in its folder.
+        Folder of the store, if it is not next to the database; not for a database in parts.
 
     Returns
     -------
@@ -229,8 +229,8 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
 
     Notes
     -----
-    What an interrupted `save_with_store` left half done is finished, if the folder can be written
-    to. The files of a store are not changed by reading.
+    An interrupted `save_with_store` is completed, if the folder is writable. Reading does not
+    change the files of a store.
 
     Examples
     --------
@@ -251,6 +251,7 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
     while True:
         place = current_store(file) if folder is None else Path(folder)
         before = file_state(file), file_state(place)
+        # If another program has replaced the files in the meantime, they are read again.
         try:
             store = _read(place, file)
         except DatabaseError:
@@ -259,13 +260,12 @@ def open_store(database: str | Path, folder: str | Path | None = None) -> Object
         else:
             if before == (file_state(file), file_state(place)):
                 return store
-        # Another program has put something else there meanwhile.
 
 
 def store_path(database: str | Path) -> Path:
-    """Return the folder beside a database file where its object store lies.
+    """Return the folder of the object store of a database file, next to the file.
 
-    Links are followed. Raise InputError if the name of the database has the ending of a store.
+    Links are followed. InputError if the name of the database has the suffix of a store.
     """
     file = Path(os.path.realpath(database))
     if file.suffix == STORE_SUFFIX:
@@ -277,14 +277,14 @@ def store_path(database: str | Path) -> Path:
 
 
 def waiting_store(database: str | Path) -> Path:
-    """Return where a new object store waits until its database is in place."""
+    """Return the folder of a new object store while its database is not in place yet."""
     return _waiting(store_path(database))
 
 
 def built_digest(path: str | Path) -> str:
-    """Return the SHA-256 digest that a database file had before columns were put into it.
+    """Return the SHA-256 digest of a database file before columns were added to it.
 
-    Without such columns it is the digest of the file as it is, even if that is damaged.
+    Without added columns this is the digest of the file, even if the file is damaged.
     """
     try:
         return str(read_specs(path)[BUILT_DIGEST])
@@ -298,11 +298,11 @@ def _manifest(folder: Path) -> dict[str, Any]:
         manifest = parse_json(read_whole(path), finite=True)
         if manifest["kind"] != STORE_KIND or not isinstance(manifest["files"], dict):
             raise ValueError(manifest["kind"])  # noqa: TRY301
-        known: bool = manifest["format"] == FORMAT
+        readable: bool = manifest["format"] == FORMAT
         version, _ = manifest["version"], manifest["database"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DatabaseError(f"{path} is missing or damaged; build the database again.") from error
-    if not known:
+    if not readable:
         raise DatabaseError(
             f"{folder} was written by another version of semsig ({version}); build the database "
             "again."
@@ -313,14 +313,15 @@ def _manifest(folder: Path) -> dict[str, Any]:
 def _read(folder: Path, database: Path) -> ObjectStore:
     if not is_folder(folder):
         raise DatabaseError(
-            f"{database} has no object store ({folder.name} beside it); build the database again."
+            f"{database} has no object store ({folder.name} in the same folder); build the "
+            "database again."
         )
     manifest = _manifest(folder)
     if manifest["database"] != built_digest(database):
         raise DatabaseError(
             f"{folder} belongs to another database than {database}; build the database again."
         )
-    # Stores of before hold an R-tree as well, which nobody reads: damage to it ends the program.
+    # Older stores have an R-tree too; it is not read, because a damaged one ends the program.
     names = [name for name in (OBJECTS, FOOTPRINTS, STREETS) if name in manifest["files"]]
     damaged = damaged_files(folder, {name: manifest["files"][name] for name in names})
     if damaged or OBJECTS not in names:
@@ -329,19 +330,19 @@ def _read(folder: Path, database: Path) -> ObjectStore:
         )
     return ObjectStore(
         objects=open_objects(folder / OBJECTS),
-        footprints=_table(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
-        streets=_table(folder / STREETS) if STREETS in names else None,
+        footprints=_read_shapes(folder / FOOTPRINTS) if FOOTPRINTS in names else None,
+        streets=_read_shapes(folder / STREETS) if STREETS in names else None,
     )
 
 
 def stored_inputs(folder: Path) -> dict[str, Path]:
-    """Return the files of objects, buildings and streets that a database in parts was built from.
+    """Return the files of objects, buildings and streets in a database in parts, by role.
 
-    DatabaseError if they are not there.
+    DatabaseError if there are no objects.
     """
     files = {path.stem: path for path in sorted((folder / INPUTS).glob("*.parquet"))}
     if "objects" not in files:
-        read_manifest(folder)  # another folder is told as such
+        read_manifest(folder)  # raises for a folder that is not a database
         raise DatabaseError(
             f"{folder} has no street objects in {INPUTS}; build the database again."
         )
@@ -349,7 +350,7 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it loads slowly
+    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 1 s to load
 
     files = stored_inputs(folder)
     objects = open_objects(files["objects"])
@@ -361,7 +362,7 @@ def _read_inputs(folder: Path) -> ObjectStore:
     return ObjectStore.of(objects, footprints=read("buildings"), streets=read("streets"))
 
 
-def _table(path: Path) -> gpd.GeoDataFrame:
+def _read_shapes(path: Path) -> gpd.GeoDataFrame:
     try:
         return gpd.read_parquet(path)
     except (*UNREADABLE, shapely.errors.ShapelyError) as error:
@@ -369,7 +370,7 @@ def _table(path: Path) -> gpd.GeoDataFrame:
 
 
 def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
-    """Write a whole store of that name, in the place of another."""
+    """Write a store to a folder, which appears complete and replaces another."""
     with whole_folder(folder) as partial:
         save_objects(store.objects, partial / OBJECTS, keep_order=True)
         for name, table in ((FOOTPRINTS, store.footprints), (STREETS, store.streets)):
@@ -387,7 +388,7 @@ def _write(store: ObjectStore, folder: Path, *, fingerprint: str) -> None:
 
 
 def current_store(database: Path) -> Path:
-    """Return the store of a database, and finish what an interrupted run left, if possible."""
+    """Return the folder of the store of a database; complete an interrupted save if possible."""
     final = store_path(database)
     if not _awaited(database):
         return final
@@ -398,14 +399,14 @@ def current_store(database: Path) -> Path:
 
 
 def _settle(database: Path) -> None:
-    """Put the store that waits for a database into its place."""
+    """Move the waiting store of a database to its final folder, if there is one."""
     if _awaited(database):
         final = store_path(database)
         move_folder(_waiting(final), final)
 
 
 def _awaited(database: Path) -> bool:
-    """Tell whether the store that belongs to a database waits to be put into its place."""
+    """Whether the store of a database still waits to be moved to its final folder."""
     final = store_path(database)
     waiting = _waiting(final)
     if not (waiting.exists() and database.exists()):
@@ -415,7 +416,7 @@ def _awaited(database: Path) -> bool:
 
 
 def _database_of(store: Path) -> str | None:
-    """Return the digest of the database that a store names, None if it is missing or damaged."""
+    """Return the digest of the database of a store, None if the store is missing or damaged."""
     try:
         return str(_manifest(store)["database"])
     except DatabaseError:
@@ -423,12 +424,12 @@ def _database_of(store: Path) -> str | None:
 
 
 def file_state(path: Path) -> tuple[int, ...] | None:
-    """Return what changes where another file or folder is put in the place of one."""
+    """Return values that change if another file or folder replaces one; None without any."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _waiting(final: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Properties of a database as plain values: the numbers of the paper's Tables 1 and 2, and more."""
+"""Summary of a database as plain values: the numbers of the paper's Tables 1 and 2, and more."""
 
 from __future__ import annotations
 
@@ -24,44 +24,43 @@ def database_summary(
     file_bytes: int | None = None,
     object_counts: Mapping[int, int] | None = None,
 ) -> dict[str, Any]:
-    """Return the properties of a database as plain values for JSON.
+    """Return the summary of a database as plain values for JSON.
 
     Parameters
     ----------
     database : SignatureDatabase
-        Of which.
+        The database.
     file_bytes : int, optional
         Size of its file in bytes.
     object_counts : mapping of int to int, optional
-        How many objects of each class code it was made of.
+        Number of objects of each class code that it was built from.
 
     Returns
     -------
     dict
         ``signatures``, ``mean_length``, ``covered_km2``, ``radius_m``, ``step_m``,
         ``levels``, ``crs``, ``extent_degrees`` (west, south, east and north of the
-        viewpoints), ``distortion`` (the plane against the ground, `Distortion.to_dict`),
-        ``file_mb`` and ``mb_per_km2`` (millions of bytes or None), ``version``,
-        ``licenses``, ``notes`` (warnings about what it was built from); ``viewpoints``:
-        ``mode``, ``half_width_m`` (of streets, else None) and ``area_km2`` (of the area
-        that they were chosen from, or None); ``occlusion_m``: the tolerance, or None where
-        no building hides anything; ``occurrences``: one dict a class (``code``, ``symbol``,
-        ``name``, ``title``, ``range_m``, ``number``, ``share``, ``objects``: its count or
-        None, ``objects_per_km2``, ``entropy_bits``); ``density_from``: ``"objects"`` or
-        ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``, ``angle`` and ``both``
-        the statistics of the group sizes as `pandas.Series.describe` gives them (``std`` is
-        the sample's, None for a single group), ``alone``, the share of the cells that share
-        their signature with no other, and ``entropy_bits``; ``largest_type_group``:
-        ``types`` and ``cells``.
+        viewpoints), ``distortion`` (of the plane, see `Distortion.to_dict`), ``file_mb`` and
+        ``mb_per_km2`` (millions of bytes or None), ``version``, ``licenses``, ``notes``
+        (warnings about its data); ``viewpoints``: ``mode``, ``half_width_m`` (of streets,
+        else None) and ``area_km2`` (of the chosen area, or None); ``occlusion_m``: the
+        tolerance, or None without buildings; ``occurrences``: one dict per class (``code``,
+        ``symbol``, ``name``, ``title``, ``range_m``, ``number``, ``share``, ``objects``: its
+        count or None, ``objects_per_km2``, ``entropy_bits``); ``density_from``:
+        ``"objects"`` or ``"occurrences"``; ``cell_bits``; ``groups``: for ``type``,
+        ``angle`` and ``both`` the statistics of the group sizes from
+        `pandas.Series.describe` (``std`` is that of a sample, None for a single group),
+        ``alone`` (share of the cells with a unique signature) and ``entropy_bits``;
+        ``largest_type_group``: ``types`` and ``cells``.
 
     Notes
     -----
     Paper, Tables 1 and 2. An object occurs once in every cell that sees it. The covered area is the
-    number n of cells times that of a cell.
+    number n of cells times the area of a cell.
 
     Objects per km2 of a class: with `object_counts`, their number divided by the covered area.
-    Without, occurrences / (n pi R^2), where R is the range of the class, which occlusion makes too
-    small.
+    Without, occurrences / (n pi R^2), where R is the range of the class; with occlusion, this is
+    too small.
 
     Entropy of a class, in bits: -sum over k of p_k log2 p_k, where p_k is the share of the cells
     that see exactly k objects of it; log2 n (``cell_bits``) would identify the cell. Entropy of
@@ -77,8 +76,8 @@ def database_summary(
     covered = len(database) * database.grid.step**2 / 1e6
     area = database.viewpoints.area
     mode = database.viewpoints.mode
-    (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
-    extent = (float(west), float(south), float(east), float(north))
+    west, south, east, north = database.bounds.tolist()
+    extent = (west, south, east, north)
     types, angles = database.type_sequences, database.angle_sequences
     pairs = types.inverse.astype(np.int64) * len(angles) + angles.inverse
     both = np.unique(pairs, return_counts=True)[1]
@@ -129,39 +128,39 @@ def _class_facts(
     total: int,
     object_counts: Mapping[int, int] | None,
 ) -> dict[str, Any]:
-    """Return what there is to say of one class."""
+    """Return the facts about one class."""
     cells = len(database)
     number = int(database.occurrences[item.code])
-    seen_from = item.range_m or float(database.spec.radius)
+    range_m = item.range_m or float(database.spec.radius)
     if object_counts is None:
-        objects, density = None, number / (cells * np.pi * seen_from**2)
+        objects, density = None, number / (cells * np.pi * range_m**2)
     else:
         objects = int(object_counts.get(item.code, 0))
         density = objects / (cells * database.grid.step**2)
-    # No cell of a database is empty, so that every offset begins a cell of its own.
-    seen = np.add.reduceat(database.codes == item.code, database.offsets[:-1], dtype=np.int64)
+    # No cell of a database is empty, as `reduceat` requires.
+    counts = np.add.reduceat(database.codes == item.code, database.offsets[:-1], dtype=np.int64)
     return {
         "code": item.code,
         "symbol": item.symbol,
         "name": item.name,
         "title": item.title,
-        "range_m": seen_from,
+        "range_m": range_m,
         "number": number,
         "share": number / total,
         "objects": objects,
         "objects_per_km2": 1e6 * density,
-        "entropy_bits": _entropy(np.bincount(seen)),
+        "entropy_bits": _entropy(np.bincount(counts)),
     }
 
 
 def _entropy(sizes: NDArray[np.int64]) -> float:
-    """Return the Shannon entropy of a partition into parts of such sizes, in bits."""
+    """Return the Shannon entropy of a partition with these sizes, in bits."""
     shares = sizes[sizes > 0] / sizes.sum()
     return max(0.0, -float((shares * np.log2(shares)).sum()))
 
 
 def _group_statistics(sizes: NDArray[np.int64]) -> dict[str, float | int | None]:
-    """Return the statistics of group sizes and the share of cells alone in their group."""
+    """Return the statistics of group sizes and the share of cells with a unique signature."""
     described = pd.Series(sizes).describe()
     statistics: dict[str, float | int | None] = {
         name: int(described[name]) for name in ("count", "min", "max")

@@ -1,4 +1,4 @@
-"""Inputs of tiles: files that every worker can read, a square at a time."""
+"""Inputs of tiles: files that every worker can read by box."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def in_files(
+def input_files(
     objects: str | Path, out: str | Path, **tables: str | Path | gpd.GeoDataFrame | None
 ) -> Iterator[dict[str, Path]]:
-    """Give the files of buildings and streets; tables are written to some beside the result.
+    """Yield the files of buildings and streets; tables are written to files next to the result.
 
-    There workers elsewhere find them.
+    So workers on other machines can read them.
     """
     files = {name: Path(path) for name, path in tables.items() if isinstance(path, str | Path)}
     in_memory: dict[Any, gpd.GeoDataFrame] = {
@@ -44,7 +44,7 @@ def in_files(
         yield files
         return
     crs = open_objects(objects, box=EMPTY_BOX).crs
-    with folder_beside(out) as folder:
+    with working_folder(out) as folder:
         for name, table in in_memory.items():
             files[name] = folder / f"{name}.parquet"
             save_surroundings(read_surroundings(table, role=name, crs=crs), files[name])
@@ -52,8 +52,8 @@ def in_files(
 
 
 @contextlib.contextmanager
-def folder_beside(out: str | Path) -> Iterator[Path]:
-    """Give a folder beside a result, for what its workers read; it is removed after the block."""
+def working_folder(out: str | Path) -> Iterator[Path]:
+    """Yield a folder next to a result, for files of its workers; it is removed after the block."""
     parent = Path(os.path.realpath(out)).parent
     parent.mkdir(parents=True, exist_ok=True)
     with temporary_folder(parent) as folder:
@@ -61,9 +61,9 @@ def folder_beside(out: str | Path) -> Iterator[Path]:
 
 
 def fingerprint(path: Path) -> str:
-    """Return the digest of a file, with its companions, or of a folder."""
+    """Return the digest of a file, of all files of a shapefile, or of a folder."""
     if path.is_dir():
-        files = sorted(one for one in path.rglob("*") if one.is_file())
+        files = sorted(file for file in path.rglob("*") if file.is_file())
     elif path.suffix.lower() == ".shp":
         files = sorted(path.parent.glob(f"{path.stem}.*"))
     else:
@@ -74,25 +74,25 @@ def fingerprint(path: Path) -> str:
         raise SourceError(f"{path} does not exist or cannot be read; give another file.") from error
 
 
-def copy_by_box(
+def copy_with_bounds(
     name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
 ) -> Path:
-    """Return a copy of an input that can be read by box in a CRS."""
+    """Copy an input to a file that can be read by box, in a CRS, and return its path."""
     copy = folder / INPUTS / f"{name}.parquet"
     if copy.exists():
         return copy
-    if _covered(path, crs):
-        with whole_file(copy) as whole, path.open("rb") as own, whole.open("wb") as copied:
-            shutil.copyfileobj(own, copied)
-    elif name == "objects":  # those of before have no bounds
+    if _has_bounds(path, crs):
+        with whole_file(copy) as partial, path.open("rb") as source, partial.open("wb") as target:
+            shutil.copyfileobj(source, target)
+    elif name == "objects":  # older files have no bounds
         save_objects(open_objects(path), copy)
     else:
         save_surroundings(read_surroundings(path, role=name, crs=crs, tell=tell), copy)
     return copy
 
 
-def _covered(path: Path, crs: CRS) -> bool:
-    """Tell whether a file is GeoParquet in this CRS with a column of bounds."""
+def _has_bounds(path: Path, crs: CRS) -> bool:
+    """Whether a file is GeoParquet in this CRS with a column of bounds."""
     try:
         schema = pq.read_schema(path)
         geo = json.loads(schema.metadata[b"geo"])
@@ -104,7 +104,7 @@ def _covered(path: Path, crs: CRS) -> bool:
 
 
 def widest_street(streets: Path) -> float:
-    """Return the largest half-width of any street in metres, 0 where the file tells none."""
+    """Return the largest half-width of the streets in metres, 0 if the file has none."""
     if HALF_WIDTH not in pq.read_schema(streets).names:
         return 0.0
     widths = pq.read_table(streets, columns=[HALF_WIDTH], **VERIFY_CHECKSUMS)[HALF_WIDTH].to_numpy()

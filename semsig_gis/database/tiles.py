@@ -1,7 +1,7 @@
-"""Tiles: building a signature database square by square, each from what lies near it alone.
+"""Build a signature database in square tiles, each only from the data near it.
 
-The run works in ``OUT.partial``, where the same command finds the tiles that an interrupted run has
-left; when all are there, the folder is renamed to ``OUT``.
+A run writes to ``OUT.partial``. The same command resumes an interrupted run there. When all tiles
+are finished, the folder is renamed to ``OUT``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow.parquet as pq
-import shapely
 
 from semsig_gis import __version__
 from semsig_gis.core import (
@@ -48,15 +47,20 @@ from semsig_gis.database.file import (
     INPUTS,
     MANIFEST,
     Manifest,
-    Part,
+    PartFile,
     digest,
     open_database,
     part_name,
     read_manifest,
     save_database,
 )
-from semsig_gis.database.occlusion import TOLERANCE_M
-from semsig_gis.database.tile_inputs import copy_by_box, fingerprint, in_files, widest_street
+from semsig_gis.database.occlusion import MARGIN_M, TOLERANCE_M, footprints_around
+from semsig_gis.database.tile_inputs import (
+    copy_with_bounds,
+    fingerprint,
+    input_files,
+    widest_street,
+)
 from semsig_gis.database.viewpoints import ViewpointSpec, require_surroundings
 from semsig_gis.objects import open_objects, read_surroundings
 from semsig_gis.storage import (
@@ -75,7 +79,6 @@ if TYPE_CHECKING:
 
     import geopandas as gpd
     from numpy.typing import NDArray
-    from pyproj import CRS
 
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.database.tile_inputs import Input
@@ -83,12 +86,9 @@ if TYPE_CHECKING:
     Tile = tuple[int, int]
     Box = tuple[float, float, float, float]
 
-# Beyond the range: for rounding, and for walls as near as occlusion.GAP_M and TOLERANCE_M look.
-MARGIN_M = 2.0
-# Tiles that one object may touch in a row, and tiles in all.
-MOST_REACHED = 16
+MOST_TILES_IN_RANGE = 16  # largest visibility range in sides of a tile
 MOST_TILES = 1_000_000
-TILE_S = 0.05  # that a tile takes at least
+TILE_S = 0.05  # shortest time to build a tile
 
 RECIPE = "_recipe.json"
 EMPTY = ".empty"
@@ -96,7 +96,7 @@ RUN = RunKind(
     content="unfinished run",
     another=(
         "{folder} contains an unfinished run that differs in {difference}; delete that folder "
-        "to start anew, or finish it with the same command and inputs as before."
+        "to start again, or finish it with the same command and inputs as before."
     ),
     read=lambda folder: read_json(folder / RECIPE),
     write=lambda folder, recipe: write_json(folder / RECIPE, recipe),
@@ -107,7 +107,7 @@ RUN = RunKind(
 
 @dataclass(frozen=True, slots=True)
 class TileSpec:
-    """How a database is cut into tiles.
+    """Size of the tiles of a database.
 
     Parameters
     ----------
@@ -150,14 +150,14 @@ def build_tiles(
     progress: Callable[[int, int], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Manifest:
-    """Build a signature database in tiles: a folder that is opened like a single file.
+    """Build a signature database in tiles: a folder that can be opened like a file.
 
     Parameters
     ----------
     objects : str or Path
         Street objects that `save_objects` wrote.
     out : str or Path
-        Folder to write. It appears whole, by rename; a database that is there is replaced.
+        Folder to write. It appears complete, by rename, and replaces an existing database.
     tile : TileSpec, optional
         Size of a tile; 2000 m by default.
     grid, spec, viewpoints : optional
@@ -165,39 +165,39 @@ def build_tiles(
     buildings, streets : str, Path or GeoDataFrame, optional
         Files that `read_surroundings` reads, or tables.
     workers : int, default 0
-        How many processes of this machine build tiles; 0 builds them here, without dask.
+        Number of processes of this machine that build tiles; 0 builds in this one, without dask.
     scheduler : str, optional
-        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers see the same
-        files under the same paths; then `workers` stays 0.
+        Address of a dask scheduler, such as ``tcp://10.0.0.5:8786``. Its workers must see the same
+        files under the same paths, and `workers` must be 0.
     progress : callable, optional
-        Called with the number of tiles done and in all.
+        Called with the number of finished tiles and of all tiles.
     tell : callable, optional
-        Called with a remark for the user, as about a run that is taken up again.
+        Called with messages for the user, for example that a run is resumed.
 
     Returns
     -------
     Manifest
-        What the database consists of.
+        The parts of the database.
 
     Raises
     ------
     InputError
-        If an option cannot be used, the scheduler cannot be reached, the memory does not hold
-        the fullest tile, or `out` holds something else or an unfinished run with other inputs or
+        If an option cannot be used, the scheduler cannot be reached, the fullest tile does not fit
+        into memory, or `out` is not a database or has an unfinished run with other inputs or
         specs.
     DatabaseError
-        If the street objects cannot be read, or a tile cannot be built; the other tiles are kept
-        for the next run.
+        If the street objects cannot be read, or a tile cannot be built; the next run reuses the
+        other tiles.
     EmptyResultError
         If no cell sees an object.
 
     Notes
     -----
-    The files are the same byte for byte whatever the number of workers. The folder keeps copies of
-    the objects, buildings and streets, so that `update_tiles` knows what was there. An interrupted
-    run leaves its tiles in ``OUT.partial``, and the same command goes on from there, if the specs
-    are the same and the input files have the same content (by SHA-256). A script that gives
-    `workers` needs the guard ``if __name__ == "__main__":``, because the workers import it.
+    The files are byte for byte the same for any number of workers. The folder has copies of the
+    objects, buildings and streets, which `update_tiles` needs. The same command resumes an
+    interrupted run from ``OUT.partial``, if the specs and the content of the input files (by
+    SHA-256) are the same. A script that gives `workers` needs the guard
+    ``if __name__ == "__main__":``, because the workers import it.
 
     Examples
     --------
@@ -210,7 +210,7 @@ def build_tiles(
     True
     """
     check_workers(workers, scheduler)
-    with in_files(objects, out, buildings=buildings, streets=streets) as surroundings:
+    with input_files(objects, out, buildings=buildings, streets=streets) as surroundings:
         plan = plan_tiles(
             objects,
             out,
@@ -225,66 +225,70 @@ def build_tiles(
         parts = build_parts(
             plan,
             objects,
-            work=partial(build_tile, plan),
+            build=partial(build_tile, plan),
             workers=workers,
             scheduler=scheduler,
             progress=progress,
             tell=tell,
         )
-        return publish(plan.folder, parts)
+        return publish_tiles(plan.folder, parts)
 
 
 def build_parts(
     plan: TilePlan,
     objects: str | Path,
     *,
-    work: Callable[[Tile], Part | None],
-    old_parts: Mapping[Tile, Part] | None = None,
+    build: Callable[[Tile], PartFile | None],
+    copies: Mapping[Tile, PartFile] | None = None,
     share: float = 1.0,
     workers: int,
     scheduler: str | None,
     progress: Callable[[int, int], None] | None,
     tell: Callable[[str], None] | None,
-) -> list[Part]:
-    """Build the tiles of a plan that are not there yet, and return all parts, ordered by tile.
+) -> list[PartFile]:
+    """Build the missing tiles of a plan, and return all parts, ordered by tile.
 
-    `work` builds one; `old_parts` lie in the folder already. About this `share` of the cells of the
-    others is computed.
+    `build` builds a tile; `copies` are in the folder already. About this `share` of the cells of
+    the other tiles is computed.
     """
-    old_parts = old_parts or {}
+    copies = copies or {}
     try:
         tiles = touched_tiles(plan.objects, grid=plan.grid, side=plan.side, reach=plan.reach)
-        left = [tile for tile in tiles if tile not in old_parts]
-        done: dict[Tile, Part | None] = {**old_parts, **finished_tiles(plan.folder, left)}
-        left = [tile for tile in left if tile not in done]
-        _look_ahead(plan, tiles, left=share * len(left), workers=workers, scheduler=scheduler)
-        if done and tell is not None:
-            tell(f"an unfinished run has left {len(done):,} of {len(tiles):,} tiles; resuming it")
+        others = [tile for tile in tiles if tile not in copies]
+        results: dict[Tile, PartFile | None] = {**copies, **finished_tiles(plan.folder, others)}
+        missing = [tile for tile in others if tile not in results]
+        _check_resources(
+            plan, tiles, missing=share * len(missing), workers=workers, scheduler=scheduler
+        )
+        if results and tell is not None:
+            tell(
+                f"an unfinished run has left {len(results):,} of {len(tiles):,} tiles; resuming it"
+            )
 
-        def note_part(tile: Tile, part: Part | None) -> None:
-            done[tile] = part
+        def add_result(tile: Tile, part: PartFile | None) -> None:
+            results[tile] = part
             if progress is not None:
-                progress(len(done), len(tiles))
+                progress(len(results), len(tiles))
 
-        failed = finish_tasks(
-            work,
-            left,
-            on_success=note_part,
+        errors = finish_tasks(
+            build,
+            missing,
+            on_success=add_result,
             workers=workers,
             scheduler=scheduler,
             files=[*filter(None, (plan.folder, plan.objects, plan.buildings, plan.streets))],
         )
     finally:
         RUN.abandon(plan.folder)
-    if failed:
-        first = min(failed)
-        others = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+    if errors:
+        first = min(errors)
+        more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
         raise DatabaseError(
-            f"{part_name(first)}{others} could not be built ({failed[first]}); the {len(done):,} "
+            f"{part_name(first)}{more} could not be built ({errors[first]}); the {len(results):,} "
             f"tiles that are done are kept in {plan.folder}, so fix the cause and run the "
             "same command again."
         )
-    parts = sorted(part for part in done.values() if part is not None)
+    parts = sorted(part for part in results.values() if part is not None)
     if not parts:
         shutil.rmtree(plan.folder, ignore_errors=True)
         raise EmptyResultError(
@@ -295,14 +299,14 @@ def build_parts(
     return parts
 
 
-def _look_ahead(
-    plan: TilePlan, tiles: Sequence[Tile], *, left: float, workers: int, scheduler: str | None
+def _check_resources(
+    plan: TilePlan, tiles: Sequence[Tile], *, missing: float, workers: int, scheduler: str | None
 ) -> None:
-    """Refuse tiles that the memory does not hold, and tell when all will take long.
+    """Raise InputError if a tile does not fit into memory, and announce a long run.
 
-    The fullest comes first. Workers elsewhere look at their own memory when they begin a tile.
+    The first tile is the fullest. Workers of a scheduler check their own memory for each tile.
     """
-    if not left:
+    if not missing:
         return
     objects = open_objects(plan.objects, box=plan.box(tiles[0], plan.reach + MARGIN_M))
     ranges = objects.taxonomy.ranges(plan.spec.radius)[objects.codes]
@@ -313,19 +317,19 @@ def _look_ahead(
         near = min(cells, round(len(objects) * (2.0 * plan.reach / plan.grid.step + 2.0) ** 2))
         require_room(pairs, cells=near, objects=len(objects), processes=max(workers, 1))
     if len(objects):
-        each = PAIR_S if plan.buildings is None else HIDDEN_PAIR_S
+        pair_s = PAIR_S if plan.buildings is None else HIDDEN_PAIR_S
         count = pq.read_metadata(plan.objects).num_rows
-        seconds = TILE_S * len(tiles) + each * pairs * count / len(objects)
-        announce(seconds * left / len(tiles) / max(workers, 1), "building tiles")
+        seconds = TILE_S * len(tiles) + pair_s * pairs * count / len(objects)
+        announce(seconds * missing / len(tiles) / max(workers, 1), "building tiles")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TilePlan:
-    """All that is needed to build any tile: paths and specs, so that it travels lightly.
+    """Paths and specs for building any tile; small, because it is sent to the workers.
 
     Part files are written to `folder`; all inputs can be read by box and are in one CRS. `side` is
-    that of a tile in cells; `reach` is the largest visibility range of any class, and
-    `street_reach` how far the widest street reaches from its centre line, both in metres.
+    the side of a tile in cells; `reach` is the largest visibility range of any class and
+    `street_reach` the largest half-width of a street, both in metres.
     """
 
     folder: Path
@@ -359,17 +363,20 @@ def plan_tiles(
     digests: Mapping[str, str] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> TilePlan:
-    """Check the inputs of a run, begin it or take it up again, and return the plan of its tiles.
+    """Check the inputs of a run, begin or resume it, and return the plan of its tiles.
 
-    Streets are needed by the viewpoints ``"streets"`` and left aside by others. `digests` are those
-    of inputs of which a copy is given. `tell` takes remarks on the files of buildings and streets.
+    Streets are ignored unless the viewpoints are ``"streets"``. `digests` replace the computed
+    digests of inputs that are copies. `tell` is called with messages about the files of buildings
+    and streets.
     """
-    along = streets if viewpoints.mode == "streets" else None
-    places: dict[Input, str | Path | None]
-    places = {"objects": objects, "buildings": buildings, "streets": along}
-    paths = {name: Path(path).absolute() for name, path in places.items() if path is not None}
-    nothing = open_objects(paths["objects"], box=EMPTY_BOX)
-    reach = float(nothing.taxonomy.ranges(spec.radius).max())
+    inputs: dict[Input, str | Path | None] = {
+        "objects": objects,
+        "buildings": buildings,
+        "streets": streets if viewpoints.mode == "streets" else None,
+    }
+    paths = {name: Path(path).absolute() for name, path in inputs.items() if path is not None}
+    empty = open_objects(paths["objects"], box=EMPTY_BOX)
+    reach = float(empty.taxonomy.ranges(spec.radius).max())
     require_step(grid, reach)
     require_surroundings(viewpoints, paths.get("buildings"), paths.get("streets"))
     recipe: dict[str, Any] = {
@@ -381,10 +388,11 @@ def plan_tiles(
         "tile": {"cells": tile.cells(grid)},
         "inputs": {name: fingerprint(path) for name, path in paths.items()} | dict(digests or {}),
     }
-    folder = begin(out, recipe)
+    folder = begin_run(out, recipe)
     try:
         files = {
-            name: copy_by_box(name, path, nothing.crs, folder, tell) for name, path in paths.items()
+            name: copy_with_bounds(name, path, empty.crs, folder, tell)
+            for name, path in paths.items()
         }
         lines = files.get("streets")
         return TilePlan(
@@ -405,22 +413,23 @@ def plan_tiles(
 
 
 def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) -> list[Tile]:
-    """Return the tiles that may have a cell from which some object is seen, fullest first.
+    """Return the tiles in range of an object, by decreasing number of objects.
 
-    Only the bounds in the file of objects are read. `side` is that of a tile in cells, `reach` the
-    largest visibility range of any class in metres. Tiles that are too small are refused.
+    Only the bounds in the file of objects are read. `side` is the side of a tile in cells, `reach`
+    the largest visibility range of any class in metres. InputError if the tiles are too small.
     """
     metres = side * grid.step
-    if reach > MOST_REACHED * metres:
+    if reach > MOST_TILES_IN_RANGE * metres:
         raise InputError(
             f"a tile of {metres:g} m is too small for a visibility range of {reach:g} m; make it "
-            f"at least {reach / MOST_REACHED:g} m."
+            f"at least {reach / MOST_TILES_IN_RANGE:g} m."
         )
-    objects: Counter[int] = Counter()
+    objects_in: Counter[int] = Counter()
     for bounds in bounds_by_group(path):
         widened = bounds + np.array([-reach, -reach, reach, reach])
-        places = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
-        boxes, count = np.unique(places, axis=0, return_counts=True)
+        # Objects with the same box of tiles are counted together, then added to each of its tiles.
+        corners = np.floor((widened - np.tile(grid.origin, 2)) / metres).astype(np.int64)
+        boxes, count = np.unique(corners, axis=0, return_counts=True)
         west, south, east, north = boxes.T
         height = north + 1 - south
         size = (east + 1 - west) * height
@@ -429,29 +438,29 @@ def touched_tiles(path: str | Path, *, grid: GridSpec, side: int, reach: float) 
         ids = cell_ids(west[box] + column, south[box] + row)
         distinct, number = np.unique(ids, return_inverse=True)
         total = np.bincount(number, weights=count[box]).astype(np.int64)
-        objects.update(dict(zip(distinct.tolist(), total.tolist(), strict=True)))
-        if len(objects) > MOST_TILES:
+        objects_in.update(dict(zip(distinct.tolist(), total.tolist(), strict=True)))
+        if len(objects_in) > MOST_TILES:
             raise InputError(
                 f"tiles of {metres:g} m would be more than {MOST_TILES:,}; make them larger."
             )
-    ordered = sorted(objects, key=lambda number: (-objects[number], number))
+    ordered = sorted(objects_in, key=lambda number: (-objects_in[number], number))
     columns, rows = split_ids(np.array(ordered, np.int64))
     return list(zip(columns.tolist(), rows.tolist(), strict=True))
 
 
-def build_tile(plan: TilePlan, tile: Tile) -> Part | None:
-    """Build and save the part of one tile; return None where none of its cells sees anything."""
+def build_tile(plan: TilePlan, tile: Tile) -> PartFile | None:
+    """Build and save the part of one tile; return None if none of its cells sees an object."""
     return save_tile(plan, tile, tile_cells(plan, tile))
 
 
 def tile_cells(
     plan: TilePlan, tile: Tile, *, only: NDArray[np.int64] | None = None
 ) -> SignatureDatabase | None:
-    """Return the cells of one tile, or `only` those of some ids; None far from any object.
+    """Return the cells of one tile, or `only` some by id; None if no object is near.
 
-    What decides about a cell lies within the largest range of it: objects, and buildings together
-    with their neighbours; a street lies within its own width. So only that is read, and the cells
-    are the same as when everything is.
+    A cell depends only on objects within the largest range, on buildings within it and their
+    neighbours, and on streets within their half-width. Only these are read, and the cells are the
+    same as those computed from all data.
     """
     if not plan.folder.is_dir():
         raise InputError(f"{plan.folder} no longer exists; run the same command again.")
@@ -465,7 +474,15 @@ def tile_cells(
         columns, rows = columns[inside], rows[inside]
     else:
         columns, rows = split_ids(only)
-    crs, along = objects.crs, plan.box(tile, plan.street_reach + MARGIN_M)
+    read = partial(read_surroundings, crs=objects.crs)
+    footprints = streets = None
+    if plan.buildings is not None:
+        footprints = footprints_around(
+            lambda box: read(plan.buildings, role="buildings", box=box), around
+        )
+    if plan.streets is not None:
+        box = plan.box(tile, plan.street_reach + MARGIN_M)
+        streets = read(plan.streets, role="streets", box=box)
     return build_cells(
         objects,
         columns,
@@ -473,54 +490,40 @@ def tile_cells(
         grid=plan.grid,
         spec=plan.spec,
         viewpoints=plan.viewpoints,
-        footprints=None if plan.buildings is None else _footprints(plan.buildings, around, crs),
-        streets=None
-        if plan.streets is None
-        else read_surroundings(plan.streets, role="streets", crs=crs, box=along),
+        footprints=footprints,
+        streets=streets,
         partial=True,
     )
 
 
-def save_tile(plan: TilePlan, tile: Tile, database: SignatureDatabase | None) -> Part | None:
-    """Save the part of one tile, or note that it has none."""
+def save_tile(plan: TilePlan, tile: Tile, database: SignatureDatabase | None) -> PartFile | None:
+    """Save the part of one tile, or an empty marker file if it has no cells."""
     path = plan.folder / part_name(tile)
     if database is None or not len(database):
         path.with_suffix(EMPTY).touch()
         return None
     save_database(database, path)
-    return describe(tile, database, path)
+    return describe_part(tile, database, path)
 
 
-def _footprints(path: Path, box: Box, crs: CRS) -> gpd.GeoDataFrame:
-    """Return the footprints that meet a box, and all neighbours of those that do."""
-    near = read_surroundings(path, role="buildings", crs=crs, box=box)
-    if len(near):
-        low, high = near.total_bounds[:2], near.total_bounds[2:]
-        around = (*(np.minimum(low, box[:2]) - MARGIN_M), *(np.maximum(high, box[2:]) + MARGIN_M))
-        near = read_surroundings(path, role="buildings", crs=crs, box=around)
-    # Flat ones are left out there too, but a tile may have no others.
-    flat = shapely.area(near.geometry.to_numpy()) == 0
-    flat[flat] = shapely.area(shapely.make_valid(near.geometry.to_numpy()[flat])) == 0
-    return near[~flat]
+def begin_run(out: str | Path, recipe: dict[str, Any]) -> Path:
+    """Begin a run or resume an unfinished one, and return its folder: `out` with ``.partial``.
 
-
-def begin(out: str | Path, recipe: dict[str, Any]) -> Path:
-    """Begin a run, or take up an unfinished one, and return its folder: `out` with ``.partial``.
-
-    Raise InputError if `out` holds something that may not be replaced, or the folder tiles of an
-    unfinished run by another recipe, which are never thrown away unasked.
+    Raise InputError if `out` may not be replaced, or the folder has tiles of an unfinished run with
+    another recipe, which are never deleted without a request.
     """
     target, folder = Path(os.path.realpath(out)), partial_folder(out)
     _require_replaceable(target)
-    if (target / RECIPE).exists():  # of a run that was killed at the very end
-        shutil.rmtree(folder, ignore_errors=True)  # which holds what it had replaced
+    # A run was killed after it had exchanged the folders; the partial one has the old database.
+    if (target / RECIPE).exists():
+        shutil.rmtree(folder, ignore_errors=True)
         (target / RECIPE).unlink()
     RUN.begin(folder, recipe)
     return folder
 
 
 def _require_replaceable(target: Path) -> None:
-    """Refuse to put a database in the place of anything but a database."""
+    """Raise InputError if a path is neither free nor a database or a file."""
     if not target.is_dir():
         if target.exists() and not target.is_file():
             raise InputError(f"{target} is a device or a pipe; give the name of a folder to write.")
@@ -535,31 +538,31 @@ def _require_replaceable(target: Path) -> None:
         )
 
 
-def describe(tile: Tile, database: SignatureDatabase, path: Path) -> Part:
-    """Return the manifest's entry for a part that was saved to a path."""
-    return Part(tile, len(database), len(database.codes), path.stat().st_size, digest(path))
+def describe_part(tile: Tile, database: SignatureDatabase, path: Path) -> PartFile:
+    """Return the entry in the manifest of a saved part."""
+    return PartFile(tile, len(database), len(database.codes), path.stat().st_size, digest(path))
 
 
-def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, Part | None]:
-    """Return the parts of the tiles that are done, None where no cell sees anything.
+def finished_tiles(folder: Path, tiles: Iterable[Tile]) -> dict[Tile, PartFile | None]:
+    """Return the parts of the finished tiles, None for tiles without cells.
 
-    A damaged file is deleted, and its tile is not done.
+    A damaged file is deleted; its tile must be built again.
     """
-    done: dict[Tile, Part | None] = {}
+    parts: dict[Tile, PartFile | None] = {}
     for tile in tiles:
         path = folder / part_name(tile)
         if path.with_suffix(EMPTY).exists():
-            done[tile] = None
+            parts[tile] = None
         elif path.exists():
             try:
-                done[tile] = describe(tile, open_database(path), path)
+                parts[tile] = describe_part(tile, open_database(path), path)
             except DatabaseError:
                 path.unlink()
-    return done
+    return parts
 
 
-def publish(folder: Path, parts: Sequence[Part]) -> Manifest:
-    """Put a database whose tiles are all done, ordered by tile, in the place of another."""
+def publish_tiles(folder: Path, parts: Sequence[PartFile]) -> Manifest:
+    """Move a finished database to its final folder and replace it; parts are ordered by tile."""
     manifest = Manifest(read_json(folder / RECIPE), tuple(parts))
     _require_replaceable(folder.with_name(folder.name.removesuffix(PARTIAL)))
     manifest.write(folder)

@@ -1,4 +1,4 @@
-"""Updating a signature database: only the cells that see a changed object are computed again."""
+"""Update a signature database: recompute only the cells in range of a changed object."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ from semsig_gis.database.file import (
 from semsig_gis.database.occlusion import TOUCHING_M, buildings_near
 from semsig_gis.database.sightings import measure_sightings
 from semsig_gis.database.store import save_with_store, stored_inputs
-from semsig_gis.database.tile_inputs import folder_beside
+from semsig_gis.database.tile_inputs import working_folder
 from semsig_gis.database.tiles import (
     TileSpec,
     build_parts,
     plan_tiles,
-    publish,
+    publish_tiles,
     save_tile,
     tile_cells,
 )
@@ -60,26 +60,25 @@ from semsig_gis.objects import (
 from semsig_gis.storage import read_json, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
     from semsig_gis.database.database import SignatureDatabase
-    from semsig_gis.database.file import Part
+    from semsig_gis.database.file import PartFile
     from semsig_gis.database.store import ObjectStore
     from semsig_gis.database.tiles import Tile, TilePlan
-    from semsig_gis.objects import ClassChange, ObjectChanges, StreetObjects
-
-    _Cells = tuple[NDArray[np.int64], NDArray[np.int64]]  # columns and rows
+    from semsig_gis.objects import ClassChange, StreetObjects
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class UpdateReport(Displayed):
-    """How far a city has drifted.
+    """Counts of the changes by an update.
 
-    `replaced` layers were loaded anew, `kept` ones were not. Of the cells, `recomputed` ones lie
-    within range of a change, seen or not; `changed` ones have another signature; `appeared` ones
-    see something for the first time, and `vanished` ones nothing any more.
+    `replaced` and `kept` are the names of the layers that were loaded again and of the others.
+    `recomputed` counts the cells in range of a changed object, visible or not. `changed` cells have
+    another signature, `appeared` cells had no visible object before, and `vanished` cells have none
+    now.
     """
 
     classes: tuple[ClassChange, ...]
@@ -105,7 +104,7 @@ class UpdateReport(Displayed):
 
     @property
     def share(self) -> float:
-        """Share of all cells, before or after, that are not what they were."""
+        """Share of the cells before or after that changed, appeared or vanished."""
         drifted = self.changed + self.appeared + self.vanished
         return drifted / (self.cells_before + self.appeared)
 
@@ -116,11 +115,11 @@ class UpdateReport(Displayed):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellChanges:
-    """Which cells of two databases of one city see what they saw.
+    """Cells of two databases of one city with equal and with different signatures.
 
-    `same` and `changed`, shape (n, 2), are rows in the old and in the new database of cells whose
-    signatures are equal, or differ in classes, bearings or distances. `vanished` and `appeared`,
-    shape (n,), are the other rows of the old and of the new database.
+    `same` and `changed`, shape (n, 2), are pairs of rows in the old and in the new database; the
+    changed ones differ in classes, bearings or distances. `vanished` and `appeared`, shape (n,),
+    are the other rows of the old and of the new database.
     """
 
     same: NDArray[np.int64]
@@ -130,27 +129,28 @@ class CellChanges:
 
 
 def compare_cells(before: SignatureDatabase, after: SignatureDatabase) -> CellChanges:
-    """Compare the cells of two databases of one city, those of each kind in their order.
+    """Compare the cells of two databases of one city; each group of rows is ascending.
 
-    Raise DatabaseError if the databases were not made in the same way.
+    Raise DatabaseError if the databases were not built in the same way.
     """
     require_same(before, after, classes=False)
-    _, first, second = np.intersect1d(
+    _, old_rows, new_rows = np.intersect1d(
         before.cell_ids, after.cell_ids, assume_unique=True, return_indices=True
     )
-    differs = before.lengths[first] != after.lengths[second]
-    alike = np.flatnonzero(~differs)
-    one, other = before.select(first[alike]), after.select(second[alike])
-    entry_differs = np.zeros(len(one.codes), bool)
+    differs = before.lengths[old_rows] != after.lengths[new_rows]
+    # Only signatures of equal length can be compared entry by entry.
+    comparable = np.flatnonzero(~differs)
+    old, new = before.select(old_rows[comparable]), after.select(new_rows[comparable])
+    entry_differs = np.zeros(len(old.codes), bool)
     for name in ENTRY_ARRAYS:
-        entry_differs |= getattr(one, name) != getattr(other, name)
-    differs[np.repeat(alike, one.lengths)[entry_differs]] = True
-    common = np.stack([first, second], axis=1)
+        entry_differs |= getattr(old, name) != getattr(new, name)
+    differs[np.repeat(comparable, old.lengths)[entry_differs]] = True
+    common = np.stack([old_rows, new_rows], axis=1)
     return CellChanges(
         same=common[~differs],
         changed=common[differs],
-        vanished=np.setdiff1d(np.arange(len(before)), first, assume_unique=True),
-        appeared=np.setdiff1d(np.arange(len(after)), second, assume_unique=True),
+        vanished=np.setdiff1d(np.arange(len(before)), old_rows, assume_unique=True),
+        appeared=np.setdiff1d(np.arange(len(after)), new_rows, assume_unique=True),
     )
 
 
@@ -161,18 +161,18 @@ def update_file(
     out: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> UpdateReport:
-    """Update the file of a database, and the object store beside it.
+    """Update the file of a database and its object store.
 
     Parameters
     ----------
     path : str or Path
         File of the database.
     objects : StreetObjects
-        The layers that were loaded anew, whole.
+        The layers to replace, complete.
     out : str or Path, optional
-        Another file to write to; `path` itself by default.
+        Another file to write; `path` by default.
     progress : callable, optional
-        Called with the number of cells done and in all.
+        Called with the number of finished cells and of all cells.
 
     Returns
     -------
@@ -182,8 +182,8 @@ def update_file(
     Raises
     ------
     DatabaseError, InputError, CrsError, EmptyResultError
-        As `update_database` does, or if the files cannot be read or written; nothing has changed
-        then.
+        As in `update_database`, or if the files cannot be read or written; then nothing is
+        changed.
 
     Examples
     --------
@@ -210,29 +210,29 @@ def update_database(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[SignatureDatabase, ObjectStore, UpdateReport]:
-    """Replace layers of a database, and compute again what the changes are seen from.
+    """Replace layers of a database, and recompute the cells in range of a change.
 
     Parameters
     ----------
     database, store : SignatureDatabase, ObjectStore
-        The database, and what it was built from.
+        The database and its object store.
     objects : StreetObjects
-        The layers that were loaded anew, whole; other layers stay as they are.
+        The layers to replace, complete; other layers are kept.
     progress : callable, optional
-        Called with the number of cells done and in all.
+        Called with the number of finished cells and of all cells.
 
     Returns
     -------
     database, store : SignatureDatabase, ObjectStore
-        All objects as they are now, and what `build_database` would make of them.
+        The database that `build_database` would make of all objects, and its object store.
     report : UpdateReport
         What changed.
 
     Raises
     ------
     InputError
-        If the new objects use a class code for something else, or one of their classes is seen
-        from further away than all classes before.
+        If the new objects use a class code for another class, or one of their classes has a
+        larger visibility range than all classes of the database.
     CrsError
         If the new objects are in another CRS.
     DatabaseError
@@ -258,46 +258,36 @@ def update_database(
             f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
             "build the database again."
         )
-    merged, kept, notes = replace_layers(store.objects, objects)
-    along = store.streets if database.viewpoints.mode == "streets" else None
-    licenses = (*map(str, merged.licenses), *licenses_of(store.footprints, along))
+    merged, kept_layers, notes = replace_layers(store.objects, objects)
+    streets = store.streets if database.viewpoints.mode == "streets" else None
     new = replace(
         database,
         taxonomy=merged.taxonomy,
-        licenses=licenses,
+        licenses=(*map(str, merged.licenses), *licenses_of(store.footprints, streets)),
         version=__version__,
         notes=merged.notes,
     )
-    if new.reach > database.reach:  # the unit in which all distances are stored
+    if new.reach > database.reach:  # the unit of all stored distances
         furthest = max(new.taxonomy.classes, key=lambda item: item.range_m or 0.0)
         raise InputError(
             f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
             f"database ({database.reach:g} m), which affects every cell; build the database again."
         )
-    changes = compare_objects(store.objects, merged)
-    places, codes = _changed_places(store.objects, merged, changes)
-    cells = _cells_in_range(new, places, codes)
+    change = _find_change(new, store.objects, merged)
     after = replace(store, objects=merged)
-    stale = np.isin(database.cell_ids, cell_ids(*cells))
-    fresh = _recomputed(new, after, places, cells, progress=progress)
-    updated = join_databases([new.select(~stale), fresh])
+    stale = np.isin(database.cell_ids, change.cell_ids)
+    recomputed = _recompute(new, after, change, progress=progress)
+    updated = join_databases([new.select(~stale), recomputed])
     if len(updated) == 0:
         raise EmptyResultError(
             f"no cell would see any of the {len(merged):,} objects; check the new objects."
         )
-    layers = _layers(store.objects) | _layers(merged)
-    drifted = compare_cells(database.select(stale), fresh)
-    report = UpdateReport(
-        classes=changes.classes,
-        replaced=tuple(sorted(layers - set(kept))),
-        kept=kept,
+    report = change.report(
+        kept_layers,
+        notes,
         cells_before=len(database),
         cells=len(updated),
-        recomputed=len(cells[0]),
-        changed=len(drifted.changed),
-        appeared=len(drifted.appeared),
-        vanished=len(drifted.vanished),
-        notes=notes,
+        drift=_count_drift(database.select(stale), recomputed),
     )
     return updated, after, report
 
@@ -311,36 +301,36 @@ def update_tiles(
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> UpdateReport:
-    """Update a database in tiles: in each, the cells that a change is seen from.
+    """Update a database in tiles: recompute the cells in range of a change.
 
     Parameters
     ----------
     path : str or Path
         Folder of the database.
     objects : str or Path
-        The layers that were loaded anew, whole, as `save_objects` wrote them.
+        The layers to replace, complete, as `save_objects` wrote them.
     out : str or Path, optional
-        Another folder to write to; `path` itself by default.
+        Another folder to write; `path` by default.
     workers, scheduler : optional
         As in `build_tiles`.
     progress : callable, optional
-        Called with the number of tiles done and in all.
+        Called with the number of finished tiles and of all tiles.
 
     Returns
     -------
     UpdateReport
-        What changed. The folder holds what `build_tiles` would make of the new objects, byte for
-        byte.
+        What changed. The files are byte for byte equal to the result of `build_tiles` with the new
+        objects.
 
     Raises
     ------
     InputError
-        If the new objects use a class code for something else or are seen from another longest
-        distance.
+        If the new objects use a class code for another class or have another largest visibility
+        range.
     CrsError
         If the new objects are in another CRS.
     DatabaseError, EmptyResultError
-        As `build_tiles` does, or if the database holds no street objects; it is as it was then.
+        As in `build_tiles`, or if the database has no street objects; then nothing is changed.
 
     Examples
     --------
@@ -359,87 +349,166 @@ def update_tiles(
     check_workers(workers, scheduler)
     folder, manifest = Path(path), read_manifest(path)
     files = dict(zip((part.tile for part in manifest.parts), part_files(path), strict=True))
-    first = open_database(next(iter(files.values()))).select(slice(0))
+    before = open_database(next(iter(files.values()))).select(slice(0))
     inputs = stored_inputs(folder)
     old, new = open_objects(inputs.pop("objects")), open_objects(objects)
-    joined, kept, notes = replace_layers(old, new)
-    now = joined if kept else new
+    merged, kept_layers, notes = replace_layers(old, new)
+    result = merged if kept_layers else new
     facts: dict[str, Any] = {
-        "taxonomy": now.taxonomy,
-        "licenses": (*map(str, now.licenses), *first.licenses[len(old.licenses) :]),
+        "taxonomy": result.taxonomy,
+        "licenses": (*map(str, result.licenses), *before.licenses[len(old.licenses) :]),
         "version": __version__,
-        "notes": now.notes,
+        "notes": result.notes,
     }
-    after = replace(first, **facts)
-    if after.reach != first.reach:  # the unit in which all distances are stored
+    after = replace(before, **facts)
+    if after.reach != before.reach:  # the unit of all stored distances
         raise InputError(
             f"the longest visibility range of {objects} is {after.reach:g} m and that of {path} "
-            f"{first.reach:g} m, which affects every cell; build the database again."
+            f"{before.reach:g} m, which affects every cell; build the database again."
         )
-    changes = compare_objects(old, joined)
-    places, codes = _changed_places(old, joined, changes)
-    cells = _cells_in_range(replace(after, taxonomy=joined.taxonomy), places, codes)
+    change = _find_change(replace(after, taxonomy=merged.taxonomy), old, merged)
     side = int(manifest.recipe["tile"]["cells"])
-    numbers = np.unique(np.stack([cells[0] // side, cells[1] // side], axis=1), axis=0)
-    stale: set[Tile] = {(column, row) for column, row in numbers.tolist()}
+    tiles = np.unique(np.stack(split_ids(change.cell_ids), axis=1) // side, axis=0)
+    stale: set[Tile] = {(column, row) for column, row in tiles.tolist()}
     target = Path(path if out is None else out)
-    with folder_beside(target) as beside:
+    with working_folder(target) as work:
         source = Path(objects)
-        if kept:
-            source = beside / "objects.parquet"
-            save_objects(joined, source)
+        if kept_layers:
+            source = work / "objects.parquet"
+            save_objects(merged, source)
         plan = plan_tiles(
             source,
             target,
-            tile=TileSpec(min(max(side * first.grid.step, 1.0), MOST_METRES)),
-            grid=first.grid,
-            spec=first.spec,
-            viewpoints=first.viewpoints,
+            tile=TileSpec(min(max(side * before.grid.step, 1.0), MOST_METRES)),
+            grid=before.grid,
+            spec=before.spec,
+            viewpoints=before.viewpoints,
             buildings=inputs.get("buildings"),
             streets=inputs.get("streets"),
             digests={name: manifest.recipe["inputs"][name] for name in inputs},
         )
-        old_parts: dict[Tile, Part] = {}
-        if database_specs(after) == database_specs(first) and not open_city(path).has_columns:
-            old_parts = {part.tile: part for part in manifest.parts if part.tile not in stale}
-        for tile, part in old_parts.items():
+        # If the facts of all parts stay the same, the tiles without a change are copied.
+        copies: dict[Tile, PartFile] = {}
+        if database_specs(after) == database_specs(before) and not open_city(path).has_columns:
+            copies = {part.tile: part for part in manifest.parts if part.tile not in stale}
+        for tile, part in copies.items():
             shutil.copyfile(files[tile], plan.folder / part.file)
         old_tiles = _OldTiles(folder, plan.folder / INPUTS / "stale.npy", facts)
-        np.save(old_tiles.stale, cell_ids(*cells))
+        np.save(old_tiles.stale, change.cell_ids)
         parts = build_parts(
             plan,
             source,
-            work=partial(update_tile, plan, old_tiles),
-            old_parts=old_parts,
-            share=len(cells[0]) / manifest.cells,
+            build=partial(update_tile, plan, old_tiles),
+            copies=copies,
+            share=len(change.cell_ids) / manifest.cells,
             workers=workers,
             scheduler=scheduler,
             progress=progress,
             tell=None,
         )
-        drift = _drift(plan, old_tiles, stale)
+        drift = _total_drift(plan, old_tiles, stale)
         old_tiles.stale.unlink()
-        publish(plan.folder, parts)
-    return UpdateReport(
-        classes=changes.classes,
-        replaced=tuple(sorted((_layers(old) | _layers(new)) - set(kept))),
-        kept=kept,
+        publish_tiles(plan.folder, parts)
+    return change.report(
+        kept_layers,
+        notes,
         cells_before=manifest.cells,
         cells=sum(part.cells for part in parts),
-        recomputed=len(cells[0]),
-        changed=drift["changed"],
-        appeared=drift["appeared"],
-        vanished=drift["vanished"],
-        notes=notes,
+        drift=drift,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """The difference between the objects of a database and the new objects.
+
+    `places`, shape (c, 2) in metres, are the positions of removed and added objects; `cell_ids`,
+    ascending, are the cells in range of one. `layers` are the layers of the old and new objects.
+    """
+
+    classes: tuple[ClassChange, ...]
+    layers: set[str]
+    places: NDArray[np.float64]
+    cell_ids: NDArray[np.int64]
+
+    def report(
+        self,
+        kept_layers: tuple[str, ...],
+        notes: tuple[str, ...],
+        *,
+        cells_before: int,
+        cells: int,
+        drift: Mapping[str, int],
+    ) -> UpdateReport:
+        """Return the report of an update, from the kept layers and the counts of cells."""
+        return UpdateReport(
+            classes=self.classes,
+            replaced=tuple(sorted(self.layers - set(kept_layers))),
+            kept=kept_layers,
+            cells_before=cells_before,
+            cells=cells,
+            recomputed=len(self.cell_ids),
+            changed=drift["changed"],
+            appeared=drift["appeared"],
+            vanished=drift["vanished"],
+            notes=notes,
+        )
+
+
+def _find_change(database: SignatureDatabase, old: StreetObjects, new: StreetObjects) -> _Change:
+    """Compare objects, and find the cells in range of a change; ranges are of the `database`."""
+    changes = compare_objects(old, new)
+    places = np.concatenate([old.xy[changes.obsolete_rows], new.xy[changes.new_rows]])
+    ids = np.empty(0, np.int64)
+    if len(places):
+        codes = np.concatenate([old.codes[changes.obsolete_rows], new.codes[changes.new_rows]])
+        ranges = database.taxonomy.ranges(database.spec.radius)[codes]
+        reach = float(ranges.max())
+        columns, rows = cells_near(places, grid=database.grid, radius=reach)
+        viewpoints = database.grid.viewpoints(columns, rows)
+        pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
+        near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
+        ids = cell_ids(columns[near], rows[near])
+    layers = {*old.table[SOURCE].unique(), *new.table[SOURCE].unique()}
+    return _Change(changes.classes, layers, places, ids)
+
+
+def _recompute(
+    database: SignatureDatabase,
+    store: ObjectStore,
+    change: _Change,
+    *,
+    progress: Callable[[int, int], None] | None,
+) -> SignatureDatabase:
+    """Return the cells in range of a change, computed from the objects of a store."""
+    # A viewpoint is at most the reach from a change, and its objects are that far from it again.
+    around = 2.0 * database.reach + TOUCHING_M
+    near = np.unique(store.index.pairs_within(change.places, radius=around)[1])
+    if len(near) == 0:
+        return database.select(slice(0))
+    footprints = store.footprints
+    if footprints is not None:
+        polygons = footprints.geometry.to_numpy()
+        footprints = footprints.iloc[buildings_near(polygons, change.places, distance=around)]
+    return build_cells(
+        replace(store.objects, table=store.objects.table.iloc[near]),
+        *split_ids(change.cell_ids),
+        grid=database.grid,
+        spec=database.spec,
+        viewpoints=database.viewpoints,
+        footprints=footprints,
+        streets=store.streets,
+        partial=True,
+        progress=progress,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _OldTiles:
-    """The tiles that an update begins with.
+    """The tiles before an update.
 
-    `stale` is the file of the numbers of the cells that a change is seen from, in their order, and
-    `facts` are what is said of the whole database from now on.
+    `stale` is a file with the ids of the cells in range of a change, ascending; `facts` are the new
+    values of the attributes of the whole database.
     """
 
     folder: Path
@@ -452,28 +521,28 @@ class _OldTiles:
         return open_database(path) if path.exists() else None
 
     def stale_in(self, tile: Tile, side: int) -> NDArray[np.int64]:
-        """Return the numbers of the cells of a tile that a change is seen from."""
+        """Return the ids of the cells of a tile in range of a change."""
         ids = np.load(self.stale, mmap_mode="r")
+        # The ids are ordered by column, so the columns of the tile are one slice.
         ends = cell_ids(np.array([tile[0], tile[0] + 1]) * side, np.full(2, -ROW_SPAN // 2))
         first, last = np.searchsorted(ids, ends)
-        inside: NDArray[np.int64] = np.array(ids[first:last])
-        rows = split_ids(inside)[1]
-        mine: NDArray[np.int64] = inside[rows // side == tile[1]]
-        return mine
+        in_columns: NDArray[np.int64] = np.array(ids[first:last])
+        inside: NDArray[np.bool_] = split_ids(in_columns)[1] // side == tile[1]
+        return in_columns[inside]
 
 
-def update_tile(plan: TilePlan, old: _OldTiles, tile: Tile) -> Part | None:
-    """Build the part of a tile from that of before and the cells that a change is seen from."""
+def update_tile(plan: TilePlan, old: _OldTiles, tile: Tile) -> PartFile | None:
+    """Build the part of a tile from its old cells and the recomputed ones."""
     stale, before = old.stale_in(tile, plan.side), old.database(tile)
-    fresh = tile_cells(plan, tile, only=stale) if len(stale) else None
-    parts = [] if fresh is None else [fresh]
-    was = None
+    recomputed = tile_cells(plan, tile, only=stale) if len(stale) else None
+    parts = [] if recomputed is None else [recomputed]
+    replaced = None
     if before is not None:
-        changes = np.isin(before.cell_ids, stale)
-        was = before.select(changes)
-        parts.append(replace(before.select(~changes), **old.facts))
+        mask = np.isin(before.cell_ids, stale)
+        replaced = before.select(mask)
+        parts.append(replace(before.select(~mask), **old.facts))
     if len(stale):
-        write_json(_drift_path(plan, tile), _cell_drift(was, fresh))
+        write_json(_drift_path(plan, tile), _count_drift(replaced, recomputed))
     joined = replace(join_databases(parts), **old.facts) if parts else None
     return save_tile(plan, tile, joined)
 
@@ -482,12 +551,13 @@ def _drift_path(plan: TilePlan, tile: Tile) -> Path:
     return (plan.folder / part_name(tile)).with_suffix(".drift")
 
 
-def _cell_drift(
+def _count_drift(
     before: SignatureDatabase | None, after: SignatureDatabase | None
 ) -> dict[str, int]:
-    """Count the cells that changed, appeared and vanished."""
+    """Return the number of cells that changed, appeared and vanished; None is no cells."""
     if before is None or after is None:
         return {
+            "changed": 0,
             "appeared": 0 if after is None else len(after),
             "vanished": 0 if before is None else len(before),
         }
@@ -499,75 +569,17 @@ def _cell_drift(
     }
 
 
-def _drift(plan: TilePlan, old: _OldTiles, stale: set[Tile]) -> Counter[str]:
-    """Count the cells that changed, appeared and vanished in all tiles.
+def _total_drift(plan: TilePlan, old: _OldTiles, stale: set[Tile]) -> Counter[str]:
+    """Return the number of cells that changed, appeared and vanished in all stale tiles.
 
-    Those that an interrupted build has left, and those without any object now, are compared here.
+    Tiles without counts (built by an interrupted run, or without objects now) are compared here.
     """
-    drift: Counter[str] = Counter()
+    total: Counter[str] = Counter()
     for tile in stale:
-        noted, part = _drift_path(plan, tile), plan.folder / part_name(tile)
-        if noted.exists():
-            drift.update(read_json(noted))
+        counts, part = _drift_path(plan, tile), plan.folder / part_name(tile)
+        if counts.exists():
+            total.update(read_json(counts))
         else:
-            now = open_database(part) if part.exists() else None
-            drift.update(_cell_drift(old.database(tile), now))
-    return drift
-
-
-def _layers(objects: StreetObjects) -> set[str]:
-    return set(objects.table[SOURCE].unique())
-
-
-def _changed_places(
-    old: StreetObjects, new: StreetObjects, changes: ObjectChanges
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Return where an object is gone or has come, shape (c, 2) in metres, and its class codes."""
-    places = np.concatenate([old.xy[changes.obsolete_rows], new.xy[changes.new_rows]])
-    return places, np.concatenate([old.codes[changes.obsolete_rows], new.codes[changes.new_rows]])
-
-
-def _cells_in_range(
-    database: SignatureDatabase, places: NDArray[np.float64], codes: NDArray[np.uint8]
-) -> _Cells:
-    """Return the cells that objects of some classes at some places may be seen from."""
-    if len(places) == 0:
-        return np.empty(0, np.int64), np.empty(0, np.int64)
-    ranges = database.taxonomy.ranges(database.spec.radius)[codes]
-    reach = float(ranges.max())
-    columns, rows = cells_near(places, grid=database.grid, radius=reach)
-    viewpoints = database.grid.viewpoints(columns, rows)
-    pairs = PackedIndex(places).pairs_within(viewpoints, radius=reach)
-    near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
-    return columns[near], rows[near]
-
-
-def _recomputed(
-    database: SignatureDatabase,
-    store: ObjectStore,
-    places: NDArray[np.float64],
-    cells: _Cells,
-    *,
-    progress: Callable[[int, int], None] | None,
-) -> SignatureDatabase:
-    """Return some cells around some places as they are now."""
-    # A viewpoint is at most the reach from a place, and all it looks at as far from it again.
-    around = 2.0 * database.reach + TOUCHING_M
-    near = np.unique(store.index.pairs_within(places, radius=around)[1])
-    if len(near) == 0:
-        return database.select(slice(0))
-    footprints = store.footprints
-    if footprints is not None:
-        polygons = footprints.geometry.to_numpy()
-        footprints = footprints.iloc[buildings_near(polygons, places, distance=around)]
-    return build_cells(
-        replace(store.objects, table=store.objects.table.iloc[near]),
-        *cells,
-        grid=database.grid,
-        spec=database.spec,
-        viewpoints=database.viewpoints,
-        footprints=footprints,
-        streets=store.streets,
-        partial=True,
-        progress=progress,
-    )
+            after = open_database(part) if part.exists() else None
+            total.update(_count_drift(old.database(tile), after))
+    return total

@@ -26,7 +26,7 @@ from semsig_gis.objects import save_objects
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-    from semsig_gis.database import Part, TilePlan
+    from semsig_gis.database import PartFile, TilePlan
 
 SIDE = 200.0
 CHECKOUT = Path(distributed.__file__).parents[2]
@@ -207,7 +207,7 @@ def test_a_tile_that_kills_its_workers_is_named_and_the_others_are_kept(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    def deadly(plan: TilePlan, tile: tuple[int, int]) -> Part | None:
+    def deadly(plan: TilePlan, tile: tuple[int, int]) -> PartFile | None:
         if tile == (3827, 31376):
             os.kill(os.getpid(), signal.SIGKILL)
         return build_tile(plan, tile)
@@ -228,7 +228,7 @@ def test_a_run_in_which_all_fails_ends_soon_and_leaves_nothing(
 ) -> None:
     tried = set()
 
-    def fail(_: TilePlan, tile: tuple[int, int]) -> Part | None:
+    def fail(_: TilePlan, tile: tuple[int, int]) -> PartFile | None:
         tried.add(tile)
         raise ValueError("nothing works")
 

@@ -21,8 +21,8 @@ from semsig_gis.database import (
     INPUTS,
     MANIFEST,
     Manifest,
-    Part,
-    describe,
+    PartFile,
+    describe_part,
     digest,
     open_database,
     open_dataset,
@@ -229,18 +229,18 @@ def test_the_manifest_tells_what_is_there_and_how_it_was_built(
     assert manifest.entries == len(database.codes)
     for part in manifest.parts:
         file = parts / part.file
-        assert part == describe(part.tile, open_database(file), file)
+        assert part == describe_part(part.tile, open_database(file), file)
 
 
 NUMBERS = st.integers(-(10**6), 10**6)
 SIZES = st.integers(1, 10**9)
 DIGESTS = st.text("0123456789abcdef", min_size=64, max_size=64)
-PARTS = st.builds(Part, st.tuples(NUMBERS, NUMBERS), SIZES, SIZES, SIZES, DIGESTS)
+PARTS = st.builds(PartFile, st.tuples(NUMBERS, NUMBERS), SIZES, SIZES, SIZES, DIGESTS)
 
 
 @given(st.lists(PARTS, unique_by=lambda part: part.tile))
 def test_a_manifest_is_read_as_it_was_written(
-    tmp_path_factory: pytest.TempPathFactory, parts: list[Part]
+    tmp_path_factory: pytest.TempPathFactory, parts: list[PartFile]
 ) -> None:
     folder = tmp_path_factory.mktemp("manifest")
     manifest = Manifest({"grid": {"step": 10.0}}, tuple(sorted(parts)))
@@ -292,7 +292,7 @@ def test_parts_that_do_not_fit_each_other_are_refused(town: World, parts: Path) 
         (open_database(parts / first.file), "the same cell"),
     ):
         save_database(database, file)
-        replaced = describe(second.tile, database, file)
+        replaced = describe_part(second.tile, database, file)
         Manifest(manifest.recipe, (first, replaced, *others)).write(parts)
         with refused(DatabaseError, word):
             open_database(parts)

@@ -33,15 +33,15 @@ from semsig_gis.database import (
     Footprints,
     TileSpec,
     ViewpointSpec,
-    begin,
+    begin_run,
     build_database,
     build_tiles,
-    describe,
+    describe_part,
     finished_tiles,
     open_database,
     part_name,
     plan_tiles,
-    publish,
+    publish_tiles,
     save_database,
     tiles,
     touched_tiles,
@@ -50,7 +50,7 @@ from semsig_gis.objects import open_objects, read_surroundings, save_objects, sa
 
 if TYPE_CHECKING:
     from semsig_gis.core import SemsigError
-    from semsig_gis.database import Part, SignatureDatabase, TilePlan, ViewpointMode
+    from semsig_gis.database import PartFile, SignatureDatabase, TilePlan, ViewpointMode
 
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:
@@ -295,17 +295,17 @@ def test_a_run_knows_its_inputs_by_their_content(objects_file: Path, tmp_path: P
 RECIPE = {"grid": {"step": 10.0, "origin": (0.0, 0.0)}, "inputs": {"objects": "abc"}}
 
 
-def build(folder: Path, database: SignatureDatabase) -> Part:
+def build(folder: Path, database: SignatureDatabase) -> PartFile:
     path = folder / part_name((0, 0))
     save_database(database, path)
     (folder / part_name((0, 1))).with_suffix(".empty").touch()
-    return describe((0, 0), database, path)
+    return describe_part((0, 0), database, path)
 
 
 def test_tiles_that_are_done_are_found_and_damaged_ones_built_again(
     database: SignatureDatabase, tmp_path: Path
 ) -> None:
-    folder = begin(tmp_path / "new" / "city", RECIPE)
+    folder = begin_run(tmp_path / "new" / "city", RECIPE)
     part = build(folder, database)
     assert finished_tiles(folder, [(0, 0), (0, 1), (7, 7)]) == {(0, 0): part, (0, 1): None}
     path = folder / part_name((0, 0))
@@ -325,11 +325,11 @@ def test_a_database_appears_whole_and_replaces_what_was_there(
         (target, database.select(slice(20))),
         (link, database),
     ):
-        folder = begin(place, RECIPE)
+        folder = begin_run(place, RECIPE)
         parts = [build(folder, cells)]
         (folder / "_inputs").mkdir()
         (folder / "_inputs" / "buildings.parquet").touch()
-        assert publish(folder, parts).cells == len(cells)
+        assert publish_tiles(folder, parts).cells == len(cells)
         names = {MANIFEST, "_inputs", part_name((0, 0))}
         assert {path.name for path in target.iterdir()} == names
         assert len(open_database(target)) == len(cells)
@@ -342,22 +342,22 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
     target.mkdir()
     (target / "letter.txt").touch()
     with refused(InputError, "'letter.txt'", "not part of a signature database"):
-        begin(target, RECIPE)
+        begin_run(target, RECIPE)
     (target / "letter.txt").unlink()
-    folder = begin(target, RECIPE)
-    publish(folder, [build(folder, database)])
+    folder = begin_run(target, RECIPE)
+    publish_tiles(folder, [build(folder, database)])
     (target / "notes.txt").touch()  # beside the parts
     with refused(InputError, "'notes.txt'", "move that file elsewhere"):
-        begin(target, RECIPE)
+        begin_run(target, RECIPE)
     assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0)), "notes.txt"}
     (tmp_path / "city.partial").mkdir()
     (tmp_path / "city.partial" / "letter.txt").touch()
     with refused(InputError, "city.partial", "'letter.txt'", "no unfinished run"):
-        begin(tmp_path / "city", RECIPE)
+        begin_run(tmp_path / "city", RECIPE)
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
         with refused(InputError, "is a device or a pipe"):
-            begin(tmp_path / "pipe", RECIPE)
+            begin_run(tmp_path / "pipe", RECIPE)
 
 
 def test_tiles_that_the_memory_does_not_hold_are_not_begun(
@@ -378,9 +378,9 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
     database: SignatureDatabase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: int
 ) -> None:
     target, rename, calls = tmp_path / "city", Path.rename, []
-    folder = begin(target, RECIPE)
-    publish(folder, [build(folder, database)])
-    folder = begin(target, RECIPE)
+    folder = begin_run(target, RECIPE)
+    publish_tiles(folder, [build(folder, database)])
+    folder = begin_run(target, RECIPE)
     part = build(folder, database.select(slice(20)))
 
     def refuse(self: Path, to: Path) -> Path:
@@ -393,10 +393,10 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
         patch.setattr("semsig_gis.storage.whole.exchange", lambda *_: False)
         patch.setattr(Path, "rename", refuse)
         with refused(InputError, str(target), "Permission denied", "run the same command again"):
-            publish(folder, [part])
+            publish_tiles(folder, [part])
     assert_same(open_database(target), database)
     # As the same command does.
-    assert finished_tiles(begin(target, RECIPE), [(0, 0)]) == {(0, 0): part}
-    publish(folder, [part])
+    assert finished_tiles(begin_run(target, RECIPE), [(0, 0)]) == {(0, 0): part}
+    publish_tiles(folder, [part])
     assert len(open_database(target)) == 20
     assert [path.name for path in tmp_path.iterdir()] == ["city"]
