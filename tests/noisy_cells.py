@@ -43,7 +43,7 @@ NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
 def random_database(
     seed: int, *, cells: int = 40, longest: int = 12, classes: int = 4
 ) -> SignatureDatabase:
-    """Return cells with one to so many random objects of the first classes."""
+    """Return cells with random objects of the first classes, from one to the given number."""
     rng = np.random.default_rng(seed)
     lengths = rng.integers(1, longest + 1, cells)
     entries = int(lengths.sum())
@@ -69,7 +69,7 @@ def random_database(
 def database_of(
     signatures: Sequence[tuple[str, Sequence[float]]], *, height: int = 1
 ) -> SignatureDatabase:
-    """Return cells with these types and bearings, in columns of so many cells."""
+    """Return cells with these types and bearings, in columns of `height` cells."""
     bearings = np.array([angle for _, angles in signatures for angle in angles], dtype=float)
     columns, rows = np.divmod(np.arange(len(signatures), dtype=np.int32), np.int32(height))
     return SignatureDatabase(
@@ -87,7 +87,7 @@ def database_of(
     )
 
 
-# Six cells: by type three DD, one DB, two B; by angle (levels) four alike, two alike.
+# Six cells: three DD, one DB and two B by type; four and two with equal angle levels.
 SIX = [
     ("DD", [10, 100]),
     ("DD", [10, 100]),
@@ -117,7 +117,7 @@ def cells_at(
     longest: int = 1,
     **facts: Any,  # noqa: ANN401
 ) -> SignatureDatabase:
-    """Return cells at places, each of which sees one object, or random numbers of them."""
+    """Return cells at places with one visible object each, or random numbers of them."""
     order = np.lexsort((rows, columns))
     lengths = np.random.default_rng(0).integers(1, longest + 1, len(order))
     objects = int(lengths.sum())
@@ -170,7 +170,7 @@ def distorted(database: SignatureDatabase, cell: int, rng: np.random.Generator) 
 
 
 def turned_query(query: Signature, turn: float) -> Signature:
-    """Return a query with so many degrees added to its bearings."""
+    """Return a query with `turn` degrees added to its bearings."""
     codes, bearings = parts_of(query)
     return Signature(codes, (bearings + turn) % 360.0)
 
@@ -191,8 +191,8 @@ def every_association(weights: np.ndarray) -> tuple[float, np.ndarray]:
     objects, detections = weights.shape
     total, chances = 0.0, np.zeros_like(weights)
     for choice in itertools.product(range(-1, detections), repeat=objects):
-        pairs = [(one, other) for one, other in enumerate(choice) if other >= 0]
-        if len(pairs) > len({other for _, other in pairs}):
+        pairs = [(item, detection) for item, detection in enumerate(choice) if detection >= 0]
+        if len(pairs) > len({detection for _, detection in pairs}):
             continue
         part = math.prod(weights[pair] for pair in pairs)
         total += part

@@ -82,9 +82,9 @@ def test_pages_become_one_layer_and_are_cached(
     assert (layer.table.crs, layer.errors, layer.notes) == ("EPSG:4326", (), ())
     assert len(download.files) == len(service.pages_asked()) == 3
     assert steps == [(2, 5), (4, 5), (5, 5)]
-    requests = len(service.server.seen)
+    requests = len(service.server.requests)
     again = fetched(service, spec=replace(quick, offline=True))
-    assert len(service.server.seen) == requests
+    assert len(service.server.requests) == requests
     assert ids(again.read()) == ids(layer)
 
 
