@@ -5,26 +5,45 @@ from __future__ import annotations
 import json
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import geopandas as gpd
+import shapely
 from machine import PATIENCE_S
 from pyproj import Transformer
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
+from small_city import chances_of
 
 from semsig_gis.core import Taxonomy
-from semsig_gis.maps import save_map
+from semsig_gis.database import ObjectStore, build_database
+from semsig_gis.localization import Method, build_index, localize, locate
+from semsig_gis.maps import (
+    ambiguity_map,
+    drift_map,
+    evaluation_map,
+    ground_map,
+    identifiability_map,
+    localization_map,
+    location_map,
+    objects_map,
+    save_map,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import folium
     from selenium.webdriver import Chrome
     from selenium.webdriver.remote.webelement import WebElement
 
     from semsig_gis.database import SignatureDatabase
+    from semsig_gis.evaluation import Evaluation
+    from semsig_gis.localization import Noise
+    from semsig_gis.objects import StreetObjects
 
 HOSTILE = (
     "<script>alert(1)</script><img src=x onerror=alert(1)>\"'`${alert(1)}`\\</script>"
@@ -234,6 +253,30 @@ def requested(browser: Chrome) -> list[str]:
         for event in events
         if event["method"] == "Network.requestWillBeSent"
     ]
+
+
+def maps_of(
+    city: SignatureDatabase, objects: StreetObjects, evaluation: Evaluation, noise: Noise
+) -> dict[str, Callable[..., folium.Map]]:
+    """Return a function for each map of a city."""
+    query = city.signature(0)
+    location = locate(
+        build_index(city, noise), query, top=5, explained=1, store=ObjectStore.of(objects)
+    )
+    localization = localize(city, query, top=5, method=Method())
+    later = replace(objects, table=objects.table[3:])
+    dates: dict[str, Any] = {"objects_before": objects, "objects_after": later}
+    house = shapely.box(*city.xy[0], *(city.xy[0] + 20))
+    return {
+        "evaluation": partial(evaluation_map, evaluation, city),
+        "localization": partial(localization_map, localization, city),
+        "location": partial(location_map, location),
+        "ambiguity": partial(ambiguity_map, city),
+        "identifiability": partial(identifiability_map, replace(chances_of(city), noise=noise)),
+        "drift": partial(drift_map, city, build_database(later), **dates),
+        "objects": partial(objects_map, objects),
+        "ground": partial(ground_map, buildings=gpd.GeoDataFrame(geometry=[house], crs=city.crs)),
+    }
 
 
 def hostile_taxonomy(taxonomy: Taxonomy, harm: str = HOSTILE) -> Taxonomy:

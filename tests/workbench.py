@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import http.client
+import io
 import json
 import struct
 import threading
@@ -12,6 +13,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from machine import PATIENCE_S
+from PIL import Image
+from PIL.ExifTags import IFD
 
 from semsig_gis.serve import make_server, open_listener
 
@@ -91,3 +94,29 @@ def decompression_bomb() -> bytes:
     header = struct.pack(">IIBBBBB", 30_000, 30_000, 8, 0, 0, 0, 0)
     data = zlib.compress(bytes(1_000_000))
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
+
+
+def picture(form: str = "JPEG", **sections: dict[int, Any]) -> bytes:
+    """Return a picture with EXIF tags in the sections ``image``, ``exif`` and ``gps``."""
+    exif = Image.Exif()
+    exif.update(sections.get("image", {}))
+    exif.get_ifd(IFD.Exif).update(sections.get("exif", {}))
+    exif.get_ifd(IFD.GPSInfo).update(sections.get("gps", {}))
+    content = io.BytesIO()
+    Image.new("RGB", (400, 300)).save(content, form, exif=exif)
+    return content.getvalue()
+
+
+def coco(name: str, size: tuple[int, int], *boxes: tuple[str, list[float], float]) -> str:
+    """Return boxes of benches and dogs in a photo (class, box, score) as a COCO file."""
+    labels = {"bench": 1, "dog": 2}
+    return json.dumps(
+        {
+            "images": [{"id": 1, "file_name": name, "width": size[0], "height": size[1]}],
+            "categories": [{"id": number, "name": label} for label, number in labels.items()],
+            "annotations": [
+                {"image_id": 1, "category_id": labels[label], "bbox": box, "score": score}
+                for label, box, score in boxes
+            ],
+        }
+    )

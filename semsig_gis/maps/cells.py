@@ -255,6 +255,7 @@ def ambiguity_map(
         identifiability.require_cells_of(database)
     page = start_map(map_, tiles, title="Cells that look the same")
     types, angles = database.type_sequences, database.angle_sequences
+    # Number the pairs of a type sequence and an angle sequence, and count the cells of each.
     pairs = types.inverse * len(angles) + angles.inverse
     _, pair, counts = np.unique(pairs, return_inverse=True, return_counts=True)
     sizes = {"Same types": database.type_group_sizes, "Same types and angle levels": counts[pair]}

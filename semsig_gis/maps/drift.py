@@ -111,6 +111,7 @@ def drift_map(
         for rows, dark in halves
         if rows.any()
     ]
+    # The signatures of unchanged cells are those before, so only the others are packed again.
     differing = new.select(np.sort(np.concatenate([cells.changed[:, 1], cells.appeared])))
     arrays = {
         "kind": packed(kinds),
@@ -178,6 +179,7 @@ def _object_drawings(
         if facts.empty:
             continue
         drawings: list[list[Any]] = []
+        # A line from the old place to the new one.
         if before is not None:
             moves = np.hypot(facts["x"] - before["x"], facts["y"] - before["y"])
             facts["by"] = [f"{metres:.1f} m" for metres in moves]

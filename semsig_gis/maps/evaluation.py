@@ -53,14 +53,9 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import ErrorField
 
 QUERY_FIELDS = (
-    *(
-        "Query",
-        "True cell sees",
-        "Expected error",
-        f"P(error ≤ {Evaluation.success_metres} m)",
-        "True rank",
-    ),
-    *("True cell", "Best cell", "Next best cells", "Best cell sees"),
+    *("Query", "True cell sees", "Expected error"),
+    *(f"P(error ≤ {Evaluation.success_metres} m)", "True rank", "True cell"),
+    *("Best cell", "Next best cells", "Best cell sees"),
 )
 FIELD_NAME = "Share of queries that fail"
 KILOMETRE = 1000
@@ -148,6 +143,7 @@ def _add_queries(
     chances = queries["chance" if has_chances else f"p{Evaluation.success_metres}"].fillna(0.0)
     next_places, details = _query_details(evaluation, database, places)
     best = queries["best_cell_id"]
+    # One array per column; the script unpacks them when the page opens.
     arrays = {
         "places": packed(_microdegrees(places)),
         "best": packed(_microdegrees(best_places)),
@@ -182,6 +178,7 @@ def _add_queries(
         if has_chances
         else {"column": f"p{metres}", "label": f"P(error ≤ {metres} m)"},
     }
+    # Several evaluations on one map have separate keys, filters and layers.
     others = sum(isinstance(child, _Queries) for child in layers_of(map_).values())
     key = f"queries{others + 1}" if others else "queries"
     _Queries("queries", map_, key, arrays, about).add_to(map_)
@@ -216,6 +213,7 @@ def _query_details(
     for number, query in enumerate(evaluation.queries.itertuples(index=False)):
         located = query.tied > 0
         look = {"place": places[number].tolist(), "turn": query.heading}
+        # Ranges and sectors are only in the columns of the query, so parse it again.
         view = None
         if query.query_ranges or query.query_sectors:
             names = ("types", "bearings", "ranges", "sectors")
@@ -254,6 +252,7 @@ def _next_cells(
     """Return the places of the cells ranked after the best of each query, and their errors."""
     queries, next_ids = evaluation.queries, evaluation.next_cell_ids
     counts = [len(ids) for ids in next_ids]
+    # All queries at once: concatenate their cells, compute, and split again.
     ids = np.array(list(itertools.chain.from_iterable(next_ids)), np.int64)
     xy = database.xy[np.searchsorted(database.cell_ids, ids)]
     true_xy = np.stack([queries.geometry.x, queries.geometry.y], axis=1)

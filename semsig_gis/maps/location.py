@@ -299,6 +299,7 @@ class _LocationLayers:
         for row, shape, end in zip(explanation.to_dict()["rows"], shapes, ends, strict=True):
             verdict = row["verdict"]
             rays[verdict].append(self.latlon(np.stack([here, end])))
+            # Without a street object, the sign is at the end of the ray.
             place = end if shape is None else np.array([shape.x, shape.y])
             details = [
                 f"{row['chance']:.2f}",
@@ -469,6 +470,7 @@ def _candidate_records(
     candidates = localization.candidates
     rows = rows_of_result(database, candidates["cell_id"], candidates["types"], what="localization")
     distances = candidates["distance"].to_numpy(np.float64)
+    # Colours are scaled to the range of distances, which is 0 for equal candidates.
     spread = np.ptp(distances) or 1.0
     colours = mixed((distances - distances.min()) / spread, CANDIDATE_RAMP)
     query = localization.grid_query

@@ -174,6 +174,7 @@ def _ground(
     }
     points = {kind: shapely.get_coordinates(lines) for kind, (lines, _) in rings.items()}
     places, about = mercator(np.concatenate(list(points.values())), crs)
+    # Streets and buildings share one origin, so all points are converted at once.
     arrays = {}
     start = 0
     for kind, (lines, owner) in rings.items():
@@ -254,6 +255,7 @@ def objects_map(
 
 def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[str, Any]]:
     """Return the objects for the script, by class and along a Hilbert curve, and settings."""
+    # Neighbours have small differences of coordinates, which compress well.
     near = hilbert_order(objects.table.geometry.array)
     order = near[np.argsort(objects.codes[near], kind="stable")]
     table = objects.table.iloc[order]
@@ -268,12 +270,7 @@ def _packed_objects(objects: StreetObjects) -> tuple[dict[str, list[str]], dict[
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
     ends = np.cumsum(list(counts.values())).tolist()
     classes = [
-        {
-            **sign_look(signs[code]),
-            "symbol": signs[code].symbol,
-            "start": end - count,
-            "end": end,
-        }
+        {**sign_look(signs[code]), "symbol": signs[code].symbol, "start": end - count, "end": end}
         for (code, count), end in zip(counts.items(), ends, strict=True)
     ]
     about |= {

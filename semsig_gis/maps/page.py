@@ -99,7 +99,14 @@ def asset_text(name: str) -> str:
         return re.sub(r"</(style)", r"<\\/\1", text, flags=re.IGNORECASE)
     text = _SOURCE_MAP.sub("", text)
     if name == "leaflet.js":
-        text += _default_icon()
+        # Leaflet would look for the images of its default marker in the folder of its script.
+        images = {
+            "iconUrl": _data_uri("marker-icon.png"),
+            "iconRetinaUrl": _data_uri("marker-icon-2x.png"),
+            "shadowUrl": _data_uri("marker-shadow.png"),
+        }
+        icon = f"L.Icon.Default.imagePath='';L.Icon.Default.mergeOptions({json.dumps(images)});"
+        text += f"\n{icon}"
     # Inside <script>, "</script" closes it and "<!--" changes how the rest is read.
     return re.sub(r"</(script)", r"<\\/\1", text, flags=re.IGNORECASE).replace("<!--", r"<\!--")
 
@@ -138,6 +145,7 @@ def inline_assets(page: str) -> str:
         element = "script" if match["script"] else "style"
         return f"<{element}>\n{asset_text(name)}\n</{element}>"
 
+    # folium links files only in the head; the rest may contain text that looks like a link.
     head, end, rest = page.partition("</head>")
     return _REFERENCE.sub(replace, head) + end + rest
 
@@ -167,16 +175,6 @@ def _data_uri(name: str) -> str:
     return f"data:image/png;base64,{base64.b64encode(_required(assets()[name])).decode('ascii')}"
 
 
-def _default_icon() -> str:
-    """Return JavaScript that includes the images of Leaflet's default marker as data URIs."""
-    images = {
-        "iconUrl": _data_uri("marker-icon.png"),
-        "iconRetinaUrl": _data_uri("marker-icon-2x.png"),
-        "shadowUrl": _data_uri("marker-shadow.png"),
-    }
-    return f"\nL.Icon.Default.imagePath='';L.Icon.Default.mergeOptions({json.dumps(images)});"
-
-
 @dataclass(frozen=True, slots=True)
 class MapFrame:
     """The page of a map in a frame of ``height`` pixels, for notebooks and the documentation."""
@@ -201,6 +199,7 @@ def page_of_map(
     page = map_.get_root().render().replace("<html>", '<html lang="en">', 1)
     page = _NO_PAGE_ZOOM.sub("", page, count=1)
     if self_contained or (self_contained is None and available()):
+        # By default a page that needs other files keeps its links.
         try:
             return inline_assets(page)
         except InputError:

@@ -127,12 +127,7 @@ class ScriptLayer(Call, Layer):
     )
 
     def __init__(
-        self,
-        name: str | None,
-        function: str,
-        *arguments: object,
-        group: str,
-        show: bool = True,
+        self, name: str | None, function: str, *arguments: object, group: str, show: bool = True
     ) -> None:
         listed = name is not None
         options = {"name": name, "overlay": True, "control": listed, "show": listed and show}
@@ -202,12 +197,7 @@ def _tile_provider(name: str) -> xyzservices.TileProvider:
 
 
 def add_layer(
-    map_: folium.Map,
-    name: str,
-    function: str,
-    *arguments: object,
-    group: str,
-    show: bool = True,
+    map_: folium.Map, name: str, function: str, *arguments: object, group: str, show: bool = True
 ) -> None:
     """Add a layer that a function of the page's script returns.
 

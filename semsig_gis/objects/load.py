@@ -445,8 +445,8 @@ def read_files(
             for group in [files] if name in MERGING else ([path] for path in files):
                 specs_of.setdefault((name, tuple(group)), []).append(spec)
     layers: list[RawLayer] = []
-    for count, ((name, group), group_specs) in enumerate(specs_of.items(), start=1):
-        source = group if len(group) > 1 else group[0]
+    for count, ((name, sources), group_specs) in enumerate(specs_of.items(), start=1):
+        source = sources if len(sources) > 1 else sources[0]
         options = {"area": area} if name in PRUNING else {}
         layers.extend(reader(name)(source, group_specs, filters=filters, crs=crs, **options))
         if progress is not None:

@@ -84,11 +84,7 @@ class _AnswerParts:
     """Parts of an answer as values for JSON."""
 
     def __init__(
-        self,
-        location: Location,
-        question: Question,
-        table: NoiseTable,
-        shares: NDArray[np.float64],
+        self, location: Location, question: Question, table: NoiseTable, shares: NDArray[np.float64]
     ) -> None:
         self.location, self.table, self.shares = location, table, shares
         self.database = location.posterior.database
@@ -105,6 +101,7 @@ class _AnswerParts:
         xy = to_metres(place, self.database.crs)
         (x, y), estimate = xy[0].tolist(), self.location.estimate
         metres = math.hypot(x - estimate.x, y - estimate.y)
+        # The true place may be outside all cells, which gives -1.
         cell = int(self.database.cells_at(xy)[0])
         chances = self.location.chances
         better = int((chances > chances[cell]).sum()) if cell >= 0 else None
@@ -170,6 +167,7 @@ class _AnswerParts:
 
         For the place: how rare the class is among the cells. Against: how rare the error is.
         """
+        # The chances of errors depend on the number of detections, up to the size of the table.
         length = min(int(explanation.counts["matched"]), len(self.table.missed) - 1)
         reasons = []
         for row in explanation.rows:

@@ -192,6 +192,7 @@ def _photos(
             look = {"sectors": photo.get("sectors") or []}
             bearings = [number(mark.get("bearing"), "a bearing", most=360.0) for mark in marks]
         else:
+            # Bearings of marks are relative to the middle of the photo, which looks at the heading.
             heading = photo.get("heading")
             middle = 0.0 if heading is None else number(heading, "a heading", most=360.0)
             camera = camera_of(photo)
@@ -242,16 +243,20 @@ def _detections(
     offsets, ranges, errors = locate_boxes(
         camera, edges, heights=sizes, whole=~np.isnan(sizes[:, 0])
     )
-    return [
-        {
-            "class": mark.get("class", "?"),
-            "offset": float(offset),
-            **_range(mark, metres, error),
-        }
-        for mark, offset, metres, error in zip(
-            marks, offsets.tolist(), ranges.tolist(), errors.tolist(), strict=True
-        )
-    ]
+    detections = []
+    columns = marks, offsets.tolist(), ranges.tolist(), errors.tolist()
+    for mark, offset, metres, error in zip(*columns, strict=True):
+        detection: dict[str, Any] = {"class": mark.get("class", "?"), "offset": offset}
+        # The range of a mark overrides the one computed from its box.
+        if mark.get("range") is not None:
+            detection |= {"range": mark["range"], "range_error": mark.get("range_error")}
+        elif math.isnan(metres):
+            detection["range"] = None
+        else:
+            detection["range"] = round(metres, METRE_DIGITS)
+            detection["range_error"] = round(error, ERROR_DIGITS)
+        detections.append(detection)
+    return detections
 
 
 def _height(mark: Mapping[str, Any], taxonomy: Taxonomy) -> tuple[float, float]:
@@ -262,15 +267,6 @@ def _height(mark: Mapping[str, Any], taxonomy: Taxonomy) -> tuple[float, float]:
     if item is None or item.height_m is None or item.height_sigma is None:
         return math.nan, math.nan
     return item.height_m, item.height_sigma
-
-
-def _range(mark: Mapping[str, Any], metres: float, error: float) -> dict[str, Any]:
-    """Return the range of a mark as given, or as computed from its box."""
-    if mark.get("range") is not None:
-        return {"range": mark["range"], "range_error": mark.get("range_error")}
-    if math.isnan(metres):
-        return {"range": None}
-    return {"range": round(metres, METRE_DIGITS), "range_error": round(error, ERROR_DIGITS)}
 
 
 def _legs(

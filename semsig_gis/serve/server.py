@@ -7,7 +7,6 @@ its own page, and contain the token from the address of that page.
 
 from __future__ import annotations
 
-import functools
 import hmac
 import secrets
 import socket
@@ -101,18 +100,15 @@ class _Api:
         return await self._json_response(lambda: self.bench.about)
 
     async def ground(self, request: Request) -> Response:  # noqa: ARG002
-        bench = self.bench
-        return await self._json_response(
-            functools.partial(city_streets, bench.database, bench.store)
-        )
+        return await self._json_response(city_streets, self.bench.database, self.bench.store)
 
     async def photo(self, request: Request) -> Response:
         name = request.query_params.get("name", "the picture")[:200]
         content = await _body(request)
-        return await self._json_response(functools.partial(self.bench.photo, content, name))
+        return await self._json_response(self.bench.photo, content, name)
 
     async def boxes(self, request: Request) -> Response:
-        return await self._json_response(functools.partial(self.bench.boxes, await _json(request)))
+        return await self._json_response(self.bench.boxes, await _json(request))
 
     async def answer(self, request: Request) -> Response:
         body = await _json(request)
@@ -127,28 +123,26 @@ class _Api:
         return await self._json_response(answer)
 
     async def suggest(self, request: Request) -> Response:
-        return await self._json_response(
-            functools.partial(self.bench.suggest, await _json(request))
-        )
+        return await self._json_response(self.bench.suggest, await _json(request))
 
     async def cell(self, request: Request) -> Response:
-        return await self._json_response(functools.partial(self.bench.cell, await _json(request)))
+        return await self._json_response(self.bench.cell, await _json(request))
 
     async def simulate(self, request: Request) -> Response:
-        return await self._json_response(
-            functools.partial(self.bench.simulate, await _json(request))
-        )
+        return await self._json_response(self.bench.simulate, await _json(request))
 
     async def export(self, request: Request) -> Response:
         suffix = request.query_params.get("format", "")
-        export = functools.partial(self.bench.export, await _json(request), suffix)
-        content = await anyio.to_thread.run_sync(export, limiter=self.limiter)
+        body = await _json(request)
+        content = await anyio.to_thread.run_sync(
+            self.bench.export, body, suffix, limiter=self.limiter
+        )
         headers = HEADERS | {"Content-Disposition": f'attachment; filename="answer.{suffix}"'}
         return Response(content, media_type=FORMATS[suffix], headers=headers)
 
-    async def _json_response(self, work: Callable[[], Any]) -> Response:
+    async def _json_response(self, work: Callable[..., Any], *arguments: object) -> Response:
         """Return the result of a function as JSON."""
-        value = await anyio.to_thread.run_sync(work, limiter=self.limiter)
+        value = await anyio.to_thread.run_sync(work, *arguments, limiter=self.limiter)
         return JSONResponse(value, headers=HEADERS)
 
 

@@ -207,6 +207,7 @@ class Workbench:
         shot = picture_shot(content, name)
         width, height = shot.size or (0, 0)
         panorama = shot.focal is None and width == PANORAMA_RATIO * height
+        # A picture of this ratio without a focal length is taken for a full panorama.
         if panorama:
             shot = replace(shot, camera="equirectangular")
         fov = field_of_view(shot)
@@ -241,6 +242,7 @@ class Workbench:
         photos = {str(photo.get("name")): photo for photo in body.get("photos") or []}
         shots = {key: _shot(photo) for key, photo in photos.items()}
         stems = {PurePosixPath(key).stem: key for key in photos}
+        # The readers of detections expect files, with the labels of YOLO next to the boxes.
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, name)
             file.write_text(str(body.get("text") or ""), encoding="utf-8")
@@ -258,6 +260,7 @@ class Workbench:
         )
         marks: dict[str, list[dict[str, Any]]] = {}
         for picture in pictures:
+            # Files of detectors name pictures with other folders and suffixes.
             key = stems.get(PurePosixPath(picture.name).stem)
             if key is not None:
                 marks.setdefault(key, []).extend(self._marks(builder, picture, tally))
@@ -452,6 +455,7 @@ class Workbench:
             )
             sight = replace(sight, photo=photo)
             look = {"sectors": [[low, high % FULL_TURN] for low, high in photo.sectors] or None}
+        # The true view, then the errors of a detector with this noise.
         noise = body.get("noise")
         chain = []
         if noise is not None:

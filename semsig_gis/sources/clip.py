@@ -45,7 +45,14 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
             f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
             "degrees, or the path of a file with polygons."
         )
-    return _outline(Path(text))
+    path = Path(text)
+    polygons = LayerSpec(name="area", class_name="", geometry="polygon")
+    layer = vector_file.read_layer(path, polygons)
+    if layer.errors:
+        raise InputError(
+            f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
+        )
+    return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
 
 
 def names_place(text: str) -> bool:
@@ -131,7 +138,7 @@ def _outside(layer: RawLayer, area: Area) -> tuple[NDArray[np.bool_], NDArray[np
         places = shapely.centroid(places)
     narrowed = _narrowed(area.polygon, area)
     shapely.prepare(narrowed)
-    # The rows so far are not covered by the area; of these, keep the ones that do not touch it.
+    # All these rows are not covered by the area; of these, keep the ones that do not touch it.
     disjoint = ~shapely.intersects(narrowed, places)
     outside[outside] = disjoint
     return outside, places[disjoint]
@@ -167,16 +174,6 @@ def _box(text: str) -> Area:
     spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
     boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
     return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
-
-
-def _outline(path: Path) -> Area:
-    polygons = LayerSpec(name="area", class_name="", geometry="polygon")
-    layer = vector_file.read_layer(path, polygons)
-    if layer.errors:
-        raise InputError(
-            f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
-        )
-    return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
 
 
 def _area_of(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:

@@ -105,16 +105,16 @@ def open_csv(open_: Callable[[], IO[bytes]], what: str) -> CsvFile:
     charset-normalizer. SourceError if the file is empty, not text, or its encoding is unknown.
     """
     encoding, errors, notes = _encoding(open_, what)
-    file = CsvFile(open_, what, encoding, errors, {}, notes)
-    layouts = {}
+    layouts: dict[str, tuple[str, ...]] = {}
+    file = CsvFile(open_, what, encoding, errors, layouts, notes)
     for separator in SEPARATORS:
-        names = next(file._values(separator), [])  # noqa: SLF001 - of this very class
+        names = next(file._values(separator), [])  # noqa: SLF001 - of this class
         layouts[separator] = () if isinstance(names, str) else tuple(map(str.strip, names))
     if not any(name for names in layouts.values() for name in names):
         raise SourceError(
             f"{what} is empty; give a file that begins with the names of its columns."
         )
-    return CsvFile(open_, what, encoding, errors, layouts, notes)
+    return file
 
 
 def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tuple[str, ...]]:
@@ -140,10 +140,9 @@ def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tupl
                     parts = NO_WORDS.split(block)
                     words |= dict.fromkeys(part for part in parts if not part.isascii())
     bad += decoder.decode(b"", final=True).count(DAMAGED)
-    if encoding or not (wide or bad):
-        return "utf-8-sig", "replace" if bad else "strict", _damage(bad)
-    if good > bad and not wide:
-        return "utf-8", "replace", _damage(bad)
+    if encoding or (not wide and (good > bad or not bad)):
+        note = f"{bad:,} places are not UTF-8 and are read as {DAMAGED}"
+        return "utf-8-sig", *(("replace", (note,)) if bad else ("strict", ()))
     # Guess from the words that are not ASCII, because the others are the same in any encoding.
     sample = head if wide else b" ".join(words)
     candidates = WIDE_ENCODINGS if wide else ENCODINGS
@@ -167,11 +166,6 @@ def _symbol_share(text: str) -> float:
     foreign = [letter for letter in text if not letter.isascii()]
     symbols = sum(unicodedata.category(letter) in SYMBOLS or letter in "¿¡" for letter in foreign)
     return symbols / max(len(foreign), 1)
-
-
-def _damage(characters: int) -> tuple[str, ...]:
-    note = f"{characters:,} places are not UTF-8 and are read as {DAMAGED}"
-    return (note,) if characters else ()
 
 
 def _is_text(head: bytes, encoding: str) -> bool:

@@ -20,9 +20,9 @@ from semsig_gis.sources.rows import (
     BadFeatureError,
     RowRules,
     Rows,
+    choose_crs,
     raw_layer,
     require_field,
-    settle_crs,
     usable_crs,
 )
 
@@ -209,6 +209,6 @@ def read_csv_layer(
             place = str(error)
         rows.add([row[field] for field in rules.fields], str(rows.read), place)
     own = table.crs
-    system, notes = settle_crs(own, implicit=False, expected=spec.crs, given=crs, where=where)
+    system, notes = choose_crs(own, implicit=False, expected=spec.crs, requested=crs, where=where)
     notes = (*table.file.notes, *notes)
     return raw_layer(rows, rules, system, by_file=own is not None, notes=notes)

@@ -36,7 +36,9 @@ def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple
             require_file(path, "a file or a folder of files")
         files = files_in(path) if path.is_dir() else [path]
         for file in files or [path]:
-            reader = _reader(file) if files else None
+            reader = file_reader(file, sure=True) if files else None
+            if reader is None and any(map(OVERTURE_COLUMNS.issubset, probe_file(file).columns)):
+                reader = "overture"
             if reader is None:
                 raise InputError(
                     f"{file} does not say what it contains; name its catalogue with --catalog "
@@ -46,11 +48,3 @@ def detect_catalogs(paths: Iterable[str | Path]) -> tuple[tuple[str, ...], tuple
             names.append(name)
             lines.append(f"{file} is read as {description}, with the catalogue {name}")
     return tuple(dict.fromkeys(names)), tuple(lines)
-
-
-def _reader(path: Path) -> str | None:
-    """Return the reader of a file that its name or its columns identify, or None."""
-    reader = file_reader(path, sure=True)
-    if reader is None and any(map(OVERTURE_COLUMNS.issubset, probe_file(path).columns)):
-        return "overture"
-    return reader

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from semsig_gis.core import SourceError
 from semsig_gis.sources.area import tiles_of
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
-from semsig_gis.sources.rows import WGS84, RowRules, Rows, raw_layer, settle_crs
+from semsig_gis.sources.rows import WGS84, RowRules, Rows, choose_crs, raw_layer
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _layer(
     for name, feature in features.items():
         rows.read += 1
         rows.add([feature.get(field) for field in rules.fields], name, _position(feature))
-    system, notes = settle_crs(WGS84, implicit=False, expected=spec.crs, given=crs, where=where)
+    system, notes = choose_crs(WGS84, implicit=False, expected=spec.crs, requested=crs, where=where)
     return raw_layer(rows, rules, system, by_file=True, notes=notes)
 
 

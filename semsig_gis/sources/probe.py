@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 VECTOR_SUFFIXES = frozenset({*DRIVERS, ".zip"} - {".csv"})
 # An answer of Overpass is JSON, too, and has its key "elements" near the beginning.
 OVERPASS_START_BYTES = 4096
-# A shapefile consists of several files, any of which may be replaced.
+# A shapefile consists of several files, and each may be replaced.
 SHAPEFILE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")
 MOST_PROBES = 256
 

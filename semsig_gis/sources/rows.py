@@ -81,23 +81,20 @@ def usable_crs(text: str) -> CRS | None:
     if not geodetic.name or crs.name.lower().startswith("undefined"):
         return None  # without a named datum, a transformation is off by up to hundreds of metres
     code = crs.to_epsg()
-    if code is not None:
-        epsg = CRS.from_epsg(code)
-        if epsg.equals(crs, ignore_axis_order=True):
-            return epsg
-    return crs
+    epsg = crs if code is None else CRS.from_epsg(code)
+    return epsg if epsg.equals(crs, ignore_axis_order=True) else crs
 
 
-def settle_crs(
-    own: CRS | None, *, implicit: bool, expected: str | None, given: str | None, where: str
+def choose_crs(
+    own: CRS | None, *, implicit: bool, expected: str | None, requested: str | None, where: str
 ) -> tuple[CRS, tuple[str, ...]]:
-    """Return the CRS of a layer and notes: the file's `own`, or else `given` or `expected`.
+    """Return CRS and notes of a layer: the file's `own` CRS, else `requested` or `expected`.
 
-    `given` is the CRS of the user, `expected` the CRS of the catalogue. With `implicit`, `own` is
-    only the default of the format, which is used last. A note reports a contradiction. CrsError if
-    there is no CRS.
+    `requested` is the CRS of the user, `expected` the CRS of the catalogue. With `implicit`, `own`
+    is only the default of the format, which is used last. A note reports a contradiction. CrsError
+    if there is no CRS.
     """
-    stated = given or expected
+    stated = requested or expected
     # A CRS in the file has priority.
     if own is not None and not implicit:
         if stated is None or own.equals(parse_crs(stated), ignore_axis_order=True):

@@ -2,67 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING
 
-import geopandas as gpd
 import pytest
-import shapely
 from axe_core_python.selenium import Axe
 from machine import PATIENCE_S
+from map_pages import maps_of
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
-from small_city import (
-    chances_of,
-    small_city,
-    small_evaluation,
-    small_localization,
-    small_location,
-)
+from small_city import small_city, small_evaluation
 
-from semsig_gis.database import build_database
-from semsig_gis.maps import (
-    ambiguity_map,
-    drift_map,
-    evaluation_map,
-    ground_map,
-    identifiability_map,
-    localization_map,
-    location_map,
-    objects_map,
-)
+from semsig_gis.localization import named_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import folium
     from map_pages import MapPage
 
-CITY, OBJECTS = small_city()
-
-
-def drift() -> folium.Map:
-    later = dataclasses.replace(OBJECTS, table=OBJECTS.table[3:])
-    return drift_map(CITY, build_database(later), objects_before=OBJECTS, objects_after=later)
-
-
-def ground() -> folium.Map:
-    house = shapely.box(*CITY.xy[0], *(CITY.xy[0] + 20))
-    return ground_map(buildings=gpd.GeoDataFrame(geometry=[house], crs=CITY.crs))
-
-
-MAPS: dict[str, Callable[[], folium.Map]] = {
-    "evaluation": lambda: evaluation_map(small_evaluation("medium"), CITY),
-    "localization": lambda: localization_map(small_localization(), CITY),
-    "location": lambda: location_map(small_location()),
-    "ambiguity": lambda: ambiguity_map(CITY, identifiability=chances_of(CITY)),
-    "identifiability": lambda: identifiability_map(chances_of(CITY)),
-    "drift": drift,
-    "objects": lambda: objects_map(OBJECTS, database=CITY),
-    "ground": ground,
-}
-
-
+MAPS = maps_of(*small_city(), small_evaluation("medium"), named_noise("light"))
 # The rules of axe that a page violates, and the elements.
 VIOLATIONS = """
 axe.run({resultTypes: ["violations"]}).then(({violations}) => arguments[0](

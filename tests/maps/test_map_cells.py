@@ -47,7 +47,7 @@ def group(cell: int, *, angles: bool = False) -> list[int]:
 
 
 LARGEST = int(CITY.type_group_sizes.argmax())
-ALIKE = group(LARGEST)
+SAME_TYPES_CELLS = group(LARGEST)
 
 
 def test_click_counts_cells_that_look_the_same(page: MapPage) -> None:
@@ -63,18 +63,18 @@ def test_click_counts_cells_that_look_the_same(page: MapPage) -> None:
         assert facts["Cell"] == str(CITY.cell_ids[cell])
         text = " ".join(page.jumps())
         for label, angles in (("Same types", False), ("Types and angle levels", True)):
-            alike = group(cell, angles=angles)
-            if len(alike) == 1:
+            members = group(cell, angles=angles)
+            if len(members) == 1:
                 assert facts.get(label, "no other cell") == "no other cell"
                 assert f"{label}:" not in text
             else:
-                at = alike.index(cell) + 1
-                assert f"{label}: {at} of {len(alike)}" in text
+                at = members.index(cell) + 1
+                assert f"{label}: {at} of {len(members)}" in text
 
 
 def test_buttons_step_through_the_group(page: MapPage) -> None:
     page.open(ambiguity_map(CITY))
-    cells = ALIKE
+    cells = SAME_TYPES_CELLS
     assert len(cells) > 4
     facts = page.click(CITY, cells[0])
     visited = [cells[0]]
@@ -142,7 +142,7 @@ def test_panel_shows_exact_bearings_and_distances(page: MapPage, cell: int) -> N
 def test_click_on_a_sign_goes_to_its_cell(page: MapPage) -> None:
     page.open(ambiguity_map(CITY))
     page.click(CITY, LARGEST)
-    others = [cell for cell in ALIKE if cell != LARGEST]
+    others = [cell for cell in SAME_TYPES_CELLS if cell != LARGEST]
     twins = len(group(LARGEST, angles=True)) - 1
     assert page.circles(SAME_TYPES) == len(others)
     assert page.circles(SAME_LEVELS) == twins

@@ -1,4 +1,4 @@
-"""Several results on one map: layers in groups, of which one at a time colours the cells."""
+"""Several results on one map: layers in groups; only one layer at a time colours the cells."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import dataclasses
 import re
 from functools import partial
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import folium
 import geopandas as gpd
@@ -16,7 +16,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machine import PATIENCE_S
-from map_pages import HOSTILE, LEGEND, hostile_database
+from map_pages import HOSTILE, LEGEND, hostile_database, maps_of
 from pyproj import CRS, Transformer
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -36,18 +36,16 @@ from semsig_gis.core import (
     SignatureSpec,
     Taxonomy,
 )
-from semsig_gis.database import ObjectStore, build_database
+from semsig_gis.database import build_database
 from semsig_gis.evaluation import MissingClasses, QuerySpec, evaluate
-from semsig_gis.localization import Method, build_index, localize, locate, named_noise
+from semsig_gis.localization import Method, localize, named_noise
 from semsig_gis.maps import (
     ambiguity_map,
     drift_map,
     evaluation_map,
     ground_map,
-    identifiability_map,
     layers_of,
     localization_map,
-    location_map,
     objects_map,
     page_element,
     search_area,
@@ -60,10 +58,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from map_pages import MapPage
-
-    from semsig_gis.database import SignatureDatabase
-    from semsig_gis.evaluation import Evaluation
-    from semsig_gis.localization import Noise
 
 WORLD = random_town()
 CITY, OBJECTS = WORLD.database, WORLD.street_objects
@@ -85,29 +79,6 @@ NOWHERE, FAR = LANE.set_crs(None, allow_override=True), (0.0, 0.0, 1.0, 1.0)
 BROWSER_FILES = sorted(
     file.name for file in resources.files("semsig_gis.maps").joinpath("js").iterdir()
 )
-
-
-def maps_of(
-    city: SignatureDatabase, objects: StreetObjects, evaluation: Evaluation, noise: Noise
-) -> dict[str, Callable[..., folium.Map]]:
-    """Return a function for each map of a city."""
-    query, index = city.signature(0), build_index(city, noise)
-    location = locate(index, query, top=5, explained=1, store=ObjectStore.of(objects))
-    chances = dataclasses.replace(chances_of(city), noise=noise)
-    later = dataclasses.replace(objects, table=objects.table[3:])
-    dates: dict[str, Any] = {"objects_before": objects, "objects_after": later}
-    return {
-        "evaluation": partial(evaluation_map, evaluation, city),
-        "localization": partial(
-            localization_map, localize(city, query, top=5, method=Method()), city
-        ),
-        "location": partial(location_map, location),
-        "ambiguity": partial(ambiguity_map, city),
-        "identifiability": partial(identifiability_map, chances),
-        "drift": partial(drift_map, city, build_database(later), **dates),
-        "objects": partial(objects_map, objects),
-        "ground": partial(ground_map, buildings=HOUSE),
-    }
 
 
 MAPS = maps_of(CITY, OBJECTS, EVALUATION, named_noise("light"))

@@ -127,9 +127,7 @@ def test_used_port_is_refused() -> None:
 OTHER = 2
 
 
-def test_newer_question_cancels_older_ones_of_the_page(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_newer_question_cancels_older_ones_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     begun, go_on, answered = threading.Event(), threading.Event(), list[int]()
     arrived, read = threading.Semaphore(0), server_module._json
 

@@ -14,7 +14,7 @@ from map_pages import HOSTILE
 from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 from selenium.webdriver.common.keys import Keys
-from workbench import decompression_bomb
+from workbench import coco, decompression_bomb
 from workbench_pages import STAGE, WorkbenchPage
 
 from benchmarks.street_photos import street_photo
@@ -231,10 +231,7 @@ def test_camera_and_place_come_from_exif(
     workbench.mark(photos[1], 0)
     assert [
         len(view["photos"]) for view in workbench.ask("return semsig.session.body().views")
-    ] == [
-        1,
-        1,
-    ]
+    ] == [1, 1]
     assert [element.text for element in workbench.all(".view small")] == ["Place 1", "Place 2"]
     # A mark and its object on the map select each other.
     assert len(workbench.all("#map .at.chosen")) == 1
@@ -392,22 +389,14 @@ def test_detector_boxes_become_marks(
     workbench: WorkbenchPage, photos: list[StreetPhoto], tmp_path: Path
 ) -> None:
     x0, y0, x1, y1 = photos[0].things[0][1]
-    coco = {
-        "images": [{"id": 1, "file_name": "ahead.jpg", "width": 960, "height": 720}],
-        "categories": [{"id": 1, "name": "bench"}, {"id": 2, "name": "dog"}],
-        "annotations": [
-            {
-                "id": 1,
-                "image_id": 1,
-                "category_id": 1,
-                "score": 0.9,
-                "bbox": [x0, y0, x1 - x0, y1 - y0],
-            },
-            {"id": 2, "image_id": 1, "category_id": 2, "score": 0.9, "bbox": [1, 1, 40, 40]},
-        ],
-    }
+    document = coco(
+        "ahead.jpg",
+        (960, 720),
+        ("bench", [x0, y0, x1 - x0, y1 - y0], 0.9),
+        ("dog", [1, 1, 40, 40], 0.9),
+    )
     file = tmp_path / "boxes.json"
-    file.write_text(json.dumps(coco), encoding="utf-8")
+    file.write_text(document, encoding="utf-8")
     workbench.give("#photo", photos[0].file)
     workbench.give("#boxes", file)
     (mark,) = workbench.until("return semsig.session.entries.length && semsig.session.entries")

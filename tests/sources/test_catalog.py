@@ -13,6 +13,7 @@ import pytest
 import shapely
 from pyproj import CRS
 from sentences import refused
+from town_catalog import MISTAKES, TOWN, mistake
 
 from semsig_gis.core import CatalogError, InputError, ObjectClass, SourceError, UnknownNameError
 from semsig_gis.sources import (
@@ -49,8 +50,6 @@ NAMES = (
     "vienna",
     "washington",
 )
-DATA = Path(__file__).with_name("data")
-TOWN = (DATA / "town.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -123,21 +122,6 @@ def test_layer_of_streets_has_widths(town: Town) -> None:
         ("id_field", "ID"),
     )
     assert not load_catalog(town()).layer("posts").has_width
-
-
-MISTAKES = (DATA / "mistakes.txt").read_text(encoding="utf-8").splitlines()[2:]
-
-
-def mistake(row: str) -> tuple[str, str, list[str]]:
-    """Return the text to replace, its replacement, and the words of a row."""
-    change, *words = row.replace(r"\n", "\n").split(" | ")
-    old, sign, new = change.partition(" -> ")
-    if not sign:
-        old, _, line = change.partition(" + ")
-        new = f"{old}\n{line}"
-    if old.endswith("..."):
-        old = TOWN[TOWN.index(old.removesuffix("...")) :]
-    return old, new, words
 
 
 @pytest.mark.parametrize("row", MISTAKES)

@@ -6,12 +6,12 @@ import copy
 import json
 import tomllib
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from town_catalog import MISTAKES, TOWN, mistake
 
 from semsig_gis.core import CatalogError
 from semsig_gis.sources import (
@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
 
 SCHEMA = json.loads((data_folder() / "catalog.schema.json").read_text("utf-8"))
-DATA = Path(__file__).with_name("data")
-TOWN = (DATA / "town.toml").read_text("utf-8")
-MISTAKES = (DATA / "mistakes.txt").read_text("utf-8").splitlines()[2:]
 # Errors that only the reader detects: unknown names, duplicate names, CRSs, patterns, the order of
 # numbers, NaN, and a decimal point in an integer.
 ONLY_READER = (
@@ -56,18 +53,6 @@ def accepts(content: dict[str, Any]) -> bool:
     except CatalogError:
         return False
     return True
-
-
-def changed(row: str) -> str:
-    """Return the catalogue of the town with a mistake; see `test_catalog`."""
-    change = row.replace(r"\n", "\n").partition(" | ")[0]
-    old, sign, new = change.partition(" -> ")
-    if not sign:
-        old, _, line = change.partition(" + ")
-        new = f"{old}\n{line}"
-    if old.endswith("..."):
-        old = TOWN[TOWN.index(old.removesuffix("...")) :]
-    return TOWN.replace(old, new)
 
 
 @cache
@@ -103,8 +88,9 @@ def test_built_in_catalogue_names_its_schema(name: str) -> None:
 
 @pytest.mark.parametrize("row", MISTAKES)
 def test_schema_and_reader_refuse_invalid_catalogues(row: str) -> None:
+    old, new, _ = mistake(row)
     try:
-        content = tomllib.loads(changed(row))
+        content = tomllib.loads(TOWN.replace(old, new))
     except tomllib.TOMLDecodeError:
         assert "not valid TOML" in row
         return

@@ -39,7 +39,7 @@ def test_text_is_compared_as_text(a: str, b: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "wanted", "expected"),
+    ("value", "accepted", "expected"),
     [
         (1, True, False),
         (True, 1, False),
@@ -65,11 +65,11 @@ def test_text_is_compared_as_text(a: str, b: str) -> None:
 )
 def test_match_is_exact_or_a_pattern(
     value: object,
-    wanted: Any,  # noqa: ANN401
+    accepted: Any,  # noqa: ANN401
     *,
     expected: bool,
 ) -> None:
-    assert matches(value, wanted) == expected
+    assert matches(value, accepted) == expected
 
 
 AT_STREET_LEVEL = ">=0 or none"

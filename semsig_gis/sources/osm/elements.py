@@ -13,8 +13,8 @@ from semsig_gis.sources.rows import (
     BadFeatureError,
     RowRules,
     Rows,
+    choose_crs,
     raw_layer,
-    settle_crs,
 )
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ class ElementLayer:
 
     def raw(self, crs: str | None) -> RawLayer:
         """Return the layer in WGS 84; another `crs` of the user only causes a note."""
-        system, notes = settle_crs(
-            WGS84, implicit=False, expected=self.spec.crs, given=crs, where=self.rules.file
+        system, notes = choose_crs(
+            WGS84, implicit=False, expected=self.spec.crs, requested=crs, where=self.rules.file
         )
         return raw_layer(self.rows, self.rules, system, by_file=True, notes=notes)

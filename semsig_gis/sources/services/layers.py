@@ -23,8 +23,8 @@ from semsig_gis.sources.rows import (
     BadFeatureError,
     RowRules,
     Rows,
+    choose_crs,
     raw_layer,
-    settle_crs,
 )
 from semsig_gis.sources.services.table import open_table
 from semsig_gis.sources.vector import file as vector_file
@@ -312,8 +312,8 @@ class _TableLayer:
         self._spec = spec
         where = f"layer {spec.name!r} ({path})"
         own, implicit = table.crs or WGS84, table.crs is None
-        self._crs, self._notes = settle_crs(
-            own, implicit=implicit, expected=spec.crs, given=crs, where=where
+        self._crs, self._notes = choose_crs(
+            own, implicit=implicit, expected=spec.crs, requested=crs, where=where
         )
         self._notes = (*table.notes, *self._notes)
         self._by_file = not implicit

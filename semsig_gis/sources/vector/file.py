@@ -19,18 +19,13 @@ from semsig_gis.sources.csv_layer import NO_GEOMETRY, csv_table, read_csv_layer
 from semsig_gis.sources.rows import (
     WGS84,
     RowRules,
+    choose_crs,
     fits_the_globe,
     raw_layer,
-    settle_crs,
     usable_crs,
 )
 from semsig_gis.sources.vector import by_pyogrio
-from semsig_gis.sources.vector.by_pyogrio import (
-    describe,
-    first_rows_of,
-    layer_names,
-    read_whole,
-)
+from semsig_gis.sources.vector.by_pyogrio import describe, first_rows_of, layer_names, read_whole
 from semsig_gis.sources.vector.member import CONTAINER, CSV, GEOJSON, Member, members, unreadable
 from semsig_gis.storage import parse_json
 
@@ -124,7 +119,7 @@ def read_layer(
     if layer.geometry == NO_GEOMETRY:
         raise SourceError(f"{where} has no geometry; give the layer that contains the positions.")
     rules = RowRules(spec, layer.fields, filters=filters, where=where)
-    table = _read_member(member, layer, rules.fields, expected=spec.crs, given=crs, where=where)
+    table = _read_member(member, layer, rules.fields, expected=spec.crs, requested=crs, where=where)
     return raw_layer(table.rows, rules, table.crs, by_file=table.by_file, notes=table.notes)
 
 
@@ -149,25 +144,22 @@ def read_tables(
     for member, layer in layers:
         if names := choose(layer.fields):
             fields = tuple(field for field in layer.fields if field in names)
-            yield _read_member(member, layer, fields, expected=None, given=crs, where=str(member))
+            yield _read_member(
+                member, layer, fields, expected=None, requested=crs, where=str(member)
+            )
 
 
 def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
     """Return the layers of a vector file that have a geometry, without those in CSV files."""
+    # Only a GeoPackage has to be opened to list its layers.
     layers = (
-        (layer, describe(layer))
+        layer
         for member in members(path)
         if member.driver != CSV
-        for layer in _layers_of(member)
+        for layer in (_layers_of(member) if member.driver == CONTAINER else [member])
     )
-    return tuple(item for item in layers if item[1].geometry != NO_GEOMETRY)
-
-
-def _layers_of(member: Member) -> list[Member]:
-    """Return the layers of a member; only a GeoPackage has to be opened to list them."""
-    if member.driver != CONTAINER:
-        return [member]
-    return [Member(member.file, member.inner, name) for name in layer_names(member)]
+    described = ((layer, describe(layer)) for layer in layers)
+    return tuple(item for item in described if item[1].geometry != NO_GEOMETRY)
 
 
 def _read_member(
@@ -176,12 +168,14 @@ def _read_member(
     fields: tuple[str, ...],
     *,
     expected: str | None,
-    given: str | None,
+    requested: str | None,
     where: str,
 ) -> TableRows:
-    """Read a layer; its CRS is that of the file, or the `given` one, or the `expected` one."""
+    """Read a layer; its CRS is that of the file, or the `requested` one, or the `expected` one."""
     own, implicit = _own_crs(member, layer)
-    system, notes = settle_crs(own, implicit=implicit, expected=expected, given=given, where=where)
+    system, notes = choose_crs(
+        own, implicit=implicit, expected=expected, requested=requested, where=where
+    )
     rows = read_whole(member, fields, layer.rows)
     if rows is None:
         rows, more = _row_reader()(member, fields, layer.rows)
@@ -228,13 +222,13 @@ def first_rows(
 
 def _layers(path: Path) -> tuple[Member, ...]:
     """Return the layers of a file, or of all the files in an archive."""
-    layers: list[Member] = []
-    for member in members(path):
-        if member.driver == CSV:
-            layers.append(Member(member.file, member.inner, Path(member.inner or path).stem))
-            continue
-        layers += [Member(member.file, member.inner, name) for name in layer_names(member)]
-    return tuple(layers)
+    return tuple(layer for member in members(path) for layer in _layers_of(member))
+
+
+def _layers_of(member: Member) -> list[Member]:
+    is_csv = member.driver == CSV
+    names = [Path(member.inner or member.file).stem] if is_csv else layer_names(member)
+    return [Member(member.file, member.inner, name) for name in names]
 
 
 def _pick(path: Path, name: str | None) -> Member:
@@ -274,25 +268,16 @@ def _csv(member: Member, spec: LayerSpec | None, *, where: str) -> CsvTable | No
 def _describe(member: Member) -> LayerInfo:
     table = _csv(member, None, where=str(member))
     if table is not None:
-        rows, kinds = table.survey()
-        return LayerInfo(
-            name=str(member.layer),
-            geometry=kinds,
-            crs=None if table.crs is None else crs_label(table.crs),
-            rows=rows,
-            fields=tuple(table.names),
-        )
-    layer = describe(member)
-    crs, implicit = _own_crs(member, layer)
-    if implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
-        crs = None
-    return LayerInfo(
-        name=str(member.layer),
-        geometry=layer.geometry,
-        crs=None if crs is None else crs_label(crs),
-        rows=layer.rows,
-        fields=layer.fields,
-    )
+        rows, geometry = table.survey()
+        crs, fields = table.crs, table.names
+    else:
+        layer = describe(member)
+        rows, geometry, fields = layer.rows, layer.geometry, layer.fields
+        crs, implicit = _own_crs(member, layer)
+        if implicit and layer.bounds and not fits_the_globe(np.reshape(layer.bounds, (2, 2))):
+            crs = None
+    label = None if crs is None else crs_label(crs)
+    return LayerInfo(str(member.layer), geometry, label, rows, fields)
 
 
 def _own_crs(member: Member, layer: LayerDescription) -> tuple[CRS | None, bool]:
@@ -318,7 +303,7 @@ def _geojson(member: Member) -> dict[str, Any]:
 
 
 def _mark_invalid(rows: Rows, member: Member) -> None:
-    """Mark the rows of a GeoJSON file whose geometry is not null but could not be read."""
+    """Mark the rows of a GeoJSON file with a geometry that is not null but cannot be read."""
     null = [row for row, position in enumerate(rows.positions) if position is None]
     if not null:
         return
