@@ -29,7 +29,7 @@ from semsig_gis.database import (
     visible_objects_at,
     visible_objects_in,
 )
-from semsig_gis.localization import views_aside
+from semsig_gis.localization import visible_objects_off_centre
 
 if TYPE_CHECKING:
     from semsig_gis.database import ViewpointMode
@@ -200,7 +200,7 @@ def test_objects_off_the_centre_of_a_cell_are_near_the_exact_ones() -> None:
     assert len(cells) > 20
     index = ObjectIndex(objects.xy)
     places = np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 2.0], [0.0, -4.0]])
-    estimate = views_aside(database, cells, places)
+    estimate = visible_objects_off_centre(database, cells, places)
     assert len(estimate) == len(places) * len(cells)
     for number, place in enumerate(places):
         views = np.arange(number, len(estimate), len(places))
