@@ -32,7 +32,7 @@ DOCS = ROOT / "docs"
 # Of a page with its styles, scripts and pictures, as they lie on the disk, but without its maps.
 MOST_BYTES = 300_000
 MAIN = (
-    *("index", "install", "tutorial", "gallery", "beside_the_paper", "how_sure"),
+    *("index", "install", "tutorial", "gallery", "compared_with_the_paper", "how_sure"),
     *("commands/localize", "api/matching"),
 )
 
@@ -134,7 +134,7 @@ def test_every_picture_has_an_alternative(pages: dict[str, Page]) -> None:
         if not (picture.get("alt") or "").strip()
     ]
     assert without == []
-    main = {"index", "install", "tutorial", "gallery", "how_sure", "beside_the_paper"}
+    main = {"index", "install", "tutorial", "gallery", "how_sure", "compared_with_the_paper"}
     if "SEMSIG_SITE" not in os.environ:
         main.remove("tutorial")  # whose commands draw them
     assert [name for name in main if not pages[name].pictures] == []
