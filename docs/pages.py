@@ -197,12 +197,14 @@ def marked(text: str) -> str:
 
 
 def public_names() -> dict[str, list[str]]:
-    """Return the public names by the package that defines them, in the order of the stub."""
+    """Return the public names by the package or subpackage that defines them, as in the stub."""
     stub = ROOT / "semsig_gis/__init__.pyi"
     names: defaultdict[str, list[str]] = defaultdict(list)
     for node in ast.parse(stub.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module:
-            names[node.module.partition(".")[0]] += [alias.name for alias in node.names]
+            # The module has up to two packages: `core.errors`, `localization.noise.model`.
+            package = ".".join(node.module.split(".")[:-1][:2]) or node.module
+            names[package] += [alias.name for alias in node.names]
     return names
 
 

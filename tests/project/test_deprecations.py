@@ -1,4 +1,4 @@
-"""Names that were public go on for a while, with a warning, and then go."""
+"""Old public names still work until a given version, with a warning."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ RENAMED: dict[str, tuple[str, str]] = vars(semsig_gis)["_RENAMED"]
 
 
 @pytest.mark.parametrize("old", RENAMED)
-def test_an_old_name_gives_what_the_new_one_does_with_a_warning(old: str) -> None:
+def test_an_old_name_returns_the_new_object_with_a_warning(old: str) -> None:
     new, end = RENAMED[old]
-    said = f"semsig_gis.{old} is called {new} now; version {end} removes the old name."
-    with pytest.warns(DeprecationWarning, match=f"^{re.escape(said)}$") as warned:
+    message = f"semsig_gis.{old} is called {new} now; version {end} removes the old name."
+    with pytest.warns(DeprecationWarning, match=f"^{re.escape(message)}$") as warned:
         value = getattr(semsig_gis, old)
     assert warned[0].filename == __file__
     assert value is getattr(semsig_gis, new)
 
 
-def test_an_import_by_an_old_name_is_warned_of_where_it_stands() -> None:
+def test_the_warning_names_the_file_that_imports_an_old_name() -> None:
     with pytest.warns(DeprecationWarning, match="draft_catalog") as warned:
         exec("from semsig_gis import suggest_catalog", {"__name__": "theirs"})  # noqa: S102
     assert warned[0].filename == "<string>"
