@@ -69,7 +69,7 @@ class Outcome:
     in_region : bool or None
         Whether the true cell is in the region of 90 %; None without a region.
     region_mass : float or None
-        Chance of that region, as stated by the method. It is of whole cells, so often above 90 %.
+        Chance of that region, as stated by the method; often above 90 %, as it has whole cells.
     in_exact_region : float or None
         The same as `in_region` if the cells of the region with the lowest chance, which tie, count
         only with the part that makes the chance of the region exactly 90 %.

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 SIZES = ("full", "small")
+# Keys of results: the inputs of the method, and figures with only the last photo of a route.
+INPUTS, LAST_ONLY = "told", "alone"
 FOLDER = Path(__file__).parent
 
 

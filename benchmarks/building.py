@@ -56,7 +56,7 @@ def _building(objects: StreetObjects, path: Path, *, repeats: int) -> Comparison
         f"building and saving a database from {len(objects):,} objects",
         ours,
         peer,
-        peer_name="scipy.spatial.cKDTree, the pairs alone",
+        peer_name="scipy.spatial.cKDTree, only the pairs",
         repeats=repeats,
         bar=1 / 3,
     )

@@ -19,6 +19,7 @@ import pandas as pd
 from benchmarks._cities import MADE_UP, MONTPELLIER, made_up, real
 from benchmarks._later_city import later_city
 from benchmarks._measuring import (
+    INPUTS,
     add_geodata,
     available_cities,
     option_parser,
@@ -96,7 +97,7 @@ def main() -> None:
                 continue
             row = {**case, **measure()}
             print(
-                f"{row['city']}, {row['map']}, {row['told']} (n={row['queries']}): within 50 m "
+                f"{row['city']}, {row['map']}, {row[INPUTS]} (n={row['queries']}): within 50 m "
                 f"{row['p50']:.3f}; {row['answered']} from 0.9 on, {row['right']} right",
                 flush=True,
             )
@@ -115,7 +116,7 @@ def _cases(
         read = functools.partial(real, Path(str(geodata)))
     city = _City(read(name))
     if name != MADE_UP:
-        case = {"city": name, "map": TODAY, "told": "", "levels": [*LEVELS]}
+        case = {"city": name, "map": TODAY, INPUTS: "", "levels": [*LEVELS]}
         count = 5 if small else 300
         yield case, functools.partial(_figures, city, city, LEVELS, count)
     if name == "Monaco":
@@ -130,7 +131,7 @@ def _cases(
             settings = f"--map-age {years:g}" + " --drift-report" * (drift is not named_drift())
             noise = aged_noise(noise, years, database=city.database, drift=drift)
         map_ = f"{years:g} years old"
-        case = {"city": name, "map": map_, "told": settings, "levels": [*OLD_LEVELS]}
+        case = {"city": name, "map": map_, INPUTS: settings, "levels": [*OLD_LEVELS]}
         count = 5 if small else 200
         yield case, functools.partial(_figures, city, now, OLD_LEVELS, count, noise)
 

@@ -193,7 +193,7 @@ def _texts(values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> list[str]:
 def _check_equal(
     database: SignatureDatabase, query: Signature, part: str, text: str, texts: list[str]
 ) -> None:
-    """Raise if the results of which the times are compared differ."""
+    """Raise if ours and the peer have different results."""
     theirs = cdist([text], texts, scorer=Levenshtein.distance)[0]
     for _ in range(2):  # the second query uses the kernel for large tables
         (ours,) = score_cells(database, [query], Method.parse(f"{part}:edit:raw"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from benchmarks._measuring import FOLDER, read_rows
+from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
 from benchmarks.views import FULL_TURN, RANGES, SECTORS
 from benchmarks.views import bars as bars_of_views
 
@@ -245,7 +245,7 @@ def _views_text(rows: Sequence[dict[str, Any]]) -> str:
 def _view_table(rows: Iterable[dict[str, Any]]) -> str:
     def cell(row: Mapping[str, Any]) -> str:
         shares = _share(row["p50"]), _share(row["p50_low"]), _share(row["p50_high"])
-        last = f"; last only {_share(row['alone'])}" if "alone" in row else ""
+        last = f"; last only {_share(row[LAST_ONLY])}" if LAST_ONLY in row else ""
         return "{} ({}-{}){}".format(*shares, last)
 
     return _of_views(rows, cell)
@@ -290,7 +290,7 @@ def _of_views(rows: Iterable[dict[str, Any]], cell: Callable[[Mapping[str, Any]]
     names = ("city", "seen_from", "photos", "degrees", "queries", "least", "heading")
     lines: dict[tuple[Any, ...], dict[str, str]] = {}
     for row in rows:
-        lines.setdefault(tuple(row[name] for name in names), {})[row["told"]] = cell(row)
+        lines.setdefault(tuple(row[name] for name in names), {})[row[INPUTS]] = cell(row)
     return _table(
         " | ".join(
             ["city", "from", "photos", "degrees", "queries", "detections", "heading", *columns]
@@ -324,7 +324,7 @@ def _old_table(rows: Iterable[dict[str, Any]]) -> str:
         "right, of those below 0.99",
         (
             (
-                *(row["city"], row["map"], f"`{row['told']}`" if row["told"] else "nothing"),
+                *(row["city"], row["map"], f"`{row[INPUTS]}`" if row[INPUTS] else "nothing"),
                 *(_share(row["p50"]), _share(row["stated"])),
                 f"{row['answered']} of {row['queries']}",
                 f"{row['right'] / row['answered']:.3f}",

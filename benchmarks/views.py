@@ -26,6 +26,8 @@ from benchmarks._accuracy_queries import straight_walk
 from benchmarks._accuracy_rows import Bar
 from benchmarks._cities import MONTPELLIER, PARIS_LIKE, made_up, made_up_streets, real
 from benchmarks._measuring import (
+    INPUTS,
+    LAST_ONLY,
     add_geodata,
     available_cities,
     option_parser,
@@ -109,7 +111,7 @@ class Line:
     def to_dict(self) -> dict[str, Any]:
         """Return the line as values of a row of ``views.json``."""
         values = asdict(self)
-        values["told"] = values.pop("inputs")
+        values[INPUTS] = values.pop("inputs")
         return values
 
 
@@ -293,7 +295,7 @@ def _answers(
             "in_region": _in_region(location, question.cell),
         }
         if question.legs:
-            row["alone"] = _right(locator.locate(question.views[-1]), question)
+            row[LAST_ONLY] = _right(locator.locate(question.views[-1]), question)
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -327,8 +329,8 @@ def _figures(answers: pd.DataFrame) -> dict[str, Any]:
             {key: short(value) for key, value in tenth.items()} for tenth in plain_records(tenths)
         ],
     }
-    if "alone" in answers:
-        values |= _interval("alone", answers["alone"])
+    if LAST_ONLY in answers:
+        values |= _interval(LAST_ONLY, answers[LAST_ONLY])
     return values
 
 
@@ -341,10 +343,10 @@ def _interval(name: str, hits: pd.Series[float]) -> dict[str, float | None]:
 def _text(row: dict[str, Any]) -> str:
     """Return a row as text."""
     off = "" if row["off"] is None else f", tenths at most {row['off']:.3f} off"
-    last = f" (only the last photo {row['alone']:.3f})" if "alone" in row else ""
+    last = f" (only the last photo {row[LAST_ONLY]:.3f})" if LAST_ONLY in row else ""
     return (
         f"{row['city']}, from {row['seen_from']}, {row['photos']} x {row['degrees']} degrees, "
-        f"{row['least']} or more, heading {row['heading']}, {row['told']} (n={row['queries']}): "
+        f"{row['least']} or more, heading {row['heading']}, {row[INPUTS]} (n={row['queries']}): "
         f"within 50 m {row['p50']:.3f} [{row['p50_low']:.3f}, {row['p50_high']:.3f}]{last}, "
         f"stated {row['stated']:.3f}{off}, in the region of 90 % {row['in_region']:.3f}, "
         f"{row['ms']:.3g} ms"
@@ -356,13 +358,13 @@ def bars(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Bar]]:
 
     Shares have bars in the Paris-like city, from cells; chances have bars in every city.
     """
-    with_sectors = [row for row in rows if row["told"] != FULL_TURN]
+    with_sectors = [row for row in rows if row[INPUTS] != FULL_TURN]
     like_paris = [row for row in rows if row["city"] == PARIS_LIKE and row["seen_from"] == "cells"]
     yield from ((PARIS_LIKE, bar) for bar in _share_bars(like_paris))
     for row in like_paris:
-        if "alone" in row:
-            ratio = row["p50"] / row["alone"] if row["alone"] else math.inf
-            what = f"route of {row['photos']} photos, {row['told']}, to only the last one"
+        if LAST_ONLY in row:
+            ratio = row["p50"] / row[LAST_ONLY] if row[LAST_ONLY] else math.inf
+            what = f"route of {row['photos']} photos, {row[INPUTS]}, to only the last one"
             yield PARIS_LIKE, Bar(what=what, value=ratio, low=3.0)
     for city, seen_from in dict.fromkeys((row["city"], row["seen_from"]) for row in with_sectors):
         lines = [
@@ -389,7 +391,7 @@ def _luck(rows: Sequence[dict[str, Any]], off: float) -> float:
 
 def _share_bars(rows: Iterable[dict[str, Any]]) -> Iterator[Bar]:
     shares = {
-        (row["degrees"], row["least"], row["told"]): row["p50"]
+        (row["degrees"], row["least"], row[INPUTS]): row["p50"]
         for row in rows
         if row["heading"] == KNOWN
     }

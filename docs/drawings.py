@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 RESULTS = Path(__file__).resolve().parents[1] / "benchmarks"
 FOUND, RECALL = "P(error ≤ 50 m)", "recall@10 %"
 SHORT = {"types": "types", "angles": "angles", "types and angles, 5 %": "both"}
+INPUTS = "told"  # key of the inputs of the method
 FEWEST = 25  # queries for which a share is drawn
 LEVELS = ("light", "medium", "strong")
 RIVALS = {
@@ -151,8 +152,8 @@ def ages() -> Picture:
         for row in _results("chances.json")
         if row["map"] != "of the day" and row["city"] != "made up"
     ]
-    rows.sort(key=lambda row: (row["city"], row["told"]))
-    names = [f"{row['city']}: {row['told'] or row['map'] + ', age not given'}" for row in rows]
+    rows.sort(key=lambda row: (row["city"], row[INPUTS]))
+    names = [f"{row['city']}: {row[INPUTS] or row['map'] + ', age not given'}" for row in rows]
     places = np.arange(len(rows))[::-1]
     shares = np.array([row["right"] / row["answered"] for row in rows])
     ends = np.array([[row["low"], row["high"]] for row in rows]).T

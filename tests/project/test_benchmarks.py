@@ -18,7 +18,7 @@ from noisy_cells import every_association, random_database
 from view_oracle import cell_loglik, random_view
 
 from benchmarks import bayes, chances, history, stranger, tables, views
-from benchmarks._measuring import FOLDER, read_rows
+from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
 from benchmarks.views import NOISE
 from semsig_gis.maps import page
 from semsig_gis.observation import Photo, View
@@ -190,7 +190,7 @@ def test_chances_on_old_maps_are_measured_once(
     assert "Real cities are left out" in capsys.readouterr().out
     written = out.read_text(encoding="utf-8")
     rows = json.loads(written)
-    assert [row["told"] for row in rows] == [
+    assert [row[INPUTS] for row in rows] == [
         *("", "--map-age 3 --drift-report", "--map-age 3"),
     ]
     for row in rows:
@@ -219,7 +219,7 @@ def test_views_are_measured_once(
     for row in rows:
         assert 0.0 <= row["p50_low"] <= row["p50"] <= row["p50_high"] <= 1.0
         assert row["queries"] == sum(tenth["n"] for tenth in row["bins"]) == 2
-    assert [row["photos"] for row in rows if "alone" in row] == [5]
+    assert [row["photos"] for row in rows if LAST_ONLY in row] == [5]
     out.write_text(json.dumps(rows[:-1]), encoding="utf-8")
     views.main()  # measures the missing row
     assert json.loads(out.read_text(encoding="utf-8"))[:-1] == rows[:-1]
