@@ -1,4 +1,4 @@
-"""Databases of given, of six or of random cells, and random queries and noise models."""
+"""Small and random databases, random queries and noise models."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ NOTHING = Signature(np.empty(0, np.uint8), np.empty(0))
 def random_database(
     seed: int, *, cells: int = 40, longest: int = 12, classes: int = 4
 ) -> SignatureDatabase:
-    """Return cells with one to so many random objects of the first classes."""
+    """Return cells with 1 to `longest` random objects of the first classes."""
     rng = np.random.default_rng(seed)
     lengths = rng.integers(1, longest + 1, cells)
     entries = int(lengths.sum())
@@ -69,7 +69,7 @@ def random_database(
 def database_of(
     signatures: Sequence[tuple[str, Sequence[float]]], *, height: int = 1
 ) -> SignatureDatabase:
-    """Return cells with these types and bearings, in columns of so many cells."""
+    """Return cells with these types and bearings, in columns of `height` cells."""
     bearings = np.array([angle for _, angles in signatures for angle in angles], dtype=float)
     columns, rows = np.divmod(np.arange(len(signatures), dtype=np.int32), np.int32(height))
     return SignatureDatabase(
@@ -87,7 +87,7 @@ def database_of(
     )
 
 
-# Six cells: by type three DD, one DB, two B; by angle (levels) four alike, two alike.
+# Six cells: by type three DD, one DB and two B; by angle levels four and two equal ones.
 SIX = [
     ("DD", [10, 100]),
     ("DD", [10, 100]),
@@ -117,7 +117,7 @@ def cells_at(
     longest: int = 1,
     **facts: Any,  # noqa: ANN401
 ) -> SignatureDatabase:
-    """Return cells at places, each of which sees one object, or random numbers of them."""
+    """Return cells at places that see one object, or up to `longest` objects."""
     order = np.lexsort((rows, columns))
     lengths = np.random.default_rng(0).integers(1, longest + 1, len(order))
     objects = int(lengths.sum())
@@ -139,7 +139,7 @@ def rows(table: Table) -> Mapping[str, tuple[str, ...]]:
 
 
 def random_cells(count: int, *, seed: int = 0) -> list[tuple[str, list[float]]]:
-    """Return short signatures of few classes, so that many are equal or tie."""
+    """Return short signatures of few classes; many are equal or tie."""
     rng = np.random.default_rng(seed)
     return [
         ("".join(rng.choice(list("DDDBG"), length)), np.sort(rng.uniform(0, 360, length)).tolist())
@@ -170,7 +170,7 @@ def distorted(database: SignatureDatabase, cell: int, rng: np.random.Generator) 
 
 
 def turned_query(query: Signature, turn: float) -> Signature:
-    """Return a query with so many degrees added to its bearings."""
+    """Return a query with `turn` degrees added to its bearings."""
     codes, bearings = parts_of(query)
     return Signature(codes, (bearings + turn) % 360.0)
 
@@ -187,12 +187,12 @@ def noisy_town(seed: int) -> World:
 
 
 def every_association(weights: np.ndarray) -> tuple[float, np.ndarray]:
-    """Sum over all one-to-one associations, one at a time: the logarithm, and chances of pairs."""
+    """Sum over all one-to-one associations: the logarithm, and the probabilities of pairs."""
     objects, detections = weights.shape
     total, chances = 0.0, np.zeros_like(weights)
     for choice in itertools.product(range(-1, detections), repeat=objects):
-        pairs = [(one, other) for one, other in enumerate(choice) if other >= 0]
-        if len(pairs) > len({other for _, other in pairs}):
+        pairs = [(row, column) for row, column in enumerate(choice) if column >= 0]
+        if len(pairs) > len({column for _, column in pairs}):
             continue
         part = math.prod(weights[pair] for pair in pairs)
         total += part
@@ -227,6 +227,6 @@ def noise_specs(draw: st.DrawFn) -> NoiseSpec:
 def mixtures() -> st.SearchStrategy[Noise]:
     """Draw a noise model, single or mixed."""
     pair = st.tuples(noise_specs(), noise_specs()).map(
-        lambda two: NoiseMixture(specs=two, weights=(0.3, 0.7))
+        lambda specs: NoiseMixture(specs=specs, weights=(0.3, 0.7))
     )
     return st.one_of(noise_specs(), pair, st.just(named_noise("generic")))

@@ -1,4 +1,4 @@
-"""Things to be seen, for the tests of what happens to them."""
+"""Sights for the tests of distortions."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def sight(objects: list[tuple[int, float, float]]) -> Sight:
 
 sights = st.lists(
     st.tuples(st.sampled_from(CLASSES), st.floats(0, 359.99), st.floats(0, REACH)), max_size=12
-).map(lambda objects: sight(sorted(objects, key=lambda one: one[1])))
+).map(lambda objects: sight(sorted(objects, key=lambda item: item[1])))
 
 
 def many(count: int, *, code: int = 3, distance: float = 10.0, bearing: float = 90.0) -> Sight:
@@ -54,14 +54,14 @@ def many(count: int, *, code: int = 3, distance: float = 10.0, bearing: float = 
 
 
 def all_round(count: int) -> Sight:
-    """Return objects all round, evenly."""
-    turns = np.linspace(0.0, 360.0, count, endpoint=False)
-    return sight([(3, turn, 10.0) for turn in turns.tolist()])
+    """Return objects in all directions, evenly spaced."""
+    angles = np.linspace(0.0, 360.0, count, endpoint=False)
+    return sight([(3, angle, 10.0) for angle in angles.tolist()])
 
 
-def rows(one: Sight) -> list[tuple[int, float, float]]:
-    """Return the objects one by one."""
-    columns = (one.codes.tolist(), one.bearings.tolist(), one.distances.tolist())
+def rows(sight: Sight) -> list[tuple[int, float, float]]:
+    """Return the objects as (class code, bearing, distance)."""
+    columns = (sight.codes.tolist(), sight.bearings.tolist(), sight.distances.tolist())
     return list(zip(*columns, strict=True))
 
 
@@ -71,6 +71,6 @@ def away(bearings: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
 
 
 def assert_rate(hits: float, trials: int, chance: float) -> None:
-    """Check a rate: neither tail of the binomial is unheard of."""
+    """Check a rate: neither tail of the binomial distribution is extremely unlikely."""
     low, high = binom.cdf(hits, trials, chance), binom.sf(hits - 1, trials, chance)
     assert min(low, high) > 1e-9, (hits / trials, chance)

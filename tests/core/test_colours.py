@@ -1,4 +1,4 @@
-"""Colours: that none has two meanings, and that all people tell apart what can lie on each other.
+"""No colour has two meanings, and overlapping colours are distinguishable for all people.
 
 Colour blindness is simulated after Machado, Oliveira and Fernandes (2009) at full severity, and
 colours are as far apart as CIEDE2000 says.
@@ -52,7 +52,7 @@ ANSWER_MARKS = [mark.colour for mark in ANSWERS.values()]
 
 
 def rgb(colours: list[str]) -> np.ndarray:
-    return np.array([list(bytes.fromhex(one[1:])) for one in colours]) / 255.0
+    return np.array([list(bytes.fromhex(colour[1:])) for colour in colours]) / 255.0
 
 
 def flipped(colours: list[str]) -> np.ndarray:
@@ -71,7 +71,7 @@ def distances(ones: np.ndarray, others: np.ndarray, sight: str) -> np.ndarray:
     """Return how far apart colours are for a sight, shape (ones, others)."""
     # Imported here, because it takes half a second. It sets how numpy prints.
     with warnings.catch_warnings(), np.printoptions():
-        warnings.simplefilter("ignore")  # it tells what it lacks, and of its tritanopia
+        warnings.simplefilter("ignore")  # on optional packages and its tritanopia model
         import colour
 
         lack = SIGHTS[sight]
@@ -79,8 +79,8 @@ def distances(ones: np.ndarray, others: np.ndarray, sight: str) -> np.ndarray:
     labs = []
     for colours in (ones, others):
         light = np.clip(colour.models.eotf_sRGB(colours) @ seen_of, 0.0, 1.0)
-        seen = colour.models.eotf_inverse_sRGB(light)
-        labs.append(colour.XYZ_to_Lab(colour.sRGB_to_XYZ(seen)))
+        simulated = colour.models.eotf_inverse_sRGB(light)
+        labs.append(colour.XYZ_to_Lab(colour.sRGB_to_XYZ(simulated)))
     return np.asarray(colour.delta_E(labs[0][:, None], labs[1][None], method="CIE 2000"))
 
 
@@ -113,7 +113,7 @@ PAIRS = {
     **{
         f"{what}, {name}": (ones, others)
         for name, colours in (
-            ("cells alike", [*GROUP_COLOURS.values()]),
+            ("cells with equal signatures", [*GROUP_COLOURS.values()]),
             ("cells found", [*FOUND_RAMP]),
             ("cells that differ", CHANGES),
         )
@@ -134,18 +134,21 @@ PAIRS = {
     "outcomes, cells that are the same": (rgb(MARKS), rgb([SAME])),
     "outcomes in the dark, cells that are the same": (rgb(MARKS), flipped([SAME])),
     **{
-        f"{one}, {other}": (rgb([table[one]]), rgb([table[other]]))
+        f"{first}, {second}": (rgb([table[first]]), rgb([table[second]]))
         for table in (VERDICTS, OBJECT_COLOURS)
-        for one, other in itertools.combinations(table, 2)
+        for first, second in itertools.combinations(table, 2)
     },
-    "rays to objects": (rgb([VERDICTS[one] for one in RAYS]), np.concatenate([LIGHT, DARK])),
+    "rays to objects": (
+        rgb([VERDICTS[verdict] for verdict in RAYS]),
+        np.concatenate([LIGHT, DARK]),
+    ),
     "changes": (rgb(CHANGES), rgb([SAME])),
     "changes in the dark": (lifted(CHANGES), flipped([SAME])),
 }
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_all_people_tell_apart_what_lies_on_each_other(sight: str) -> None:
+def test_overlapping_colours_are_distinguishable_for_all_people(sight: str) -> None:
     assert FLIPPED
     assert LIFTED
     assert len(GROUND) == 2
@@ -154,16 +157,16 @@ def test_all_people_tell_apart_what_lies_on_each_other(sight: str) -> None:
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_signs_of_classes_are_told_by_outlines_too(sight: str) -> None:
-    """Eighteen colours are too many for colour alone, so either the fill or the outline does it."""
+def test_class_signs_contrast_with_the_ground_by_fill_or_outline(sight: str) -> None:
+    """Eighteen colours are too many to differ, so either the fill or the outline must contrast."""
     edges = {"light": "#222222", "dark": "#e9e9e6"}
     assert 'isDark(map) ? "#e9e9e6" : "#222"' in script("controls.js")
     assert 'dark ? "#131518" : bright ? "#444" : "#fff"' in script("objects.js")
     for ground, edge in edges.items():
-        for one in COLOURS:
-            bright = ClassSign("A", "a", "circle", one).ink == "#000000"
+        for colour in COLOURS:
+            bright = ClassSign("A", "a", "circle", colour).ink == "#000000"
             own = "#131518" if ground == "dark" else "#444444" if bright else "#ffffff"
-            sign, fill = rgb([one, own]), rgb([one])
+            sign, fill = rgb([colour, own]), rgb([colour])
             for below in (rgb(MARKS), FIELD):
                 assert distances(sign, below, sight).max(axis=0).min() >= APART
             for mark in MARKS:
@@ -171,7 +174,7 @@ def test_signs_of_classes_are_told_by_outlines_too(sight: str) -> None:
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_signs_of_objects_are_told_from_what_is_below_by_fill_or_edge(sight: str) -> None:
+def test_object_signs_contrast_with_the_ground_by_fill_or_edge(sight: str) -> None:
     light, dark = rgb([SAME, *CHANGES]), np.concatenate([flipped([SAME]), lifted(CHANGES)])
     for signs, edge, below in (
         (VERDICTS, "#222222", LIGHT),
@@ -197,26 +200,26 @@ def meanings() -> list[str]:
     return [*itertools.chain(*tables)]
 
 
-def test_no_two_meanings_share_a_colour() -> None:
+def test_no_colour_has_two_meanings() -> None:
     counts = Counter([*meanings(), *COLOURS])
-    assert [one for one, count in counts.items() if count > 1] == []
+    assert [colour for colour, count in counts.items() if count > 1] == []
 
 
-def test_the_colours_of_reports_mean_nothing_else() -> None:
+def test_colours_of_reports_have_no_other_meaning() -> None:
     # Their curves and the classes, which no picture has together, are both many things of a kind.
     inks = (plots.INK, plots.GROUND, plots.AXIS, plots.TICK, plots.GRID, plots.SOFT)
-    drawn = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.GROUND}
-    assert drawn & {*meanings()} == set()
+    used = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.GROUND}
+    assert used & {*meanings()} == set()
 
 
-def test_web_and_qgis_draw_from_the_same_tables() -> None:
+def test_web_and_qgis_use_the_same_colours() -> None:
     assert len({mark.shape for mark in OUTCOMES.values()}) == len(OUTCOMES)
     root = ET.fromstring(by_outcome(geometry="point").renderer)  # noqa: S314 - our own
     for (outcome, mark), category in zip(OUTCOMES.items(), root.iter("category"), strict=True):
         assert (category.get("value"), category.get("label")) == (outcome, outcome)
         symbol = root.find(f".//symbol[@name='{category.get('symbol')}']")
         assert symbol is not None
-        options = {one.get("name"): one.get("value") for one in symbol.iter("Option")}
+        options = {item.get("name"): item.get("value") for item in symbol.iter("Option")}
         red, green, blue = bytes.fromhex(mark.colour[1:])
         assert options["color"] == f"{red},{green},{blue},255"
         assert options["name"] == CLASS_MARKERS[mark.shape][0]

@@ -70,7 +70,7 @@ def results() -> dict[str, object]:
     query, store = database.signature(3), ObjectStore.of(town.street_objects)
     location = locate(index, query, store=store, explained=1)
     evaluation = evaluate(database, queries=5)
-    told = identify(index, trials=5, class_trials=2)
+    identifiability = identify(index, trials=5, class_trials=2)
     layers = synthetic_city(CitySpec(size=100.0))
     loaded = assemble(layers, load_catalog("openstreetmap"))
     return {
@@ -90,8 +90,8 @@ def results() -> dict[str, object]:
         "SearchRegions": search_regions(location, database),
         "Evaluation": evaluation,
         "ErrorField": error_field(evaluation, database),
-        "Identifiability": told,
-        "IdentifiabilityCheck": check_identifiability(told, index, queries=5),
+        "Identifiability": identifiability,
+        "IdentifiabilityCheck": check_identifiability(identifiability, index, queries=5),
         "Sight": Sight.of_cell(database, 3),
         "Scene": cell_scene(database, 3),
         "Drift": named_drift(),
@@ -120,7 +120,7 @@ def results() -> dict[str, object]:
     }
 
 
-def test_every_result_is_told_on_one_line_and_as_a_table(results: dict[str, object]) -> None:
+def test_every_result_has_a_one_line_text_and_an_html_table(results: dict[str, object]) -> None:
     for name, result in results.items():
         assert isinstance(result, Displayed)
         line = repr(result)
@@ -129,11 +129,11 @@ def test_every_result_is_told_on_one_line_and_as_a_table(results: dict[str, obje
         assert len(line) < LONGEST_LINE
         page = HtmlPage(result._repr_html_())
         assert page.text_of["caption"] == [name]
-        told = zip(page.text_of["th"], page.text_of["td"], strict=True)
-        assert f"<{name}: {'; '.join(' '.join(fact) for fact in told)}>" == line
+        facts = zip(page.text_of["th"], page.text_of["td"], strict=True)
+        assert f"<{name}: {'; '.join(' '.join(fact) for fact in facts)}>" == line
 
 
-def test_what_a_database_and_an_answer_tell(results: dict[str, object]) -> None:
+def test_text_of_a_database_and_of_an_answer(results: dict[str, object]) -> None:
     index = results["LikelihoodIndex"]
     assert isinstance(index, LikelihoodIndex)
     database = index.database
@@ -143,7 +143,7 @@ def test_what_a_database_and_an_answer_tell(results: dict[str, object]) -> None:
     assert "bounds none" in repr(nothing_of(database))
 
 
-def test_objects_of_a_file_are_street_objects(results: dict[str, object], tmp_path: Path) -> None:
+def test_objects_of_a_file_have_the_same_text(results: dict[str, object], tmp_path: Path) -> None:
     objects = results["StreetObjects"]
     assert isinstance(objects, StreetObjects)
     save_objects(objects, tmp_path / "objects.parquet")
@@ -155,7 +155,7 @@ def nothing_of(database: SignatureDatabase) -> SignatureDatabase:
 
 
 @pytest.mark.parametrize("text", [HOSTILE, "two\nlines\0", "long " * 100])
-def test_text_from_data_breaks_nothing(text: str) -> None:
+def test_text_from_data_is_escaped_and_shortened(text: str) -> None:
     town = Town(text)
     assert repr(town).isprintable()
     assert len(repr(town)) < 100
@@ -163,7 +163,7 @@ def test_text_from_data_breaks_nothing(text: str) -> None:
     assert HtmlPage(town._repr_html_()).tags <= {"table", "caption", "tbody", "tr", "th", "td"}
 
 
-def test_pictures_and_maps_do_not_print_their_files(results: dict[str, object]) -> None:
+def test_texts_of_pictures_and_maps_are_short(results: dict[str, object]) -> None:
     scene = results["Scene"]
     assert isinstance(scene, Scene)
     assert len(repr(draw_scene(scene))) < 1000

@@ -14,7 +14,7 @@ NAMES = st.text(st.characters(codec="utf-8"), max_size=12)
 
 
 @pytest.mark.parametrize("name", [name for name in vars(errors) if name.endswith("Error")])
-def test_one_root_catches_every_error_and_so_does_a_builtin(name: str) -> None:
+def test_errors_have_the_base_class_and_a_builtin_class(name: str) -> None:
     kind = getattr(errors, name)
     assert issubclass(kind, errors.SemsigError)
     if kind is not errors.SemsigError:
@@ -33,7 +33,7 @@ def test_one_root_catches_every_error_and_so_does_a_builtin(name: str) -> None:
         ("", ["layer"], None),
     ],
 )
-def test_a_misspelt_name_is_offered_its_nearest(
+def test_misspelt_name_gets_the_nearest_name(
     name: str, names: list[str], nearest: str | None
 ) -> None:
     offer = f"; the nearest is {nearest!r}" if nearest else ""
@@ -41,7 +41,7 @@ def test_a_misspelt_name_is_offered_its_nearest(
 
 
 @given(NAMES, st.lists(NAMES, max_size=5))
-def test_what_is_offered_is_one_of_the_names(name: str, names: list[str]) -> None:
+def test_nearest_name_is_one_of_the_names(name: str, names: list[str]) -> None:
     offer = errors.nearest_name(name, names)
     assert not offer or offer in {f"; the nearest is {item!r}" for item in names}
     if name:  # which is nearest to itself
@@ -56,7 +56,7 @@ def test_what_is_offered_is_one_of_the_names(name: str, names: list[str]) -> Non
         ("raster", "rasterio", "import semsig_gis.storage.raster"),
     ],
 )
-def test_an_extra_that_is_missing_is_named(name: str, package: str, use: str) -> None:
+def test_error_names_a_missing_extra(name: str, package: str, use: str) -> None:
     script = (
         f"import sys\nsys.modules[{package!r}] = None\n"
         "from semsig_gis.core import parallel\n"
@@ -64,13 +64,13 @@ def test_an_extra_that_is_missing_is_named(name: str, package: str, use: str) ->
         f"try:\n    {use}\n"
         "except InputError as error:\n    print(error)\n"
     )
-    said = subprocess.run(
+    output = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, check=True, text=True
     ).stdout
-    assert f"needs {package}, which is not installed" in said
-    assert f"pip install 'semsig_gis[{name}]'." in said
+    assert f"needs {package}, which is not installed" in output
+    assert f"pip install 'semsig_gis[{name}]'." in output
 
 
-def test_a_fault_of_our_own_is_no_missing_extra() -> None:
+def test_missing_module_of_the_package_is_no_missing_extra() -> None:
     with pytest.raises(ModuleNotFoundError), extra("serve", "the workbench"):
         importlib.import_module("semsig_gis.nowhere")

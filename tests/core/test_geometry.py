@@ -74,7 +74,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("crs", METRIC.values(), ids=METRIC)
-def test_a_metric_system_is_accepted(crs: str | int) -> None:
+def test_metric_crs_is_accepted(crs: str | int) -> None:
     system = require_metric_crs(crs)
     assert system.is_projected
     assert len(system.axis_info) == 2
@@ -82,13 +82,13 @@ def test_a_metric_system_is_accepted(crs: str | int) -> None:
 
 
 @pytest.mark.parametrize(("crs", "words"), REFUSED.values(), ids=REFUSED)
-def test_another_system_is_refused_in_one_sentence(crs: str | int | None, words: str) -> None:
+def test_other_crs_is_refused(crs: str | int | None, words: str) -> None:
     with refused(CrsError, words, "give a projected CRS in metres"):
         require_metric_crs(crs)
 
 
 @pytest.mark.parametrize("crs", ["EPSG:2154", "EPSG:32631", "EPSG:31467", "EPSG:2056"])
-def test_one_metre_is_one_metre_in_an_accepted_system(crs: str) -> None:
+def test_metre_in_an_accepted_crs_is_a_metre_on_the_ground(crs: str) -> None:
     area = require_metric_crs(crs).area_of_use
     assert area is not None
     middle = (area.west + area.east) / 2, (area.south + area.north) / 2
@@ -110,7 +110,7 @@ PLACES = {  # a metric system, longitude and latitude
 
 
 @pytest.mark.parametrize(("code", "longitude", "latitude"), PLACES.values(), ids=PLACES)
-def test_convergence_leads_from_the_grid_to_true_north(
+def test_convergence_is_the_angle_to_true_north(
     code: str, longitude: float, latitude: float
 ) -> None:
     crs = require_metric_crs(code)
@@ -125,7 +125,7 @@ def test_convergence_leads_from_the_grid_to_true_north(
         assert apart(azimuth, bearing + angle) < 1e-4
 
 
-def test_convergence_nowhere_is_not_a_number() -> None:
+def test_convergence_off_the_earth_is_nan() -> None:
     crs = require_metric_crs("EPSG:32631")
     assert np.isnan(grid_convergence(crs, [(math.inf, 0.0), (math.nan, 1.0)])).all()
     assert grid_convergence(crs, np.empty((0, 2))).shape == (0,)
@@ -143,14 +143,14 @@ def apart(a: float, b: float) -> float:
 
 
 @given(ANGLES)
-def test_wrapping_lands_on_one_turn_and_stays_there(angle: float) -> None:
+def test_wrapped_angles_are_on_one_turn(angle: float) -> None:
     once = wrap_degrees(angle)
     assert 0.0 <= once < 360.0
     assert wrap_degrees(once) == once
     assert apart(float(once), angle) < 1e-6
 
 
-def test_whole_turns_do_not_matter() -> None:
+def test_full_turns_do_not_change_a_direction() -> None:
     assert wrap_degrees(np.arange(-720, 1080)).tolist() == [*range(360)] * 5
     # A tiny negative angle does not become a whole turn.
     assert wrap_degrees([-1e-20, -5e-324, -0.0, 360.0, 720.0]).tolist() == [0.0] * 5
@@ -181,7 +181,7 @@ POINTS = st.lists(st.tuples(METRES, METRES), min_size=1, max_size=5)
 
 
 @given(st.lists(st.tuples(CELLS, CELLS), min_size=1, unique=True))
-def test_a_cell_number_tells_its_column_and_row(cells: list[tuple[int, int]]) -> None:
+def test_cell_number_is_split_into_column_and_row(cells: list[tuple[int, int]]) -> None:
     columns, rows = zip(*cells, strict=True)
     numbers = cell_ids(columns, rows)
     assert numbers.dtype == np.int64
@@ -190,12 +190,12 @@ def test_a_cell_number_tells_its_column_and_row(cells: list[tuple[int, int]]) ->
     assert cell_ids(*zip(*sorted(cells), strict=True)).tolist() == sorted(numbers.tolist())
 
 
-def test_a_cell_number_can_be_read() -> None:
+def test_cell_number_has_readable_digits() -> None:
     assert cell_ids([76520, 0, -1], [627500, 3, -2]).tolist() == [7652000627500, 3, -100000002]
 
 
 @given(ORIGINS, STEPS, st.lists(st.tuples(st.integers(-9999, 9999), st.integers(-9999, 9999))))
-def test_the_centre_of_a_cell_lies_in_it(
+def test_centre_of_a_cell_is_in_the_cell(
     origin: tuple[float, float], step: float, cells: list[tuple[int, int]]
 ) -> None:
     grid = GridSpec(step, origin)
@@ -206,7 +206,7 @@ def test_the_centre_of_a_cell_lies_in_it(
 
 
 @given(ORIGINS, STEPS, POINTS)
-def test_a_point_lies_in_its_cell(
+def test_point_is_in_its_cell(
     origin: tuple[float, float], step: float, points: list[tuple[float, float]]
 ) -> None:
     grid = GridSpec(step, origin)
@@ -214,7 +214,7 @@ def test_a_point_lies_in_its_cell(
     assert (np.abs(centres - points) <= step / 2 + 1e-6).all()
 
 
-def test_a_point_on_an_edge_belongs_east_and_north() -> None:
+def test_point_on_an_edge_belongs_to_the_cell_east_or_north() -> None:
     columns, rows = GridSpec(10.0, (5.0, 5.0)).cells_at([(5, 5), (15, 14.9), (4.9, 5), (-5, -5.1)])
     assert (columns.tolist(), rows.tolist()) == ([0, 1, -1, -1], [0, 0, 0, -2])
 
@@ -235,7 +235,7 @@ def test_cells_near_points_fill_a_square_around_each(
 
 
 @given(st.integers(-20, 20), st.integers(-20, 20), st.sampled_from([5.0, 15.0, 25.0, 10.0, 20.0]))
-def test_a_centre_at_exactly_the_radius_is_not_left_out(x: int, y: int, radius: float) -> None:
+def test_cell_with_centre_at_the_radius_is_included(x: int, y: int, radius: float) -> None:
     # Points on edges and at centres of cells, where rounding would show.
     columns, rows = cells_near(np.array([[5.0 * x, 5.0 * y]]), grid=GridSpec(), radius=radius)
     cells = set(zip(columns.tolist(), rows.tolist(), strict=True))
@@ -255,9 +255,7 @@ def test_a_centre_at_exactly_the_radius_is_not_left_out(x: int, y: int, radius: 
         ),
     ],
 )
-def test_a_grid_has_a_step_in_metres_and_a_finite_origin(
-    name: str, value: object, words: str
-) -> None:
+def test_invalid_step_or_origin_is_refused(name: str, value: object, words: str) -> None:
     with refused(InputError, f"{name} is {value}", words):
         GridSpec(**{name: value})  # type: ignore[arg-type]
 
@@ -272,14 +270,12 @@ def test_a_grid_has_a_step_in_metres_and_a_finite_origin(
         ((math.nan, 0.0), GridSpec()),
     ],
 )
-def test_a_cell_that_cannot_be_numbered_is_an_error(
-    xy: tuple[float, float], grid: GridSpec
-) -> None:
+def test_cell_too_far_from_the_origin_is_refused(xy: tuple[float, float], grid: GridSpec) -> None:
     with refused(InputError, f"({grid.step:g} m)", "larger"):
         cells_near(np.array([[900.0, 0.0], xy]), grid=grid, radius=grid.step)
 
 
-def test_a_step_far_below_the_range_is_an_error() -> None:
+def test_too_small_step_for_the_range_is_refused() -> None:
     for step in (0.01, 0.03):
         with refused(InputError, f"step of {step:g} m", "range of 30 m", "at least 0.03"):
             cells_near(np.zeros((1, 2)), grid=GridSpec(step), radius=30.0)

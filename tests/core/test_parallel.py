@@ -28,7 +28,7 @@ def test_workers_return_the_same_outcomes() -> None:
     assert sorted(outcomes, key=lambda outcome: outcome.task) == [*run_tasks(abs, [*range(-5, 0)])]
 
 
-def test_a_task_is_tried_three_times() -> None:
+def test_failing_task_is_attempted_three_times() -> None:
     attempts: list[int] = []
 
     def fail_often(task: int) -> int:

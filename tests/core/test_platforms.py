@@ -40,8 +40,8 @@ def test_without_locks_temporary_folders_are_created_and_removed(
     with temporary_folder(tmp_path) as first, temporary_folder(tmp_path) as second:
         assert {*tmp_path.iterdir()} == {first, second}
     assert list(tmp_path.iterdir()) == []
-    with folder_locked(tmp_path) as alone:
-        assert not alone
+    with folder_locked(tmp_path) as is_locked:
+        assert not is_locked
 
 
 def test_folder_that_cannot_be_opened_is_not_locked(
@@ -51,8 +51,8 @@ def test_folder_that_cannot_be_opened_is_not_locked(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(os, "open", refuse)
-    with folder_locked(tmp_path) as alone:
-        assert not alone
+    with folder_locked(tmp_path) as is_locked:
+        assert not is_locked
 
 
 def test_without_exchange_a_folder_is_replaced_in_two_steps(

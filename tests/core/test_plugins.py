@@ -44,7 +44,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-def test_an_installed_package_is_shown_and_used(installed: Path, tmp_path: Path) -> None:
+def test_installed_package_is_listed_and_used(installed: Path, tmp_path: Path) -> None:
     data, out = tmp_path / "town.benches", tmp_path / "objects.parquet"
     data.write_text("a7 770000 6280000\nb8 770020 6280000\n", encoding="utf-8")
     paths = [str(installed), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
@@ -61,7 +61,7 @@ def test_an_installed_package_is_shown_and_used(installed: Path, tmp_path: Path)
 
     shown = semsig("sources")
     listed = json.loads(shown.stdout)
-    # Packages that the machine has beside it do no harm.
+    # Other installed packages do not matter.
     catalogs = {item["name"]: item["title"] for item in listed["catalogs"]}
     assert catalogs["testville"] == "Testville"
     assert "testville_lines" in listed["readers"]
@@ -99,7 +99,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
         sys.modules.pop(module, None)
 
 
-def test_names_come_sorted_and_paths_are_paths(
+def test_names_are_sorted_and_values_are_paths(
     install: Callable[..., None], tmp_path: Path
 ) -> None:
     city = tmp_path / "city.toml"
@@ -125,7 +125,7 @@ def test_names_come_sorted_and_paths_are_paths(
         ("value = __file__", "is not a .toml file"),
     ],
 )
-def test_a_broken_catalogue_is_told_and_skipped(
+def test_broken_catalogue_is_skipped_with_a_warning(
     install: Callable[..., None], tmp_path: Path, code: str, words: str
 ) -> None:
     good = tmp_path / "good.toml"
@@ -141,14 +141,14 @@ def test_a_broken_catalogue_is_told_and_skipped(
     assert words in str(warning.message)
 
 
-def test_a_reader_that_is_no_function_is_told_and_skipped(install: Callable[..., None]) -> None:
+def test_reader_that_is_no_function_is_skipped_with_a_warning(install: Callable[..., None]) -> None:
     install("bad", READERS, "read_layers = 'x'", bad="read_layers")
     words = r"'bad' of semsig_gis.readers.*it gives 'x', not a function.*; correct or uninstall"
     with pytest.warns(UserWarning, match=words):
         assert "bad" not in installed_readers()
 
 
-def test_one_package_may_use_a_name_in_both_groups(install: Callable[..., None]) -> None:
+def test_package_may_use_a_name_in_both_groups(install: Callable[..., None]) -> None:
     install("north", READERS, "def read_layers(): pass", city="read_layers")
     install("south", CATALOGS, "def read_layers(): pass", other="read_layers")
     with warnings.catch_warnings():
@@ -156,7 +156,7 @@ def test_one_package_may_use_a_name_in_both_groups(install: Callable[..., None])
         assert "city" in installed_readers()
 
 
-def test_a_name_that_is_taken_is_an_error(install: Callable[..., None]) -> None:
+def test_reserved_name_is_refused(install: Callable[..., None]) -> None:
     for package, group, name in (
         ("north", CATALOGS, "city"),
         ("south", CATALOGS, "city"),

@@ -34,12 +34,12 @@ CORNERS = st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-5e6, 1e7)])
 
 
 def shifted(places: Points, corner: tuple[float, float]) -> Places:
-    moved: Places = np.array(places, float).reshape(-1, 2) + np.array(corner)
-    return moved
+    result: Places = np.array(places, float).reshape(-1, 2) + np.array(corner)
+    return result
 
 
-def apart(one: tuple[float, float], other: tuple[float, float]) -> float:
-    return float(np.hypot(one[0] - other[0], one[1] - other[1]))
+def distance(first: tuple[float, float], second: tuple[float, float]) -> float:
+    return float(np.hypot(first[0] - second[0], first[1] - second[1]))
 
 
 def pairs(index: Index, radius: float, xy: Places) -> list[tuple[int, int]]:
@@ -52,9 +52,9 @@ def pairs(index: Index, radius: float, xy: Places) -> list[tuple[int, int]]:
 def pairs_of(points: Points, views: Points, radius: float) -> list[tuple[int, int]]:
     """Return the pairs of viewpoints and points, on which both indexes in memory agree."""
     xy, places = shifted(points, (0, 0)), shifted(views, (0, 0))
-    one, other = (pairs(kind(xy), radius, places) for kind in (ObjectIndex, PackedIndex))
-    assert one == other
-    return one
+    by_index, by_packed = (pairs(kind(xy), radius, places) for kind in (ObjectIndex, PackedIndex))
+    assert by_index == by_packed
+    return by_index
 
 
 @given(
@@ -64,7 +64,7 @@ def pairs_of(points: Points, views: Points, radius: float) -> list[tuple[int, in
     CORNERS,
 )
 @settings(max_examples=100)
-def test_pairs_are_those_of_a_plain_search(
+def test_pairs_equal_a_brute_force_search(
     points: Points, views: Points, radius: float, corner: tuple[float, float]
 ) -> None:
     points = [(x + corner[0], y + corner[1]) for x, y in points]
@@ -73,39 +73,39 @@ def test_pairs_are_those_of_a_plain_search(
         (i, j)
         for i, view in enumerate(views)
         for j, point in enumerate(points)
-        if apart(point, view) <= radius
+        if distance(point, view) <= radius
     ]
     assert pairs_of(points, views, radius) == expected
 
 
 @pytest.mark.parametrize("corner", [(0.0, 0.0), (765_200.0, 6_275_000.0), (0.1, 0.7)])
-def test_a_point_at_exactly_the_radius_counts(corner: tuple[float, float]) -> None:
+def test_point_exactly_at_the_radius_is_included(corner: tuple[float, float]) -> None:
     ring = [(30, 0), (-30, 0), (0, 30), (0, -30), (18, 24), (-24, 18), (24, -18), (-18, -24)]
     for point in [(corner[0] + dx, corner[1] + dy) for dx, dy in ring]:
-        radius = apart(point, corner)  # what the subtraction gives, not always 30
+        radius = distance(point, corner)  # what the subtraction gives, not always 30
         assert pairs_of([point], [corner], radius) == [(0, 0)]
         assert pairs_of([point], [corner], math.nextafter(radius, 0.0)) == []
 
 
-def test_all_points_at_one_place_or_none_are_returned() -> None:
+def test_either_all_points_at_a_place_are_returned_or_none() -> None:
     assert pairs_of([(1, 1)] * 300, [(1, 1)], 0.001) == [(0, j) for j in range(300)]
     assert pairs_of([(1, 1)], [], 5.0) == pairs_of([(1, 1)], [(9, 9), (8, 8)], 5.0) == []
 
 
 @pytest.mark.parametrize("kind", [ObjectIndex, PackedIndex])
-def test_a_pickled_copy_and_a_changed_array_make_no_difference(kind: type[ObjectIndex]) -> None:
+def test_index_is_picklable_and_independent_of_the_array(kind: type[ObjectIndex]) -> None:
     points = np.array([[0.0, 0.0], [3.0, 4.0], [50.0, 0.0]])
     index = kind(points)
     copy = pickle.loads(pickle.dumps(index))  # noqa: S301
     points[:] = 1000.0
-    for one in (index, copy):
-        assert pairs(one, 5.0, np.zeros((1, 2))) == [(0, 0), (0, 1)]
+    for tree in (index, copy):
+        assert pairs(tree, 5.0, np.zeros((1, 2))) == [(0, 0), (0, 1)]
 
 
 @pytest.mark.parametrize("make", [ObjectIndex, PackedIndex])
 @pytest.mark.parametrize(
     "xy", [np.empty((0, 2)), [[0.0, math.nan]], [[math.inf, 0.0]], [[0.0, 0.0], [math.nan] * 2]]
 )
-def test_nothing_to_index_is_an_error(xy: object, make: Callable[[object], object]) -> None:
+def test_index_without_points_is_refused(xy: object, make: Callable[[object], object]) -> None:
     with refused(InputError, "at least one point", "finite"):
         make(np.asarray(xy))

@@ -33,7 +33,7 @@ BEARINGS = st.floats(0.0, 360.0, exclude_max=True)
 
 
 @given(BEARINGS, LEVELS)
-def test_a_level_is_the_floor_of_the_paper(bearing: float, levels: int) -> None:
+def test_angle_level_is_the_floor_defined_in_the_paper(bearing: float, levels: int) -> None:
     exact = Fraction(bearing) * levels / 360
     level = int(quantize(bearing, levels))
     assert 0 <= level < levels
@@ -43,7 +43,7 @@ def test_a_level_is_the_floor_of_the_paper(bearing: float, levels: int) -> None:
         assert level in {round(exact) - 1, round(exact)}
 
 
-def test_a_level_begins_at_a_whole_multiple() -> None:
+def test_angle_level_begins_at_an_integer_multiple() -> None:
     for levels in range(1, 256):
         # Where no float is the multiple, a level begins at a neighbour of it.
         exact = [
@@ -57,13 +57,13 @@ def test_a_level_begins_at_a_whole_multiple() -> None:
 
 
 @pytest.mark.parametrize("levels", [q for q in range(1, 256) if BEARING_UNITS % q == 0])
-def test_a_stored_bearing_falls_into_the_level_of_its_units(levels: int) -> None:
+def test_stored_bearing_has_the_level_of_its_units(levels: int) -> None:
     units = np.arange(BEARING_UNITS)
     stored = units * np.float64(360.0 / BEARING_UNITS)
     assert (quantize(stored, levels) == units // (BEARING_UNITS // levels)).all()
 
 
-def test_levels_keep_the_shape_and_fit_a_byte() -> None:
+def test_levels_have_the_shape_of_the_bearings_and_fit_a_byte() -> None:
     levels = quantize(np.full((2, 3), 359.9999), 255)
     assert levels.tolist() == [[254] * 3] * 2
     assert levels.dtype == quantize([], 16).dtype == np.uint8
@@ -82,7 +82,7 @@ def test_levels_keep_the_shape_and_fit_a_byte() -> None:
         *(("levels", value, f"{value}, 1 to 255") for value in (0, -1, 256, 16.5, math.nan, "16")),
     ],
 )
-def test_a_range_is_in_metres_and_levels_fit_a_byte(name: str, value: object, words: str) -> None:
+def test_invalid_range_or_levels_are_refused(name: str, value: object, words: str) -> None:
     with refused(InputError, *words.split(", ")):
         SignatureSpec(**{name: value})  # type: ignore[arg-type]
 
@@ -95,8 +95,8 @@ def order_of(rows: list[tuple[int, float, float, int]]) -> list[tuple[int, float
     viewpoint, bearing, distance, code = (np.array(part) for part in zip(*rows, strict=True))
     # Objects numbered backwards, so that their numbers cannot be what orders them.
     item = np.arange(len(rows))[::-1]
-    seen = SightingPairs(viewpoint, item, bearing.astype(float), distance.astype(float))
-    order = clockwise_order(seen, code[::-1].astype(np.uint8))
+    pairs = SightingPairs(viewpoint, item, bearing.astype(float), distance.astype(float))
+    order = clockwise_order(pairs, code[::-1].astype(np.uint8))
     assert sorted(order.tolist()) == list(range(len(rows)))
     return [rows[row] for row in order]
 
@@ -127,7 +127,7 @@ def test_order_is_by_viewpoint_bearing_distance_and_class(
 # --- Signature --------------------------------------------------------------------------------
 
 
-def test_a_signature_may_lack_one_part_but_not_both() -> None:
+def test_signature_needs_types_or_bearings() -> None:
     types = Signature(np.array([3, 3, 1], np.uint8), None)
     angles = Signature(None, np.array([0.0, 90.0]))
     nothing = Signature(np.empty(0, np.uint8), np.empty(0))
@@ -150,7 +150,7 @@ def test_a_signature_may_lack_one_part_but_not_both() -> None:
         (None, None, ("types, bearings or both",)),
     ],
 )
-def test_what_is_no_signature(
+def test_invalid_signature_is_refused(
     codes: list[int] | None, bearings: list[float] | None, words: tuple[str, ...]
 ) -> None:
     with refused(InputError, *words):
@@ -175,15 +175,15 @@ def parsed(
 
 
 @given(st.lists(st.tuples(st.sampled_from("BCDEGHIJKLM"), st.floats(-360, 360)), min_size=1))
-def test_a_query_is_sorted_clockwise(pairs: list[tuple[str, float]]) -> None:
-    # The outer remainder is for tiny negative bearings, whose inner one rounds to 360.
+def test_query_is_sorted_clockwise(pairs: list[tuple[str, float]]) -> None:
+    # The outer remainder is for tiny negative bearings: the inner one rounds to 360.
     turned = [(bearing % 360.0 % 360.0, symbol) for symbol, bearing in pairs]
     bearings, symbols = zip(*sorted(turned, key=lambda pair: pair[0]), strict=True)
     types = "".join(symbol for symbol, _ in pairs)
     assert parsed(types, [bearing for _, bearing in pairs]) == ("".join(symbols), list(bearings))
 
 
-def test_queries_in_the_order_of_their_bearings_or_as_they_are() -> None:
+def test_query_without_bearings_keeps_its_order() -> None:
     assert parsed("DBL", [90, 90, 90]) == ("DBL", [90.0] * 3)
     assert parsed("DBD") == ("DBD", None)
     assert parsed(None, [200.0, 10.0]) == (None, [10.0, 200.0])
@@ -207,7 +207,7 @@ def test_queries_in_the_order_of_their_bearings_or_as_they_are() -> None:
         ("DD", [[10.0], [20.0]], ["one row"]),
     ],
 )
-def test_a_query_that_cannot_be_used_has_its_sentence(
+def test_unusable_query_is_refused(
     types: str | None, bearings: list[float] | None, words: list[str]
 ) -> None:
     with refused(InputError, *words):
@@ -215,7 +215,7 @@ def test_a_query_that_cannot_be_used_has_its_sentence(
 
 
 @pytest.mark.parametrize("types", ["DZ", "d", "D D", "DD\n", "D,D", "É"])
-def test_an_unknown_symbol_is_named(types: str) -> None:
+def test_error_names_an_unknown_symbol(types: str) -> None:
     unknown = next(symbol for symbol in types if symbol != "D")
     with refused(UnknownNameError, f"symbol {unknown!r}", "D street light"):
         parsed(types)

@@ -33,7 +33,7 @@ def taxonomies(draw: st.DrawFn) -> Taxonomy:
 
 
 @given(taxonomies(), st.data())
-def test_decoding_undoes_encoding(taxonomy: Taxonomy, data: st.DataObject) -> None:
+def test_decode_is_the_inverse_of_encode(taxonomy: Taxonomy, data: st.DataObject) -> None:
     symbols = "".join(item.symbol for item in taxonomy.classes)
     text = data.draw(st.text(symbols, max_size=40))
     codes = taxonomy.encode(text)
@@ -44,7 +44,7 @@ def test_decoding_undoes_encoding(taxonomy: Taxonomy, data: st.DataObject) -> No
 
 
 @given(taxonomies())
-def test_a_class_is_found_by_each_of_its_names(taxonomy: Taxonomy) -> None:
+def test_class_is_found_by_name_code_and_symbol(taxonomy: Taxonomy) -> None:
     for item in taxonomy.classes:
         assert taxonomy.by_name(item.name) is item
         assert taxonomy.by_code(item.code) is item
@@ -66,7 +66,7 @@ BAD_NAMES = ("", "Tree", "tree-1", "1tree", "arbre à fruits", "tree\n", 7)
         *(("name", bad, (repr(bad), "lower-case")) for bad in BAD_NAMES),
     ],
 )
-def test_a_class_has_a_byte_a_letter_and_an_identifier(
+def test_invalid_code_symbol_or_name_is_refused(
     attribute: str, value: object, words: tuple[str, ...]
 ) -> None:
     with refused(CatalogError, *words):
@@ -77,7 +77,7 @@ def test_a_class_has_a_byte_a_letter_and_an_identifier(
     ("height", "sigma"),
     [(2.0, None), (None, 1.0), (0.0, 1.0), (2.0, 0.0), (2.0, 3.0), (999.0, 1.0)],
 )
-def test_a_height_has_a_deviation(height: float | None, sigma: float | None) -> None:
+def test_height_needs_a_deviation(height: float | None, sigma: float | None) -> None:
     with refused(CatalogError, "'tree'", f"height of {height} m", f"height_sigma of {sigma} m"):
         dataclasses.replace(OTHER, height_m=height, height_sigma=sigma)
     tall = Taxonomy((dataclasses.replace(OTHER, height_m=9.0, height_sigma=4.0),))
@@ -85,14 +85,14 @@ def test_a_height_has_a_deviation(height: float | None, sigma: float | None) -> 
 
 
 @pytest.mark.parametrize("attribute", ["code", "symbol", "name"])
-def test_what_stands_twice_is_named(attribute: str) -> None:
+def test_duplicate_code_symbol_or_name_is_refused(attribute: str) -> None:
     value = getattr(TREE, attribute)
     other = dataclasses.replace(ObjectClass(9, "Z", "other", "Other"), **{attribute: value})
     with refused(CatalogError, f"{attribute} {value!r}", "'alignment_tree'", repr(other.name)):
         TAXONOMY.extended([other])
 
 
-def test_extending_leaves_the_taxonomy_as_it_was() -> None:
+def test_extended_does_not_change_the_taxonomy() -> None:
     bench = ObjectClass(10, "L", "bench", "Bench")
     assert TAXONOMY.extended(iter([bench])).classes == (TREE, LIGHT, bench)
     assert TAXONOMY.classes == (TREE, LIGHT)
@@ -111,14 +111,14 @@ def test_extending_leaves_the_taxonomy_as_it_was() -> None:
         (TAXONOMY.by_code, 2, ("class code 2", "[1, 3]")),
     ],
 )
-def test_what_is_unknown_is_named(
+def test_error_names_an_unknown_class(
     look_up: Callable[[object], object], value: object, words: tuple[str, ...]
 ) -> None:
     with refused(UnknownNameError, *words):
         look_up(value)
 
 
-def test_the_table_of_symbols_cannot_be_changed() -> None:
+def test_table_of_symbols_is_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         TAXONOMY.symbol_bytes[1] = 0
     assert TAXONOMY.decode([1, 2, 3]) == "B?D"

@@ -1,4 +1,4 @@
-"""The field of failures: every query counts for every place as its distance says."""
+"""Error fields: means of all queries, weighted by their distance from each pixel."""
 
 from __future__ import annotations
 
@@ -35,32 +35,32 @@ def test_pixels_are_weighted_means(radius: float) -> None:
     limit = math.sqrt(2.0 * CITY.xy.var(axis=0).sum())
     assert guess_error(CITY) == pytest.approx(limit)
     errors = np.minimum(EVALUATION.queries["error_m"].to_numpy(), limit)
-    for values, told in ((~EVALUATION.successful, field.failed), (errors, field.errors)):
-        assert np.allclose(told[near], (weights @ values)[near] / sums[near])
-        assert np.isnan(told[sums == 0.0]).all()
+    for values, means in ((~EVALUATION.successful, field.failed), (errors, field.errors)):
+        assert np.allclose(means[near], (weights @ values)[near] / sums[near])
+        assert np.isnan(means[sums == 0.0]).all()
     speaking = sums**2 / np.maximum((weights**2).sum(axis=-1), 1e-300)
     assert np.allclose(field.speaking[near], speaking[near])
-    # At the centres of pixels, what lies between them is what they hold.
+    # At the centres of pixels, interpolation gives their values.
     failed, speak = field.at(centres)
     assert np.allclose(failed, field.failed, equal_nan=True)
     assert np.allclose(speak, field.speaking)
     assert np.isnan(field.at(np.array([[1e9, 1e9]]))[0]).all()
 
 
-def test_the_radius_grows_until_enough_queries_speak() -> None:
+def test_radius_increases_until_there_are_enough_queries() -> None:
     assert error_field(EVALUATION, CITY).radius == RADII[0]
     queries = EVALUATION.queries
     apart = XY.mean(axis=0) + 20.0 * (XY - XY.mean(axis=0))
-    moved = queries.set_geometry(gpd.points_from_xy(*apart.T, crs=queries.crs))
-    field = error_field(dataclasses.replace(EVALUATION, queries=moved), CITY)
+    spread = queries.set_geometry(gpd.points_from_xy(*apart.T, crs=queries.crs))
+    field = error_field(dataclasses.replace(EVALUATION, queries=spread), CITY)
     assert field.radius in RADII[1:]
     assert np.median(field.at(apart)[1]) >= ENOUGH_QUERIES
-    one = dataclasses.replace(EVALUATION, queries=queries[:1])
-    assert error_field(one, CITY).radius == RADII[-1]
+    single = dataclasses.replace(EVALUATION, queries=queries[:1])
+    assert error_field(single, CITY).radius == RADII[-1]
 
 
 @pytest.mark.parametrize("radius", [0.0, 9.0, -1.0, math.nan, math.inf])
-def test_a_radius_that_cannot_be_is_refused(radius: float) -> None:
+def test_invalid_radius_and_other_database_are_refused(radius: float) -> None:
     with refused(InputError, f"{radius:g} m", "10 m or more"):
         error_field(EVALUATION, CITY, radius=radius)
     with refused(InputError, "give the database that it was made with"):

@@ -1,4 +1,4 @@
-"""Figures against cases counted by hand, ties among them."""
+"""Figures compared with cases counted by hand, including ties."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ from semsig_gis.localization import THRESHOLDS
 
 NAN = math.nan
 
-# Five queries of a database of 200 cells. The first is right for sure; the second ties with one
-# cell 30 m off; the third is 60 m off; the fourth is far off; of the fifth nothing is left.
+# Five queries of a database of 200 cells. The first is right; the second ties with one cell 30 m
+# away; the third has an error of 60 m; the fourth a large error; the fifth has no objects.
 ERRORS = ([0.0], [0.0, 30.0], [60.0], [900.0], [math.inf])
 RANKS = ((1, 1), (1, 2), (3, 4), (150, 150), (200, 200))
 CHANCES = (0.97, 0.5, 0.91, 0.2, NAN)
 
 
 def table() -> pd.DataFrame:
-    errors = [np.array(one) for one in ERRORS]
-    within = {x: [(one <= x).mean() for one in errors] for x in THRESHOLDS}
+    errors = [np.array(values) for values in ERRORS]
+    within = {x: [(values <= x).mean() for values in errors] for x in THRESHOLDS}
     low, high = zip(*RANKS, strict=True)
     stated = ~np.isnan(CHANCES)
     return pd.DataFrame(
         {
-            "error_m": [one.mean() for one in errors],
+            "error_m": [values.mean() for values in errors],
             **{f"p{x}": shares for x, shares in within.items()},
             **{f"near{count}": within[25] for count in (1, 5, 10, 20)},
             "rank_low": low,
@@ -66,7 +66,7 @@ def test_figures_counted_by_hand() -> None:
         "p100": 3.0 / 5,
         "near1": 1.5 / 5,
         "near20": 1.5 / 5,
-        # 1 % are two cells, 10 % twenty: the second is among them for sure, the third never, soon.
+        # 1 % are two cells, 10 % are twenty: the second query is in both, the third only in 10 %.
         "recall1": 2.0 / 5,
         "recall10": 3.0 / 5,
         "coverage": 2.0 / 5,
@@ -81,19 +81,19 @@ def test_figures_counted_by_hand() -> None:
         assert (means["low"][name], means["high"][name]) == pytest.approx((low, high))
 
 
-def test_groups_share_the_queries_out() -> None:
+def test_means_are_grouped() -> None:
     figures = query_figures(table(), cells=200)
     labels = ["a", "b", "a", "b", "a"]
-    found = grouped_means(figures, labels, by="part", order=["b", "a", "c"])
-    assert found["part"].tolist() == ["b", "a", "c"]
-    assert found["n"].tolist() == [2, 3, 0]
-    assert found["p50"].iloc[:2].tolist() == pytest.approx([0.5, 1 / 3])
-    assert found["p50"].isna().tolist() == [False, False, True]
+    means = grouped_means(figures, labels, by="part", order=["b", "a", "c"])
+    assert means["part"].tolist() == ["b", "a", "c"]
+    assert means["n"].tolist() == [2, 3, 0]
+    assert means["p50"].iloc[:2].tolist() == pytest.approx([0.5, 1 / 3])
+    assert means["p50"].isna().tolist() == [False, False, True]
     low, high = wilson_interval(0.5, 2)
-    assert (found["p50_low"][0], found["p50_high"][0]) == pytest.approx((low, high))
+    assert (means["p50_low"][0], means["p50_high"][0]) == pytest.approx((low, high))
 
 
-def test_ranges() -> None:
+def test_sizes_are_labelled_by_range() -> None:
     sizes = [0, 1, 4, 5, 9, 10, 19, 20, 400]
     expected = ["0", "1-4", "1-4", "5-9", "5-9", "10-19", "10-19", "20+", "20+"]
     assert range_labels(np.array(sizes), LENGTHS) == expected
@@ -102,12 +102,12 @@ def test_ranges() -> None:
     assert range_labels(np.array(groups), AMBIGUITIES) == expected
 
 
-def test_districts() -> None:
+def test_queries_are_labelled_by_district() -> None:
     places = [shapely.Point(x, 5.0) for x in (1.0, 10.0, 15.0, 25.0)]
     queries = gpd.GeoDataFrame(geometry=places, crs=2154)
     boxes = [shapely.box(0, 0, 10, 10), shapely.box(10, 0, 20, 10)]
     districts = gpd.GeoDataFrame({"name": [7, "new"]}, geometry=boxes, crs=2154)
-    # The second stands on the border: the first district that holds it counts.
+    # The second place is on the border: the first district that contains it counts.
     expected = ["7", "7", "new", "elsewhere"]
     assert district_labels(queries, districts, "name") == expected
     far = gpd.GeoDataFrame(geometry=[shapely.Point(765_205, 6_275_005)], crs=2154)
@@ -132,35 +132,35 @@ def test_districts() -> None:
     ],
 )
 def test_percentiles_by_hand(values: list[float], percent: float, expected: float) -> None:
-    found, low, high = percentile(np.array(values), percent)
-    assert found == expected
-    assert low <= found <= high
+    value, low, high = percentile(np.array(values), percent)
+    assert value == expected
+    assert low <= value <= high
 
 
-def test_a_percentile_of_nothing() -> None:
+def test_percentile_without_values_is_nan() -> None:
     assert all(math.isnan(value) for value in percentile(np.array([NAN]), 50))
 
 
 @given(
     values=st.lists(st.floats(0, 1e4), min_size=1, max_size=60), percent=st.sampled_from([50, 90])
 )
-def test_percentiles_are_those_of_numpy(values: list[float], percent: float) -> None:
-    found, low, high = percentile(np.array(values), percent)
-    assert found == pytest.approx(np.percentile(values, percent))
-    assert low <= found + 1e-9
-    assert found <= high + 1e-9
+def test_percentiles_agree_with_numpy(values: list[float], percent: float) -> None:
+    value, low, high = percentile(np.array(values), percent)
+    assert value == pytest.approx(np.percentile(values, percent))
+    assert low <= value + 1e-9
+    assert value <= high + 1e-9
 
 
-def test_intervals_of_a_median_hold_it() -> None:
+def test_intervals_contain_the_median_in_95_percent() -> None:
     rng = np.random.default_rng(5)
-    held = 0
+    count = 0
     for _ in range(1000):
         _, low, high = percentile(rng.exponential(1.0, 200), 50)
-        held += low <= math.log(2.0) <= high
-    assert 930 <= held <= 985
+        count += low <= math.log(2.0) <= high
+    assert 930 <= count <= 985
 
 
-def test_a_coverage_curve_by_hand() -> None:
+def test_coverage_curve_by_hand() -> None:
     curve = coverage_curve(table()).set_index("threshold")
     answered = {0.0: 4, 0.2: 4, 0.3: 3, 0.5: 3, 0.6: 2, 0.9: 2, 0.95: 1, 0.98: 0}
     assert {key: curve["answered"][key] for key in answered} == answered
@@ -183,7 +183,7 @@ def test_calibration_by_hand() -> None:
 
 
 @given(seed=st.integers(0, 2**32))
-def test_chances_that_come_true_are_calibrated(seed: int) -> None:
+def test_true_probabilities_are_calibrated(seed: int) -> None:
     rng = np.random.default_rng(seed)
     chance = rng.random(4000)
     right = (rng.random(4000) < chance).astype(float)

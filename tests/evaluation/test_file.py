@@ -46,29 +46,29 @@ EVALUATION = evaluate(
     others=st.lists(st.sampled_from(list(NAMED_DISTORTIONS.values())), max_size=3),
     number=st.integers(1, 99),
 )
-def test_settings_survive_json(
+def test_settings_round_trip_through_json(
     noise: NoiseSpec, kind: str, others: list[SimulatedDetector], number: int
 ) -> None:
-    asked = QuerySpec(
+    query_spec = QuerySpec(
         number=number, seeds=(3, 0), distortions=(*others, SimulatedDetector(noise=noise))
     )
     by_chance = LikelihoodMethod(noise=noise, refined=True)
     method = by_chance if kind == "likelihood" else Method(keep=5, weights=EditWeights(insert=2))
-    values = json.loads(json.dumps(settings_to_dict(method, asked), allow_nan=False))
-    assert settings_from_dict(values) == (method, asked)
+    values = json.loads(json.dumps(settings_to_dict(method, query_spec), allow_nan=False))
+    assert settings_from_dict(values) == (method, query_spec)
 
 
 @pytest.mark.parametrize("name", ["a:b", "a/b", "a,b", "a=b"])
-def test_names_that_mean_something_else_are_refused(name: str) -> None:
+def test_noise_names_with_reserved_characters_are_refused(name: str) -> None:
     with refused(InputError, repr(name), "without"):
         used_noises([LikelihoodMethod(noise=NoiseSpec(name=name))], [])
 
 
-def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
+def test_saved_evaluation_is_opened(tmp_path: Path) -> None:
     chain = parse_chain("light:resort=false, detector:mine:half=9", noises={"mine": MINE})
-    asked = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
+    query_spec = QuerySpec(number=9, seeds=(4, 2), seen_from="anywhere", distortions=chain)
     saved = replace(
-        EVALUATION, method=LikelihoodMethod(noise=MINE), asked=asked, city="other.parquet"
+        EVALUATION, method=LikelihoodMethod(noise=MINE), asked=query_spec, city="other.parquet"
     )
     save_evaluation(saved, tmp_path / "made" / "here")
     opened = open_evaluation(tmp_path / "made" / "here")
@@ -80,7 +80,7 @@ def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
     assert_frame_equal(opened.by_length(), saved.by_length())
 
 
-def test_the_readable_files_are_strict_json(tmp_path: Path) -> None:
+def test_json_files_are_strict_json(tmp_path: Path) -> None:
     save_evaluation(EVALUATION, tmp_path)
     names = ["evaluation.json", "queries.parquet", "timing.json"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
@@ -99,7 +99,7 @@ def test_the_readable_files_are_strict_json(tmp_path: Path) -> None:
     assert summary["versions"].keys() == {"semsig_gis", "python", "numpy", "pandas", "rapidfuzz"}
 
 
-def test_files_that_are_no_evaluation_are_refused(tmp_path: Path) -> None:
+def test_missing_and_damaged_files_are_refused(tmp_path: Path) -> None:
     with refused(DatabaseError, "does not exist"):
         open_evaluation(tmp_path / "nowhere")
     save_evaluation(EVALUATION, tmp_path)

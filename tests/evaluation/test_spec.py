@@ -62,9 +62,9 @@ def experiments(draw: st.DrawFn) -> ExperimentSpec:
 
 
 @given(experiments())
-def test_written_and_read_is_the_same(spec: ExperimentSpec) -> None:
+def test_specification_round_trips_through_toml(spec: ExperimentSpec) -> None:
     assert parse_experiment(spec.to_toml()) == spec
-    # Noise models that the package has by name are not written out.
+    # Built-in noise models are written only by name.
     assert spec.to_dict().get("noises", {}).keys() <= {"own"}
 
 
@@ -81,11 +81,11 @@ def test_defaults_and_cases() -> None:
         *("x/a-top1", "x/a-top100", "x/b-top1", "x/b-top100"),
         *("y/a-top1", "y/a-top100", "y/b-top1", "y/b-top100"),
     ]
-    asked = replace(more, queries=7, seeds=(3,)).asked("y")
-    assert (asked.number, asked.seeds, asked.distortions) == (7, (3,), parse_chain("light"))
+    queries = replace(more, queries=7, seeds=(3,)).asked("y")
+    assert (queries.number, queries.seeds, queries.distortions) == (7, (3,), parse_chain("light"))
 
 
-def test_noise_models_come_from_tables_and_files(tmp_path: Path) -> None:
+def test_noise_models_are_read_from_tables_and_files(tmp_path: Path) -> None:
     save_noise(NoiseSpec(detection=0.7, name="whatever"), tmp_path / "learnt.toml")
     (tmp_path / "spec.toml").write_text(
         SMALL.replace("[distortions]", 'generic = "likelihood:learnt"\n[distortions]')
@@ -98,7 +98,7 @@ def test_noise_models_come_from_tables_and_files(tmp_path: Path) -> None:
         "learnt": NoiseSpec(detection=0.7, name="learnt"),
         "mine": NoiseSpec(clutter=3.0, bearing_sigma=2, name="mine"),
     }
-    # Written out, it needs the file no more.
+    # The TOML contains the noise model, so that the file is not needed again.
     assert parse_experiment(spec.to_toml()) == spec
 
 
@@ -135,12 +135,12 @@ def changed(old: str, new: str) -> str:
         (SMALL + '[districts]\nfile = "a.gpkg"', ["districts", "'name'"]),
     ],
 )
-def test_experiments_that_cannot_be_read(text: str, words: list[str]) -> None:
+def test_invalid_experiments_are_refused(text: str, words: list[str]) -> None:
     with refused(SemsigError, *words):
         parse_experiment(text)
 
 
-def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+def test_unreadable_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "spec.toml").write_bytes(b"\xff\xfe")
     for name in ("spec.toml", "nowhere.toml"):
         with refused(SemsigError, name, "cannot be read"):
@@ -148,9 +148,9 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["generic", "mine"])
-def test_two_noise_models_of_one_name(name: str) -> None:
-    one, other = (NoiseSpec(clutter=value, name=name) for value in (1.0, 2.0))
-    methods = {"a": LikelihoodMethod(noise=one)}
-    distortions = {"b": (SimulatedDetector(noise=other),)}
+def test_two_noise_models_with_the_same_name_are_refused(name: str) -> None:
+    first, second = (NoiseSpec(clutter=value, name=name) for value in (1.0, 2.0))
+    methods = {"a": LikelihoodMethod(noise=first)}
+    distortions = {"b": (SimulatedDetector(noise=second),)}
     with refused(SemsigError, name, "a name of its own"):
         ExperimentSpec(database="city.parquet", methods=methods, distortions=distortions)

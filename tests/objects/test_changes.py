@@ -44,7 +44,7 @@ OLD = table(
 )
 
 
-def test_added_removed_moved_and_of_another_class() -> None:
+def test_added_removed_moved_and_reclassified_objects() -> None:
     new = table(
         (0, 0, TREE, "trees", "1"),
         (8, 4, TREE, "trees", "2"),
@@ -68,7 +68,7 @@ def test_added_removed_moved_and_of_another_class() -> None:
     ]  # fmt: skip
 
 
-def test_of_several_at_one_place_the_one_with_the_id_is_the_same() -> None:
+def test_objects_at_the_same_place_are_matched_by_id() -> None:
     old = table((0, 0, TREE, "trees", "1"), (0, 0, TREE, "trees", "2"))
     new = table((0, 0, TREE, "trees", "2"), (3, 4, TREE, "trees", "1"))
     assert rows_of(compare_objects(old, new)) == ([[1, 0]], [[0, 1]], [], [], [])
@@ -87,25 +87,27 @@ THINGS = st.lists(
 
 
 @given(THINGS, THINGS)
-def test_every_row_is_told_of_once(before: list[Thing], now: list[Thing]) -> None:
+def test_every_row_has_exactly_one_kind_of_change(before: list[Thing], now: list[Thing]) -> None:
     old, new = table(*before), table(*now)
     changes = compare_objects(old, new)
     assert sorted([*changes.same[:, 0], *changes.obsolete_rows]) == list(range(len(old)))
     assert sorted([*changes.same[:, 1], *changes.new_rows]) == list(range(len(new)))
-    # What is gone and has come is what differs in class and place, and no more.
+    # Obsolete and new rows are exactly those that differ in class or place.
     looks = [Counter(thing[:3] for thing in things) for things in (before, now)]
     assert Counter(before[row][:3] for row in changes.obsolete_rows) == looks[0] - looks[1]
     assert Counter(now[row][:3] for row in changes.new_rows) == looks[1] - looks[0]
     names = [Counter(thing[3:] for thing in things) for things in (before, now)]
-    for kind, alike in ((changes.moved, True), (changes.changed, False)):
+    for kind, same_class in ((changes.moved, True), (changes.changed, False)):
         for row, other in kind:
             name = before[row][3:]
             assert name == now[other][3:]
             assert name[1]
-            assert (before[row][2] == now[other][2]) == alike
+            assert (before[row][2] == now[other][2]) == same_class
             assert names[0][name] == names[1][name] == 1
-    left = {before[row][3:] for row in changes.removed} & {now[row][3:] for row in changes.added}
-    assert all(not name[1] or names[0][name] > 1 or names[1][name] > 1 for name in left)
+    unmatched = {before[row][3:] for row in changes.removed} & {
+        now[row][3:] for row in changes.added
+    }
+    assert all(not name[1] or names[0][name] > 1 or names[1][name] > 1 for name in unmatched)
     for item in changes.classes:
         gains, losses = item.added + item.gained, item.removed + item.lost
         assert item.after == item.before + gains - losses
@@ -113,7 +115,7 @@ def test_every_row_is_told_of_once(before: list[Thing], now: list[Thing]) -> Non
     assert sum(item.after for item in changes.classes) == len(new)
 
 
-def test_layers_that_were_not_loaded_anew_stay() -> None:
+def test_layers_that_were_not_reloaded_remain() -> None:
     old = table(
         (0, 0, TREE, "trees", "1"),
         (9, 0, LAMP, "lamps", "1"),
@@ -125,12 +127,12 @@ def test_layers_that_were_not_loaded_anew_stay() -> None:
         (4, 4, TREE, "trees", "5"),
         licenses=(Licence("City (CC0)", ("trees",)), Licence("Streets (OGL)", ("signals",))),
     )
-    objects, kept, notes = replace_layers(old, new)
+    objects, remaining, notes = replace_layers(old, new)
     assert objects.table["source"].tolist() == ["lamps", "trees"]
     assert objects.xy.tolist() == [[9, 0], [4, 4]]
     assert objects.table["class_code"].dtype == np.uint8
     assert objects.crs == old.crs
-    assert (kept, notes) == (("lamps",), ())
+    assert (remaining, notes) == (("lamps",), ())
     assert objects.licenses == (
         Licence("City (CC0)", ("lamps", "trees")),
         Licence("Streets (OGL)", ("signals",)),
@@ -139,7 +141,7 @@ def test_layers_that_were_not_loaded_anew_stay() -> None:
 
 @pytest.mark.parametrize("name", ["parks, trees", "parks: trees", "A: parks, trees", ": trees, "])
 @pytest.mark.parametrize("has_objects", [True, False])
-def test_a_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bool) -> None:
+def test_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bool) -> None:
     def saved(*sources: str, layers: tuple[str, ...]) -> StreetObjects:
         """Save an object of each source, and open them again."""
         things = [(float(x), 0.0, TREE, source, str(x)) for x, source in enumerate(sources)]
@@ -149,19 +151,19 @@ def test_a_layer_may_have_any_name(tmp_path: Path, name: str, *, has_objects: bo
 
     city = saved("trees", "trees", "parks", name, layers=("trees", "parks", name))
     new = [name] * has_objects + ["lamps"]
-    objects, kept, _ = replace_layers(city, saved(*new, layers=(name, "lamps")))
-    assert kept == ("parks", "trees")
+    objects, remaining, _ = replace_layers(city, saved(*new, layers=(name, "lamps")))
+    assert remaining == ("parks", "trees")
     assert Counter(objects.table["source"]) == Counter(["trees", "trees", "parks", *new])
 
 
-def test_all_layers_may_be_loaded_anew() -> None:
+def test_all_layers_may_be_reloaded() -> None:
     new = table((4, 4, TREE, "trees", "5"))
-    objects, kept, _ = replace_layers(OLD, new)
-    assert (kept, objects.licenses) == ((), new.licenses)
+    objects, remaining, _ = replace_layers(OLD, new)
+    assert (remaining, objects.licenses) == ((), new.licenses)
     assert objects.table.equals(new.table)
 
 
-def test_what_may_be_twice_is_told() -> None:
+def test_possible_duplicates_are_noted() -> None:
     old = table(
         (0, 0, LAMP, "lamps", "1"),
         (5, 5, LAMP, "lamps", "2"),
@@ -169,25 +171,25 @@ def test_what_may_be_twice_is_told() -> None:
         merged=["posts:4; signals:2", "", ""],
     )
     new = table((1, 0, LAMP, "posts", "4"), (9, 9, TREE, "posts", "5"), licenses=())
-    objects, kept, notes = replace_layers(old, new)
-    assert kept == ("lamps", "trees")
+    objects, remaining, notes = replace_layers(old, new)
+    assert remaining == ("lamps", "trees")
     assert objects.table["merged"].tolist() == ["posts:4; signals:2", "", "", "", ""]
     assert "not loaded again were merged with objects of 'posts'" in notes[0]
     assert "1 new objects are at exactly the place" in notes[1]
     assert len(notes) == 2
 
 
-def test_a_licence_of_unknown_layers_renews_none() -> None:
-    """Nothing is lost by it; and what may have stayed too long is told."""
+def test_licence_without_layers_replaces_no_layer() -> None:
+    """No object is lost, and a note says that old objects may remain."""
     unclear = Licence("City (CC0): lamps, trees")
     before = (Licence("Town (CC0)"),)
     new = table((4, 4, TREE, "trees", "5"), licenses=(unclear,))
-    objects, kept, notes = replace_layers(dataclasses.replace(OLD, licenses=before), new)
-    assert (kept, objects.licenses) == (("lamps",), (*before, unclear))
+    objects, remaining, notes = replace_layers(dataclasses.replace(OLD, licenses=before), new)
+    assert (remaining, objects.licenses) == (("lamps",), (*before, unclear))
     assert "which layers the licence 'City (CC0): lamps, trees' is for" in notes[0]
 
 
-def test_warnings_go_with_the_layers_that_they_are_about() -> None:
+def test_notes_are_replaced_with_their_layers() -> None:
     old = dataclasses.replace(OLD, notes=("a file is missing", "lamps: odd", "trees: odd"))
     new = table((4, 4, LAMP, "lamps", "5"), licenses=(Licence("City (CC0)", ("lamps",)),))
     objects, _, _ = replace_layers(old, dataclasses.replace(new, notes=("lamps: few",)))
@@ -215,7 +217,7 @@ def changed(**values: object) -> Taxonomy:
         ),
     ],
 )
-def test_another_crs_or_meaning_of_a_class_is_refused(
+def test_other_crs_or_different_class_is_refused(
     options: dict[str, Any], error: type[Exception], words: list[str]
 ) -> None:
     old = dataclasses.replace(OLD, taxonomy=Taxonomy(TAXONOMY.classes[:2]))
@@ -223,7 +225,7 @@ def test_another_crs_or_meaning_of_a_class_is_refused(
         replace_layers(old, table((4, 4, LAMP, "lamps", "5"), **options))
 
 
-def test_further_classes_are_fine() -> None:
+def test_new_classes_are_added() -> None:
     few, drain = TAXONOMY.classes[:3], ObjectClass(250, "9", "drain", "Drain")
     old = dataclasses.replace(OLD, taxonomy=Taxonomy(few))
     for classes, joined in (((drain,), (*few, drain)), ((drain, *few[::-1]), (drain, *few[::-1]))):

@@ -50,7 +50,7 @@ def bench(source: str, name: str, x: float, y: float = 0.0) -> Thing:
     return ("bench", source, name, 1, x, y)
 
 
-def test_the_same_object_in_two_sources_is_one() -> None:
+def test_same_object_in_two_sources_is_merged() -> None:
     things = [bench("city", "1", 0), bench("osm", "node/7", 3, 4), bench("osm", "node/8", 50)]
     objects, report = conflate(world(things), {"bench": 5.0})
     expected = objects_of(
@@ -67,7 +67,7 @@ def test_the_same_object_in_two_sources_is_one() -> None:
 
 
 @pytest.mark.parametrize("radii", [{}, {"automatic_wc": 5.0}, {"bench": 5.0}])
-def test_nothing_to_merge_is_no_error(radii: dict[str, float]) -> None:
+def test_nothing_to_merge_returns_the_objects(radii: dict[str, float]) -> None:
     objects, report = conflate(world([bench("a", "1", 0)]), radii)
     assert (content(objects), report.count) == ([(10, "a", "1", 1, "", 0.0, 0.0)], 0)
 
@@ -90,11 +90,11 @@ RADII = st.dictionaries(st.sampled_from(["bench", "bus_stop"]), st.sampled_from(
 def by_hand(
     things: Sequence[Thing], radii: Mapping[str, float]
 ) -> tuple[list[tuple[object, ...]], list[tuple[object, ...]]]:
-    """Merge by looking at all pairs again and again; return what is left, and the report."""
+    """Merge by searching all pairs repeatedly; return the remaining objects and the report."""
     sources = list(dict.fromkeys(source for _, source, *_ in things))
     counts = [count for _, _, _, count, *_ in things]
     merged: list[list[str]] = [[] for _ in things]
-    left = list(range(len(things)))
+    remaining = list(range(len(things)))
     report: list[tuple[object, ...]] = []
 
     def order(row: int) -> tuple[object, ...]:
@@ -104,29 +104,29 @@ def by_hand(
     for name, radius in radii.items():
         metres_of: dict[tuple[int, int], list[float]] = {}
         for number, source in enumerate(sources):
-            of_class = [row for row in left if things[row][0] == name]
+            of_class = [row for row in remaining if things[row][0] == name]
             new = [row for row in of_class if things[row][1] == source]
             old = [row for row in of_class if things[row][1] in sources[:number]]
             while near := [
-                (metres, order(one), order(other), one, other)
-                for one, other in itertools.product(old, new)
-                if (metres := math.dist(things[one][4:], things[other][4:])) <= radius
+                (metres, order(first), order(second), first, second)
+                for first, second in itertools.product(old, new)
+                if (metres := math.dist(things[first][4:], things[second][4:])) <= radius
             ]:
-                metres, *_, one, other = min(near)
-                old.remove(one)
-                new.remove(other)
-                left.remove(other)
-                counts[one] += counts[other]
-                merged[one].append(f"{source}:{things[other][2]}")
-                metres_of.setdefault((sources.index(things[one][1]), number), []).append(metres)
+                metres, *_, first, second = min(near)
+                old.remove(first)
+                new.remove(second)
+                remaining.remove(second)
+                counts[first] += counts[second]
+                merged[first].append(f"{source}:{things[second][2]}")
+                metres_of.setdefault((sources.index(things[first][1]), number), []).append(metres)
         report += [
-            (name, radius, sources[kept], sources[number], len(far), median(far), max(far))
-            for (kept, number), far in sorted(metres_of.items())
+            (name, radius, sources[first_source], sources[number], len(far), median(far), max(far))
+            for (first_source, number), far in sorted(metres_of.items())
         ]
     return [
         (code_of(things[row]), *things[row][1:3], counts[row], "; ".join(merged[row]),
          *things[row][4:])
-        for row in left
+        for row in remaining
     ], report  # fmt: skip
 
 
@@ -136,7 +136,7 @@ def check(things: Sequence[Thing], radii: Mapping[str, float]) -> ConflationRepo
     objects, report = conflate(before, radii)
     assert_geodataframe_equal(before.table, table)
     rows, pairs = by_hand(things, radii)
-    # Rows that are the same in every respect may stand for each other.
+    # Rows with equal values are interchangeable.
     assert sorted(content(objects)) == sorted(rows)
     for pair, expected in zip(report.pairs, pairs, strict=True):
         assert dataclasses.astuple(pair) == pytest.approx(expected)
@@ -145,7 +145,7 @@ def check(things: Sequence[Thing], radii: Mapping[str, float]) -> ConflationRepo
 
 @given(THINGS, RADII)
 @settings(max_examples=80)
-def test_the_fast_way_gives_what_the_slow_way_gives(
+def test_result_equals_a_simple_implementation(
     things: list[Thing], radii: dict[str, float]
 ) -> None:
     check(things, radii)
@@ -161,7 +161,7 @@ def test_the_fast_way_gives_what_the_slow_way_gives(
         ({"banch": 5.0}, UnknownNameError, ("'banch'", "'bench'")),
     ],
 )
-def test_bad_radii_are_refused(
+def test_invalid_radii_are_refused(
     radii: dict[str, float], error: type[Exception], words: tuple[str, ...]
 ) -> None:
     with refused(error, *words):
@@ -169,14 +169,14 @@ def test_bad_radii_are_refused(
 
 
 def test_conflating_twice_is_refused() -> None:
-    # What was left over for want of a partner would find one of a source already merged.
+    # What was remaining over for want of a partner would find one of a source already merged.
     things = [bench("a", "1", 0), bench("b", "2", 0), bench("b", "3", 1)]
     objects, _ = conflate(world(things), {"bench": 5.0})
     with refused(InputError, "conflated already", "all sources at once"):
         conflate(objects, {"bench": 5.0})
 
 
-def test_provenance_is_kept_in_the_file(tmp_path: Path) -> None:
+def test_merged_sources_are_stored_in_the_file(tmp_path: Path) -> None:
     before = world([bench("a", "1", 0), bench("b", "é;2", 1), bench("b", "3", 50)])
     after, _ = conflate(before, {"bench": 5.0})
     for objects, merged in ((before, None), (after, ["b:é;2", ""])):
@@ -186,7 +186,7 @@ def test_provenance_is_kept_in_the_file(tmp_path: Path) -> None:
         assert (again["merged"].tolist() if "merged" in again else None) == merged
 
 
-def test_disabled_bays_that_stand_in_two_layers(geodata: Path) -> None:
+def test_disabled_bays_in_two_layers_are_merged(geodata: Path) -> None:
     catalog = load_catalog("montpellier")
     layers = [
         read_layer(geodata / "montpellier" / spec.files[0], spec, filters=False)

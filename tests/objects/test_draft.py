@@ -1,4 +1,4 @@
-"""Drafts of catalogues: keywords, guesses, and what is suggested for a file."""
+"""Drafts of catalogues: keywords, guesses, and the draft for a file."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from semsig_gis.core import ObjectClass
     from semsig_gis.sources import Catalog, RawLayer
 
-# What a person would take of the comments.
+# Comments that a person would uncomment.
 OFFERED = re.compile(r"# (?=\[\[classes|(?:where|class_by|\w*id\w*|code|symbol|name|title) = )")
 
 
@@ -62,7 +62,7 @@ def load(draft: str, folder: Path) -> Catalog:
 
 
 def read(draft: str, file: Path, folder: Path) -> tuple[RawLayer, ...]:
-    """Read a file by its draft."""
+    """Read a file with its draft."""
     catalog = load(draft, folder)
     return reader(catalog.reader)(file, catalog.layers)
 
@@ -78,7 +78,7 @@ def write(path: Path, fields: Mapping[str, Sequence[object]]) -> Path:
 
 
 def check(file: Path, snapshot: Callable[[str, str], None]) -> None:
-    """Compare a draft, and what is read by it when all that it offers is taken."""
+    """Compare a draft, and the rows read with all of its offers uncommented."""
     text = draft = draft_catalog(file, crs="EPSG:2154" if "lambert" in file.name else None)
     assert all(layer.counts.kept == layer.counts.read for layer in read(draft, file, file.parent))
     for layer in read(OFFERED.sub("", draft), file, file.parent):
@@ -89,7 +89,7 @@ def check(file: Path, snapshot: Callable[[str, str], None]) -> None:
 
 
 FILES: dict[str, dict[str, list[object]] | list[object] | str] = {
-    # The class is sure, doubtful, one of two, or unknown.
+    # The class is certain, doubtful, one of two, or unknown.
     "Bancs_publics.gpkg": {
         "Numéro": [f"b{row}" for row in range(6)],
         "etat": ["neuf", "usé", "neuf", None, "neuf", "usé"],
@@ -97,12 +97,12 @@ FILES: dict[str, dict[str, list[object]] | list[object] | str] = {
     "layer1.geojson": {"amenity": ["post_box"] * 3},
     "signalisation.gpkg": {"a": [1]},
     "stuff.gpkg": {"a": [1, 2]},
-    # A value tells another class.
+    # A value names another class.
     "PlacesReserv.gpkg": {"Type": ["Livraison", "Taxi", "GIG/GIC"] * 3},
-    # Ids come again, or have another name.
+    # Ids are repeated, or the field has an unusual name.
     "trees.gpkg": {"code": ["a", "a", "b"], "x": [1, 2, 3]},
     "arbres.gpkg": {"height": [1.5, 2.5, 3.25], "kind": ["a", "a", "b"], "baumnr": [17, 18, 21]},
-    # A CRS that nobody names is guessed, or left to the person.
+    # A CRS that is not stated is guessed, or must be given.
     "bancs.csv": "X;Y\n3.88;43.61\n3.89;43.62\n",
     "bancs_lambert.csv": "X;Y\n770000;6280000\n",
     # Tables of portals.
@@ -117,7 +117,7 @@ FILES: dict[str, dict[str, list[object]] | list[object] | str] = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_draft_is_read_by(
+def test_file_is_read_with_its_draft(
     tmp_path: Path, name: str, snapshot: Callable[[str, str], None]
 ) -> None:
     content = FILES[name]
@@ -133,15 +133,13 @@ def test_a_draft_is_read_by(
 @pytest.mark.parametrize(
     ("stem", "name"), [("stuff", "stuff"), ("2019 œuvres", "layer_2019_uvres"), ("木", "layer")]
 )
-def test_what_nothing_is_known_of_is_a_class_of_its_own(
-    tmp_path: Path, stem: str, name: str
-) -> None:
+def test_unknown_file_gets_a_class_of_its_own(tmp_path: Path, stem: str, name: str) -> None:
     draft = draft_catalog(write(tmp_path / f"{stem}.gpkg", {"a": [1, 2]}))
     assert f'class = "{name}"  # EDIT: unknown' in draft
     assert load(draft, tmp_path).layers[0].class_name == name
 
 
-def test_classes_that_the_paper_has_not_keep_their_code_or_get_a_free_one(tmp_path: Path) -> None:
+def test_new_class_has_an_unused_code_and_symbol(tmp_path: Path) -> None:
     def drafted(file: str, name: str) -> ObjectClass:
         path = write(tmp_path / file, {"a": [1]})
         return load(draft_catalog(path), tmp_path).taxonomy.by_name(name)
@@ -167,7 +165,7 @@ def test_every_layer_with_geometry_is_drafted(
     check(file, snapshot)
 
 
-def test_strange_names_and_values_stay_within_their_quotes(tmp_path: Path) -> None:
+def test_unusual_names_and_values_are_quoted(tmp_path: Path) -> None:
     file = write(
         tmp_path / 'arbres [2] "x" # ü.geojson',
         {
@@ -209,7 +207,7 @@ NOWHERE = b"""{"type": "FeatureCollection", "features": [
         ("town.gpkg", None, ("town.gpkg", "does not exist")),
     ],
 )
-def test_what_cannot_be_drafted_is_an_error(
+def test_file_that_cannot_be_drafted_is_refused(
     tmp_path: Path, name: str, content: bytes | None, words: tuple[str, ...]
 ) -> None:
     if content is not None:
@@ -231,13 +229,13 @@ OFFSETS = st.lists(st.tuples(st.integers(0, 99), st.integers(0, 99)), min_size=1
 
 def near(centre: tuple[float, float], offset: tuple[int, int]) -> tuple[float, float]:
     """Return a place within some hundred metres."""
-    lon, lat = (round(one + 1e-5 * other, 6) for one, other in zip(centre, offset, strict=True))
+    lon, lat = (round(value + 1e-5 * step, 6) for value, step in zip(centre, offset, strict=True))
     return lon, lat
 
 
 @st.composite
 def csv_files(draw: st.DrawFn) -> bytes:
-    """Draw a table of places in one of many styles, some of whose rows are of no use."""
+    """Draw a table of places in one of many styles, with some unusable rows."""
     separator = draw(st.sampled_from(";,\t"))
     comma = draw(st.booleans()) and separator != ","
     names = draw(st.lists(TEXTS | st.sampled_from(["id", "type", "Nom"]), max_size=3))
@@ -262,7 +260,7 @@ def csv_files(draw: st.DrawFn) -> bytes:
 
 @st.composite
 def geojson_files(draw: st.DrawFn) -> bytes:
-    """Draw features of all kinds, some of which have no geometry."""
+    """Draw features of all kinds, some without geometry."""
     centre = draw(CENTRES)
     fields = draw(st.lists(TEXTS.filter(bool), max_size=3, unique=True))
     features: list[dict[str, object]] = []
@@ -283,7 +281,7 @@ def geojson_files(draw: st.DrawFn) -> bytes:
 @pytest.mark.parametrize(
     ("suffix", "files"), [(".csv", csv_files()), (".geojson", geojson_files())]
 )
-def test_every_file_loads_by_its_draft(
+def test_every_file_loads_with_its_draft(
     suffix: str, files: st.SearchStrategy[bytes], tmp_path: Path
 ) -> None:
     @settings(max_examples=8, deadline=None)
@@ -301,14 +299,14 @@ def test_every_file_loads_by_its_draft(
 
 
 @pytest.mark.parametrize(
-    ("name", "kind", "shape", "said"),
+    ("name", "kind", "shape", "line"),
     [
         ("trees", "Point", "<gml:pos>391000 5820000</gml:pos>", 'geometry = "point"'),
         ("streets", "LineString", "<gml:posList>0 0 9 9</gml:posList>", 'role = "streets"'),
     ],
 )
-def test_gml_is_drafted_and_read_by_its_draft(
-    tmp_path: Path, name: str, kind: str, shape: str, said: str
+def test_gml_is_read_with_its_draft(
+    tmp_path: Path, name: str, kind: str, shape: str, line: str
 ) -> None:
     place = f'<gml:{kind} srsName="urn:ogc:def:crs:EPSG::25833">{shape}</gml:{kind}>'
     member = f"<wfs:member><a><n>7</n><geom>{place}</geom></a></wfs:member>"
@@ -318,14 +316,14 @@ def test_gml_is_drafted_and_read_by_its_draft(
         f'xmlns:gml="http://www.opengis.net/gml/3.2">{member * 3}</wfs:FeatureCollection>'
     )
     text = draft_catalog(file)
-    assert said in text
+    assert line in text
     assert 'metric_crs = "EPSG:25833"' in text
     (layer,), absent = read_files(load(text, tmp_path).layers, [file])
     assert (len(layer.table), absent) == (3, ())
 
 
 @pytest.mark.parametrize("folder", ["montpellier", "paris"])
-def test_published_files_are_drafted_and_read_by_their_drafts(
+def test_published_files_are_read_with_their_drafts(
     geodata: Path, tmp_path: Path, folder: str, snapshot: Callable[[str, str], None]
 ) -> None:
     guesses = []
@@ -345,10 +343,10 @@ def test_published_files_are_drafted_and_read_by_their_drafts(
     snapshot(f"{folder}.txt", "".join(guesses))
 
 
-def test_the_filters_of_the_montpellier_catalogue_are_offered(geodata: Path) -> None:
+def test_filters_of_the_montpellier_catalogue_are_offered(geodata: Path) -> None:
     for name, field, value in (
         ("FontainesPublic", "ETAT", "en fonction"),
-        ("EclairagePublic", "type_lante", "Lanterne"),  # stands once, in row 29,000 or so
+        ("EclairagePublic", "type_lante", "Lanterne"),  # occurs once, near row 29,000
         ("ParkingOuv", "TYPARK_C_2", "Superstructure"),
         ("PlacesReserv", "F01_TYPE_D", "Livraison"),
     ):
@@ -372,12 +370,12 @@ def test_the_filters_of_the_montpellier_catalogue_are_offered(geodata: Path) -> 
         ("日本 tree", ("日本", "tree")),
     ],
 )
-def test_names_are_taken_apart(text: str, words: tuple[str, ...]) -> None:
+def test_names_are_split_into_words(text: str, words: tuple[str, ...]) -> None:
     assert words_of(text) == words
 
 
 @given(st.text(max_size=40))
-def test_words_are_words_again(text: str) -> None:
+def test_splitting_words_again_changes_nothing(text: str) -> None:
     words = words_of(text)
     assert words_of(" ".join(words)) == words
 
@@ -405,33 +403,33 @@ NAMES = {
 
 
 @pytest.mark.parametrize("classes", NAMES)
-def test_layers_are_recognised_by_their_names(classes: str) -> None:
+def test_classes_are_recognised_in_layer_names(classes: str) -> None:
     for name in NAMES[classes]:
         assert [match.name for match in keywords("classes").find(name)] == classes.split(), name
 
 
-def test_the_longest_keyword_decides_and_hides_its_parts() -> None:
+def test_longest_keyword_wins_over_its_parts() -> None:
     own = Keywords.of([("sign", "light"), ("lamp", "street light"), ("lamp", "lamp")])
     assert own.find("Street_Lights") == (Match("lamp", "street lights", 11),)
     assert [item.name for item in own.find("light and street light")] == ["lamp", "sign"]
     assert own.find("streetlight") == (Match("lamp", "streetlight", 11),)
 
 
-def test_every_class_can_be_found_by_its_own_words() -> None:
+def test_every_class_is_recognised_by_its_keywords() -> None:
     for name, phrase in keywords("classes").phrases:
         assert phrase, name
-        found = keywords("classes").find(" ".join(phrase))
-        assert name in {item.name for item in found}, phrase
+        matches = keywords("classes").find(" ".join(phrase))
+        assert name in {match.name for match in matches}, phrase
 
 
-def test_the_classes_are_those_of_the_catalogues() -> None:
+def test_keywords_have_all_classes_of_the_catalogues() -> None:
     assert "keywords" not in catalog_names()
-    known = {name for name, _ in keywords("classes").phrases}
-    assert {item.name for item in paper_taxonomy().classes} <= known
+    names = {name for name, _ in keywords("classes").phrases}
+    assert {item.name for item in paper_taxonomy().classes} <= names
     for catalog in catalog_names():
         own = {item.name for item in load_catalog(catalog).taxonomy.classes}
-        assert own <= known, catalog
-    assert {name for name, _ in keywords("class_fields").phrases} <= known
+        assert own <= names, catalog
+    assert {name for name, _ in keywords("class_fields").phrases} <= names
 
 
 def sample(*rows: dict[str, Any]) -> LayerSample:
@@ -440,17 +438,17 @@ def sample(*rows: dict[str, Any]) -> LayerSample:
 
 
 def column(name: str, *values: object) -> Column:
-    (found,) = columns_of(sample(*({name: value} for value in values)))
-    return found
+    (result,) = columns_of(sample(*({name: value} for value in values)))
+    return result
 
 
-def test_only_fields_of_plain_values_are_looked_at() -> None:
+def test_only_fields_of_plain_values_become_columns() -> None:
     rows = sample(
         {"a": 1, "b": {"lon": 1}, "c": "x", "d": None, "e": b"wkb"},
         {"a": None, "b": None, "c": "", "d": None, "e": None},
     )
-    found = columns_of(rows)
-    assert [(item.name, dict(item.counts), item.missing) for item in found] == [
+    columns = columns_of(rows)
+    assert [(item.name, dict(item.counts), item.missing) for item in columns] == [
         ("a", {1: 1}, 1),
         ("c", {"x": 1}, 1),
         ("d", {}, 2),
@@ -475,12 +473,12 @@ def test_only_fields_of_plain_values_are_looked_at() -> None:
         (tuple("abcdefghijklm" * 3), []),
     ],
 )
-def test_identifiers_and_filters_are_told_apart(
+def test_identifiers_and_filters_are_distinguished(
     values: tuple[object, ...], kinds: list[str]
 ) -> None:
     counts = Counter(value for value in values if value is not None)
-    found = Column("x", counts, len(values) - counts.total())
-    assert [kind for kind in ("unique", "few") if getattr(found, kind)] == kinds
+    field = Column("x", counts, len(values) - counts.total())
+    assert [kind for kind in ("unique", "few") if getattr(field, kind)] == kinds
 
 
 @pytest.mark.parametrize(
@@ -494,7 +492,7 @@ def test_identifiers_and_filters_are_told_apart(
         ([], ["N° Voie", "LONGUEUR", "latin"]),
     ],
 )
-def test_fields_are_known_by_their_names(purpose: list[str], names: list[str]) -> None:
+def test_purpose_of_a_field_is_recognised_by_its_name(purpose: list[str], names: list[str]) -> None:
     purposes = ("filter", "identifier", "row_number", "x", "y")
     for name in names:
         fits = [item for item in purposes if Column(name, Counter(), 0).meant_for(item)]
@@ -524,7 +522,7 @@ USE = column("use", "tree", "tree")
         ("streets", "polygon", [], ("", False, False)),
     ],
 )
-def test_the_class_is_guessed_by_name_then_values_then_fields(
+def test_class_is_guessed_by_name_then_values_then_fields(
     names: str, geometry: str | None, columns: list[Column], expected: tuple[str, bool, bool]
 ) -> None:
     guess = guess_class(names, columns, geometry=geometry, rows=4)
@@ -534,7 +532,7 @@ def test_the_class_is_guessed_by_name_then_values_then_fields(
     assert ("the field espece" in guess.reason) == (guess.name == "alignment_tree")
 
 
-def test_values_that_name_other_classes_are_found() -> None:
+def test_field_with_values_of_other_classes_is_found() -> None:
     others = "kind", {"Taxi": "taxi_station", "GIG/GIC": "disabled_bay"}
     kind = column("kind", *["Taxi", "Livraison", "GIG/GIC", "Autre"] * 3)
     assert guess_class_by([kind], "reserved_bay") == others
@@ -558,7 +556,7 @@ def test_values_that_name_other_classes_are_found() -> None:
         ([{"lon": "?", "lat": 1}, {"lon": 2.5, "lat": 48}], ("lon", "lat")),
     ],
 )
-def test_positions_are_found_in_a_table(
+def test_position_fields_of_a_table_are_guessed(
     rows: list[dict[str, Any]], expected: tuple[str, ...]
 ) -> None:
     table = sample(*rows)

@@ -68,7 +68,7 @@ def loaded(*layers: RawLayer, **options: object) -> Loaded:
 
 
 ZERO = [(0.0, 0.0)]
-STRAYS = {  # rows, of which the last stray; how many do; what is said of where they are
+STRAYS = {  # rows with the strays last; number of strays; text about their places
     "null island": ((town(HELSINKI), ZERO), 1, "longitude 0, latitude 0"),
     "in the same zone": ((town(ACCRA), ZERO * 3), 3, "longitude 0, latitude 0"),
     "in a small table": ((town(HELSINKI, size=3), ZERO), 1, "latitude 0"),
@@ -111,10 +111,12 @@ FITTING = {  # layers, the CRS to work in, and the CRS that it is in the end
 
 
 @pytest.mark.parametrize(("layers", "metric", "code"), FITTING.values(), ids=FITTING)
-def test_what_fits_is_taken_as_it_is(layers: list[RawLayer], metric: int | None, code: int) -> None:
-    kept, crs, notes = settle_extent(layers, crs=None if metric is None else f"EPSG:{metric}")
+def test_plausible_layers_do_not_change(
+    layers: list[RawLayer], metric: int | None, code: int
+) -> None:
+    settled, crs, notes = settle_extent(layers, crs=None if metric is None else f"EPSG:{metric}")
     assert (crs.to_epsg(), notes) == (code, ())
-    assert len(kept[0].table) == len(layers[0].table)
+    assert len(settled[0].table) == len(layers[0].table)
 
 
 def swapped(places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -180,14 +182,14 @@ REFUSED = {  # layers, the metric CRS, words
 
 
 @pytest.mark.parametrize(("layers", "metric", "words"), REFUSED.values(), ids=REFUSED)
-def test_what_lies_where_it_cannot_is_refused(
+def test_implausible_positions_are_refused(
     layers: list[RawLayer], metric: str | None, words: list[str]
 ) -> None:
     with refused(CrsError, *words):
         settle_extent(layers, crs=metric)
 
 
-def test_a_larger_distortion_can_be_allowed() -> None:
+def test_larger_distortion_can_be_allowed() -> None:
     layers = [layer(town(PARIS), town(BERLIN))]
     _, _, (note,) = settle_extent(layers, max_distortion=9.0)
     assert "2 places far apart" in note
@@ -196,24 +198,24 @@ def test_a_larger_distortion_can_be_allowed() -> None:
             settle_extent(layers, max_distortion=most)
 
 
-def test_a_grid_that_is_much_turned_is_told() -> None:
+def test_large_convergence_is_noted() -> None:
     _, _, (note,) = settle_extent([layer(town((-9.1, 38.7)))], crs="EPSG:3035")
     assert "grid north of EPSG:3035 is up to 13" in note
 
 
-def test_a_crs_without_a_code_is_used_where_its_likeness_is() -> None:
-    alike = CRS.from_user_input(CRS(2154).to_wkt("WKT1_ESRI"))
-    assert alike.area_of_use is None
+def test_crs_without_a_code_has_the_area_of_the_equivalent_one() -> None:
+    equivalent = CRS.from_user_input(CRS(2154).to_wkt("WKT1_ESRI"))
+    assert equivalent.area_of_use is None
     with refused(CrsError, "-9.86,41.15,10.38,51.56", "with x and y exchanged"):
-        settle_extent([layer(swapped(lambert(town(PARIS))), crs=alike)])
+        settle_extent([layer(swapped(lambert(town(PARIS))), crs=equivalent)])
 
 
-def test_towns_of_one_zone_are_told() -> None:
-    kept, crs, notes = settle_extent([layer(town(PARIS), town(LYON))])
-    assert (len(kept[0].table), crs.to_epsg(), len(notes)) == (80, 32631, 1)
+def test_distant_towns_in_one_zone_are_noted() -> None:
+    settled, crs, notes = settle_extent([layer(town(PARIS), town(LYON))])
+    assert (len(settled[0].table), crs.to_epsg(), len(notes)) == (80, 32631, 1)
 
 
-def test_layers_without_places() -> None:
+def test_layers_without_positions_are_accepted_with_a_crs() -> None:
     with refused(CrsError, "'b'", "state its crs"):
         settle_extent([layer(town(PARIS)), layer(ZERO, name="b", crs=None)])
     empty = raw_layer([None, shapely.Point()], classes="bench")
@@ -222,7 +224,7 @@ def test_layers_without_places() -> None:
     assert settle_extent([empty], crs="EPSG:2154")[1].to_epsg() == 2154
 
 
-def test_bearings_and_distances_across_180_degrees() -> None:
+def test_layers_may_cross_180_degrees() -> None:
     """What cells see, against geodesics on the ellipsoid."""
     places = town(TAVEUNI, size=400, km=1.0)
     assert np.ptp(places[:, 0]) > 359.0

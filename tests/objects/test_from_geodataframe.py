@@ -29,7 +29,7 @@ KEYS = ["amenity", "highway", "natural", "traffic_sign", "building"]
 
 @pytest.fixture(scope="module")
 def extract(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a town as OpenStreetMap XML, with the same as pbf beside it."""
+    """Return a town as OpenStreetMap XML, with the same data as pbf in the same folder."""
     path = write_osm(tmp_path_factory.mktemp("town") / "town.osm", *street_town())
     with osmium.SimpleWriter(str(path.with_suffix(".osm.pbf"))) as writer:
         for element in osmium.FileProcessor(str(path)):
@@ -85,7 +85,7 @@ def assert_same(database: SignatureDatabase, expected: SignatureDatabase) -> Non
         assert np.array_equal(getattr(database, name), getattr(expected, name)), name
 
 
-def test_a_frame_of_osmnx_is_built_in_one_call_as_from_the_extract(
+def test_osmnx_table_gives_the_same_objects_as_the_extract(
     frame: gpd.GeoDataFrame, expected: StreetObjects
 ) -> None:
     assert len(expected) == 12
@@ -97,7 +97,7 @@ def test_a_frame_of_osmnx_is_built_in_one_call_as_from_the_extract(
     assert np.abs(objects.xy - expected.xy).max() < 1e-6
 
 
-def test_buildings_and_streets_may_be_a_frame_of_osmnx(
+def test_buildings_and_streets_may_be_an_osmnx_table(
     frame: gpd.GeoDataFrame, extract: Path
 ) -> None:
     """As they are, with what is neither among them."""
@@ -116,19 +116,19 @@ def test_buildings_and_streets_may_be_a_frame_of_osmnx(
 
 
 @pytest.mark.parametrize("suffix", [".gpkg", ".geojson", ".fgb", ".parquet"])
-def test_files_of_osmnx_are_read_like_the_extract(
+def test_osmnx_files_give_the_same_objects_as_the_extract(
     frame: gpd.GeoDataFrame, expected: StreetObjects, tmp_path: Path, suffix: str
 ) -> None:
     path = tmp_path / f"town{suffix}"
     frame.to_parquet(path) if suffix == ".parquet" else frame.to_file(path)
-    found, wanted = (
+    result, extract = (
         objects.table.sort_values(["source", "source_id"]) for objects in (loaded(path), expected)
     )
-    assert found["source_id"].tolist() == wanted["source_id"].tolist()
-    assert shapely.distance(found.geometry.array, wanted.geometry.array).max() < 1e-6
+    assert result["source_id"].tolist() == extract["source_id"].tolist()
+    assert shapely.distance(result.geometry.array, extract.geometry.array).max() < 1e-6
 
 
-def test_a_file_of_quackosm_is_read_like_the_extract(
+def test_quackosm_file_gives_the_same_objects_as_the_extract(
     quack: Path, extract: Path, expected: StreetObjects
 ) -> None:
     assert_same(build_database(loaded(quack)), build_database(expected))
@@ -153,7 +153,7 @@ def points(**columns: list[object]) -> gpd.GeoDataFrame:
     return gpd.GeoDataFrame(columns, geometry=places, crs="EPSG:4326")
 
 
-def test_classes_are_in_a_column() -> None:
+def test_classes_are_read_from_a_column() -> None:
     frame = points(kind=["bench", "fire_hydrant", None, "street_light"])
     objects = objects_from_frame(frame, class_column="kind")
     assert objects.to_geodataframe()["class_name"].tolist() == [
@@ -165,7 +165,7 @@ def test_classes_are_in_a_column() -> None:
     assert objects.notes == ()
     again = objects_from_frame(objects.to_geodataframe(), class_column="class_name")
     assert (again.xy == objects.xy).all()
-    assert [str(one) for one in again.licenses] == [str(one) for one in objects.licenses]
+    assert [*map(str, again.licenses)] == [*map(str, objects.licenses)]
     with refused(InputError, "'kind'", "'benhc'", "'bench'"):
         objects_from_frame(points(kind=["benhc", "bench"]), class_column="kind")
     with refused(InputError, "'fire_hydrant'", "street_light"):
@@ -179,7 +179,7 @@ SPECS = (
 PAPER = Catalog(name="town", title="Town", taxonomy=paper_taxonomy(), layers=SPECS)
 
 
-def test_a_catalogue_tells_what_a_table_is() -> None:
+def test_table_is_read_with_a_catalogue() -> None:
     frame = points(seats=[1, 2, None, 4])
     assert objects_from_frame(frame, catalog=PAPER).table["source_id"].tolist() == ["1", "3"]
     both = frame.assign(art=["tree", "", None, "tree"])
@@ -190,7 +190,7 @@ def test_a_catalogue_tells_what_a_table_is() -> None:
         objects_from_frame(points(other=[1]), catalog=PAPER)
 
 
-def test_tables_that_do_not_tell_what_they_hold_are_refused() -> None:
+def test_tables_with_unclear_contents_are_refused() -> None:
     tagged = points(amenity=["bench"])
     assert len(objects_from_frame(tagged, tags=True)) == 1
     assert len(objects_from_frame(tagged, catalog="openstreetmap")) == 1

@@ -60,7 +60,7 @@ def catalog_of(**values: object) -> Catalog:
     return Catalog(**{**plain, **values})  # type: ignore[arg-type]
 
 
-def test_layers_are_chosen() -> None:
+def test_layers_are_selected_by_name_and_selection() -> None:
     osm = load_catalog("openstreetmap")
 
     def chosen(*names: str, **options: Any) -> set[str]:  # noqa: ANN401
@@ -82,8 +82,8 @@ def test_layers_are_chosen() -> None:
     assert roles == {"objects", "buildings", "streets"}
 
 
-def test_the_classes_of_the_paper_are_not_taken_from_others() -> None:
-    """Values of other classes are left out, and no pattern below them takes them."""
+def test_values_of_other_classes_match_no_pattern_of_the_paper() -> None:
+    """Values of other classes are omitted, and no later pattern matches them."""
     values = (("Taxi VIP", "kiosk"), ("/Taxi.*/", "taxi_station"))
     bays = LayerSpec(
         name="bays", class_name="kiosk", class_by=ClassBy("type", values, otherwise=True)
@@ -101,31 +101,31 @@ def test_the_classes_of_the_paper_are_not_taken_from_others() -> None:
     assert filtered.notes == ("left out, unlisted in class_by 'type': 'Taxi VIP' 1, 'other' 1",)
 
 
-def test_layers_that_are_not_read_are_counted_on_the_way(tmp_path: Path) -> None:
+def test_other_layers_of_an_extract_are_counted(tmp_path: Path) -> None:
     osm = load_catalog("openstreetmap")
     tags = [{"amenity": "bench"}, *[{"amenity": "clock"}] * 2, {"natural": "tree"}]
-    nodes = (node(n, 7.42, 43.73 + n / 1000, one) for n, one in enumerate(tags, start=1))
+    nodes = (node(n, 7.42, 43.73 + n / 1000, tag) for n, tag in enumerate(tags, start=1))
     specs = choose_layers(osm, ["benches", "trees"])
     others = layers_in_same_extracts(osm, specs)
     assert {"clocks", "taxi_ranks"} < {spec.name for spec in others}
     layers, _ = read_files([*specs, *others], [write_osm(tmp_path / "town.osm", *nodes)])
     counted = [layer for layer in layers if layer.spec in others]
-    loaded = assemble([one for one in layers if one.spec in specs], osm, counted=counted)
-    numbers = {one.name: one.objects for one in loaded.report.unread}
+    loaded = assemble([layer for layer in layers if layer.spec in specs], osm, counted=counted)
+    numbers = {layer.name: layer.objects for layer in loaded.report.unread}
     assert (numbers.pop("clocks"), set(numbers.values())) == (2, {0})
     report = quality_report(loaded.objects, loaded.report)
     assert report.absent == ()
-    assert {one["name"]: one["objects"] for one in report.to_dict()["unread"]}["clocks"] == 2
-    (table,) = [one for one in quality_tables(report) if one.title == "Layers not read"]
+    assert {layer["name"]: layer["objects"] for layer in report.to_dict()["unread"]}["clocks"] == 2
+    (table,) = [item for item in quality_tables(report) if item.title == "Layers not read"]
     assert ("clocks", "clock", "2") in table.rows
-    # Nobody counts what stands in other files, or was not fetched.
+    # Layers in other files, or not fetched, are not counted.
     assert layers_in_same_extracts(load_catalog("montpellier"), []) == ()
-    unread = assemble([one for one in layers if one.spec in specs], osm).report.unread
-    assert {one.objects for one in unread} == {None}
+    unread = assemble([layer for layer in layers if layer.spec in specs], osm).report.unread
+    assert {layer.objects for layer in unread} == {None}
 
 
 def test_layers_of_small_files_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the others nothing is told: too large, absent, without a CRS, or of two files."""
+    """Others are skipped: too large, absent, without a CRS, or in two files."""
     rows = "\n".join(f"{n};7;43" for n in range(5))
     for name in ("bins", "odd", "twice_a", "twice_b", "large"):
         size = 200 if name == "large" else 1
@@ -145,7 +145,7 @@ def test_layers_of_small_files_are_counted(tmp_path: Path, monkeypatch: pytest.M
     assert read_small_layers(catalog, specs, [tmp_path]) == ()
 
 
-def test_a_file_is_read_once_for_all_its_layers(
+def test_file_is_read_once_for_all_its_layers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     osm = load_catalog("openstreetmap")
@@ -166,9 +166,9 @@ def test_a_file_is_read_once_for_all_its_layers(
 
     monkeypatch.setattr(osm_file, "read_layers", counted)
     specs = choose_layers(osm, surroundings=True)
-    done: list[tuple[int, int]] = []
-    layers, absent = read_files(specs, [path], progress=lambda *step: done.append(step))
-    assert (len(calls), absent, done) == (1, (), [(1, 1)])
+    steps: list[tuple[int, int]] = []
+    layers, absent = read_files(specs, [path], progress=lambda *step: steps.append(step))
+    assert (len(calls), absent, steps) == (1, (), [(1, 1)])
     assert [layer.spec for layer in layers] == list(specs)
     loaded = assemble(layers, osm)
     assert loaded.objects.crs.to_epsg() == 32632
@@ -209,7 +209,7 @@ def test_buildings_and_streets_are_reported_like_other_layers(tmp_path: Path) ->
     assert "buildings" in str(quality_tables(report)[1].rows)
 
 
-def test_buildings_that_cannot_be_used_are_counted() -> None:
+def test_unusable_buildings_are_counted() -> None:
     house = shapely.box(770_000, 6_280_000, 770_010, 6_280_010)
     far = shapely.box(1e9, 0, 2e9, 1)
     layer = raw_layer([house, None, shapely.Polygon(), house.boundary, far], name="houses")
@@ -224,14 +224,14 @@ def test_buildings_that_cannot_be_used_are_counted() -> None:
     assert loaded.report.layers[1].counts == after
 
 
-def test_one_bench_in_two_layers_is_one_bench() -> None:
+def test_same_bench_in_two_layers_is_merged() -> None:
     layers = [
         raw("city", (770000, 6280000), (770050, 6280000)),
         raw("osm", (770000, 6280000), (770051, 6280000), (770099, 6280000)),
     ]
     catalog = catalog_of(metric_crs="EPSG:2154", conflate=(("bench", 3.0),))
     merged = assemble(layers, catalog)
-    # The one at the very same place is accounted for as well.
+    # The one at exactly the same place is recorded as well.
     assert merged.objects.table[MERGED].tolist() == ["osm:0", "osm:1", ""]
     assert (merged.conflation.count, merged.buildings) == (2, None)
     apart = assemble(layers, catalog, merge=False)
@@ -239,7 +239,7 @@ def test_one_bench_in_two_layers_is_one_bench() -> None:
     assert len(assemble(layers, catalog, merge=False, collapse=False).objects) == 5
 
 
-def test_ranges_of_the_catalogue_reach_the_database(tmp_path: Path) -> None:
+def test_visibility_ranges_of_the_catalogue_are_stored_in_the_database(tmp_path: Path) -> None:
     taxonomy = paper_taxonomy().with_ranges({"bench": 12.0})
     catalog = catalog_of(metric_crs="EPSG:2154", taxonomy=taxonomy)
     loaded = assemble([raw("city", (770005, 6280005))], catalog)
@@ -248,7 +248,7 @@ def test_ranges_of_the_catalogue_reach_the_database(tmp_path: Path) -> None:
     save_database(build_database(objects), tmp_path / "city.parquet")
     database = open_database(tmp_path / "city.parquet")
     assert objects.taxonomy == database.taxonomy == taxonomy
-    assert len(database) == 5  # a cell and those beside it, of the 29 within 30 m
+    assert len(database) == 5  # a cell and its neighbours, of the 29 within 30 m
 
 
 @pytest.fixture
@@ -257,7 +257,7 @@ def server() -> Iterator[Server]:
         yield running
 
 
-def test_openstreetmap_is_fetched_cut_to_the_area_and_kept(server: Server, tmp_path: Path) -> None:
+def test_openstreetmap_is_fetched_clipped_and_cached(server: Server, tmp_path: Path) -> None:
     elements = [
         {"type": "node", "id": i, "lon": x, "lat": 43.73, "tags": {"amenity": "bench"}}
         for i, x in enumerate((7.42, 7.49), start=1)
@@ -276,21 +276,21 @@ def test_openstreetmap_is_fetched_cut_to_the_area_and_kept(server: Server, tmp_p
     (layer,) = fetch_layers(here.layers, here, area=area, cache=cache, http=http)
     assert layer.table["source_id"].tolist() == ["node/1"]
     assert (layer.counts.read, layer.counts.outside) == (2, 1)
-    asked = len(server.seen)
+    request_count = len(server.requests)
     _, offline = open_cache(tmp_path / "cache", offline=True)
     (again,) = fetch_layers(here.layers, here, area=area, cache=cache, http=offline)
     assert again.table["source_id"].tolist() == ["node/1"]
-    assert len(server.seen) == asked
+    assert len(server.requests) == request_count
     far = find_area("1,2,3,4", here, cache=cache, http=offline)
     with refused(SourceError, "127.0.0.1"):
         fetch_layers(here.layers, here, area=far, cache=cache, http=offline)
 
 
-def test_a_place_is_looked_up_only_where_the_catalogue_says(server: Server, tmp_path: Path) -> None:
+def test_place_name_needs_a_geocoder_in_the_catalogue(server: Server, tmp_path: Path) -> None:
     cache, http = open_cache(tmp_path)
     with refused(InputError, "'town'", "'Monaco'", "polygon file"):
         find_area("Monaco", catalog_of(), cache=cache, http=http)
     area = find_area("1,2,3,4", catalog_of(), cache=cache, http=http)
     with refused(InputError, "'town'", "semsig load"):
         fetch_layers([BENCH], catalog_of(), area=area, cache=cache, http=http)
-    assert server.seen == []
+    assert server.requests == []

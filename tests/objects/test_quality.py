@@ -48,7 +48,7 @@ def report_on(*layers: RawLayer, **radii: float) -> QualityReport:
     return quality_report(merged, load, conflation)
 
 
-def test_the_objects_of_a_class_are_counted() -> None:
+def test_objects_of_each_class_are_counted() -> None:
     square = [(X, Y), (X + 1000, Y), (X + 1000, Y + 1000), (X, Y + 1000), (X, Y)]
     report = report_on(
         layer(square, name="benches"),
@@ -61,12 +61,12 @@ def test_the_objects_of_a_class_are_counted() -> None:
     ]
     assert report.objects == 5
     assert (report.hull_km2, report.occupied_km2) == pytest.approx((1.0, 0.05))
-    # What no layer holds was not looked for, and what a layer holds none of, was.
+    # A class of a layer without objects is absent; a class of no layer is not.
     assert report.absent == ()
     assert report_on(layer(square), layer([])).absent == ("alignment_tree",)
 
 
-def test_a_line_of_objects_has_no_area_of_its_own() -> None:
+def test_hull_of_objects_in_a_line_has_no_area() -> None:
     for places in ([(X, Y)], [(X, Y), (X + 50, Y), (X + 99, Y)]):
         report = report_on(layer(places))
         assert report.hull_km2 == 0
@@ -74,14 +74,14 @@ def test_a_line_of_objects_has_no_area_of_its_own() -> None:
         assert report.classes[0].per_km2_occupied == pytest.approx(100 * len(places))
 
 
-def test_squares_are_counted_on_both_sides_of_zero() -> None:
+def test_occupied_squares_are_counted_for_negative_coordinates() -> None:
     objects, load = built(layer([(X, Y), (X + 1, Y)]))
-    moved = objects.table.set_geometry(shapely.points([[-1.0, 5.0], [1.0, 5.0]]), crs=objects.crs)
-    report = quality_report(StreetObjects(moved, TAXONOMY, ()), load)
+    shifted = objects.table.set_geometry(shapely.points([[-1.0, 5.0], [1.0, 5.0]]), crs=objects.crs)
+    report = quality_report(StreetObjects(shifted, TAXONOMY, ()), load)
     assert report.occupied_km2 == pytest.approx(0.02)
 
 
-def test_the_whole_report(snapshot: Callable[[str, str], None]) -> None:
+def test_report_equals_the_snapshot(snapshot: Callable[[str, str], None]) -> None:
     places = [(X, Y), (X, Y), None, (math.inf, Y), (X + 50, Y + 30), (X, Y + 70), (X + 80, Y)]
     plain = report_on(
         layer(places, notes=("odd",)),
@@ -97,7 +97,7 @@ def test_the_whole_report(snapshot: Callable[[str, str], None]) -> None:
     snapshot("quality.json", json.dumps(plain, indent=1) + "\n")
 
 
-def test_a_system_without_a_code_is_told_by_name() -> None:
+def test_crs_without_a_code_is_reported_by_name() -> None:
     own = CRS("+proj=tmerc +lat_0=43.6 +lon_0=3.9").to_wkt().replace("unknown", "Our town", 1)
     objects, load = build_objects([layer([(X, Y)])], taxonomy=TAXONOMY, crs=own)
     assert quality_report(objects, load).crs == "Our town"
@@ -111,17 +111,17 @@ def test_a_system_without_a_code_is_told_by_name() -> None:
     ),
     st.booleans(),
 )
-def test_the_nearest_neighbour_is_that_of_a_plain_loop(
+def test_nearest_distance_equals_a_simple_loop(
     places: list[tuple[float, float]],
     collapse: bool,  # noqa: FBT001
 ) -> None:
     objects, load = built(layer(places), collapse=collapse)
     (benches,) = quality_report(objects, load).classes
-    left = objects.xy.tolist()
+    points = objects.xy.tolist()
     nearest = [
-        min(math.dist(one, other) for other in left[:row] + left[row + 1 :])
-        for row, one in enumerate(left)
-        if len(left) > 1
+        min(math.dist(point, other) for other in points[:row] + points[row + 1 :])
+        for row, point in enumerate(points)
+        if len(points) > 1
     ]
     assert benches.nearest_m == (pytest.approx(median(nearest)) if nearest else None)
     assert benches.rows == len(places)

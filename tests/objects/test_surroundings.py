@@ -31,7 +31,7 @@ def write(path: Path, *shapes: shapely.Geometry | None) -> Path:
 
 
 @pytest.mark.parametrize("name", ["houses.parquet", "houses.gpkg", "houses.geojson"])
-def test_files_are_moved_to_the_crs_asked_for(tmp_path: Path, name: str) -> None:
+def test_files_are_reprojected(tmp_path: Path, name: str) -> None:
     table = read_surroundings(write(tmp_path / name, HOUSE, None), role="buildings", crs=CRS)
     assert len(table) == 1
     assert table.geometry[0].hausdorff_distance(HOUSE) < 0.01
@@ -39,7 +39,7 @@ def test_files_are_moved_to_the_crs_asked_for(tmp_path: Path, name: str) -> None
     assert area.area == pytest.approx(HOUSE.buffer(5).area, rel=1e-3)
 
 
-def test_an_area_may_be_a_box_of_degrees() -> None:
+def test_area_may_be_a_box_in_degrees() -> None:
     area = read_area("24.5,60,25.5,60.2", crs="EPSG:32635")
     south = gpd.GeoSeries(shapely.points([(25, 59.99999), (25, 60.00001)]), crs="EPSG:4326")
     inside = shapely.covers(area, south.to_crs("EPSG:32635").to_numpy())
@@ -48,7 +48,7 @@ def test_an_area_may_be_a_box_of_degrees() -> None:
         read_area("25,60,24,61", crs=CRS)
 
 
-def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
+def test_buildings_and_streets_of_an_openstreetmap_file(tmp_path: Path) -> None:
     nodes = [node(1, 24.9, 60.1), node(2, 24.91, 60.1), node(3, 24.91, 60.11)]
     ways = [way(n, ring, {"building": "yes"}) for n, ring in ((4, [1, 2, 3, 1]), (6, [1, 2, 3]))]
     ways += [way(5, [1, 2], {"highway": "residential"})]
@@ -56,16 +56,16 @@ def test_an_openstreetmap_file_gives_what_it_tags(tmp_path: Path) -> None:
     houses = read_surroundings(path, role="buildings", crs="EPSG:32635")
     streets = read_surroundings(path, role="streets", crs="EPSG:32635")
     assert (houses.geom_type.tolist(), streets.geom_type.tolist()) == (["Polygon"], ["LineString"])
-    told: list[str] = []
-    read_surroundings(path, role="buildings", crs="EPSG:32635", tell=told.append)
+    notes: list[str] = []
+    read_surroundings(path, role="buildings", crs="EPSG:32635", tell=notes.append)
     why = "unreadable: is not closed, as the outline of a building is (1)"
-    assert told == [f"{path}: {why}"]
-    named = tuple(
+    assert notes == [f"{path}: {why}"]
+    lines = tuple(
         f"OpenStreetMap contributors (ODbL 1.0): {name}" for name in ("buildings", "streets")
     )
-    assert licenses_of(houses, streets, houses) == named
+    assert licenses_of(houses, streets, houses) == lines
     shouted = path.rename(path.with_name("CITY.OSM"))
-    assert licenses_of(read_surroundings(shouted, role="streets", crs=CRS)) == named[1:]
+    assert licenses_of(read_surroundings(shouted, role="streets", crs=CRS)) == lines[1:]
 
 
 LINE = shapely.LineString([(770_000, 6_280_000), (770_100, 6_280_000)])
@@ -82,7 +82,7 @@ FLAT = shapely.Polygon([(770_000, 6_280_000)] * 3)
         (FLAT, "", ("encloses no area",)),
     ],
 )
-def test_a_file_of_something_else_is_refused(
+def test_other_geometries_are_refused(
     tmp_path: Path, name: str, shape: shapely.Geometry | None, role: Role, words: tuple[str, ...]
 ) -> None:
     path = write(tmp_path / name, shape)
@@ -97,7 +97,7 @@ HOUSES = gpd.GeoDataFrame(
 NOWHERE = (0, 0, 9, 9)
 
 
-def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+def test_error_names_an_unusable_file(tmp_path: Path) -> None:
     (tmp_path / "broken.parquet").write_text("no", encoding="utf-8")
     gpd.GeoDataFrame(geometry=[HOUSE]).to_parquet(tmp_path / "bare.parquet")
     whole = pq.read_table(write(tmp_path / "open.parquet", HOUSE))
@@ -122,7 +122,7 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
         read_surroundings(tmp_path / "empty.parquet", role="buildings", crs=CRS)
 
 
-def test_a_table_is_as_good_as_a_file() -> None:
+def test_table_is_read_like_a_file() -> None:
     assert len(read_surroundings(HOUSES, role="buildings", crs="EPSG:4326")) == len(HOUSES)
     box = (770_106.0, 6_280_400.0, 770_130.0, 6_280_456.0)
     near = read_surroundings(HOUSES, role="buildings", crs=CRS, box=box)
@@ -134,7 +134,7 @@ def test_a_table_is_as_good_as_a_file() -> None:
         read_surroundings(HOUSES.set_crs(None, allow_override=True), role="buildings", crs=CRS)
 
 
-def test_elements_of_openstreetmap_are_chosen_by_the_catalogue(tmp_path: Path) -> None:
+def test_openstreetmap_elements_are_selected_by_the_catalogue(tmp_path: Path) -> None:
     """A node is no building, a footway no street, and a street has a width by its kind."""
     shapes = [HOUSE, HOUSE.centroid, shapely.LineString([(1, 1), (2, 2)]), HOUSE.exterior]
     columns = {
@@ -145,9 +145,9 @@ def test_elements_of_openstreetmap_are_chosen_by_the_catalogue(tmp_path: Path) -
     }
     table = gpd.GeoDataFrame(columns, geometry=shapes, crs=CRS)
     table.to_file(tmp_path / "town.gpkg")
-    for given in (table, tmp_path / "town.gpkg"):
-        houses = read_surroundings(given, role="buildings", crs=CRS)
-        streets = read_surroundings(given, role="streets", crs=CRS)
+    for source in (table, tmp_path / "town.gpkg"):
+        houses = read_surroundings(source, role="buildings", crs=CRS)
+        streets = read_surroundings(source, role="streets", crs=CRS)
         assert houses["source_id"].tolist() == ["way/1"]
         assert streets[["source_id", "half_width"]].to_numpy().tolist() == [["way/4", 8.0]]
         assert licenses_of(houses) == ("OpenStreetMap contributors (ODbL 1.0): buildings",)
@@ -155,7 +155,7 @@ def test_elements_of_openstreetmap_are_chosen_by_the_catalogue(tmp_path: Path) -
         read_surroundings(table.iloc[2:], role="buildings", crs=CRS)
 
 
-def test_saved_surroundings_come_back_by_box(tmp_path: Path) -> None:
+def test_saved_surroundings_are_read_by_box(tmp_path: Path) -> None:
     table = HOUSES.copy()
     table.attrs["licenses"] = ["City (CC0): houses"]
     path = tmp_path / "new" / "houses.parquet"

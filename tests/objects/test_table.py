@@ -52,7 +52,7 @@ def points(*places: tuple[float, float]) -> list[shapely.Point]:
     return [shapely.Point(x, y) for x, y in places]
 
 
-def test_objects_are_a_table_that_tells_their_classes() -> None:
+def test_geodataframe_has_names_and_symbols_of_classes() -> None:
     objects = build(
         raw_layer(points((0, 0), (50, 0)), classes=["bench", "street_light"], ids=["7", "8"])
     )
@@ -83,7 +83,7 @@ def write(objects: StreetObjects, path: Path, change: dict[str, Any], *, rows: i
     write_geoparquet(pa.table(columns).slice(0, rows), path, geo=geo, specs=specs)
 
 
-def test_the_table_has_the_columns_it_promises() -> None:
+def test_table_has_the_documented_columns() -> None:
     objects = build(
         raw_layer(points((1, 2), (3, 4)), ids=["a7", "é8"], classes=["bench", "street_light"])
     )
@@ -95,7 +95,7 @@ def test_the_table_has_the_columns_it_promises() -> None:
     assert not objects.xy.flags.writeable
 
 
-def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
+def test_licences_list_each_publisher_once_with_its_layers() -> None:
     place = points((1, 2))
     objects = build(
         raw_layer(place, name="trees"),
@@ -127,14 +127,14 @@ def test_every_publisher_is_named_once_with_the_layers_it_gave() -> None:
         ("GEOMETRYCOLLECTION (POINT (9 9), LINESTRING (0 0, 2 0))", (1, 0)),
     ],
 )
-def test_an_object_stands_at_its_centroid(wkt: str, centre: tuple[float, float]) -> None:
+def test_object_is_placed_at_its_centroid(wkt: str, centre: tuple[float, float]) -> None:
     objects = build(raw_layer([shapely.from_wkt(wkt), shapely.Point(100, 100)]))
     assert objects.xy[0] == pytest.approx(centre)
     assert set(objects.table.geom_type) == {"Point"}
     assert not objects.table.has_z.any()
 
 
-def test_a_centroid_is_taken_in_metres() -> None:
+def test_centroid_is_computed_in_metres() -> None:
     # At 60 degrees north, a degree to the east is half as long as one to the north.
     bent = shapely.LineString([(24.941, 60.165), (24.941, 60.1654), (24.9416, 60.1654)])
     metric = "EPSG:32635"
@@ -160,7 +160,7 @@ AREA = shapely.box(0, 0, 20, 20)
     ],
     ids=["point first", "area first", "several points", "several areas", "outside", "a line"],
 )
-def test_an_area_and_a_point_in_it_are_one_object(
+def test_area_and_point_in_it_are_one_object(
     shapes: list[shapely.Geometry], places: list[tuple[float, float]], counts: list[int]
 ) -> None:
     objects, report = build_objects([raw_layer(shapes)], taxonomy=TAXONOMY, crs=LAMBERT)
@@ -171,19 +171,19 @@ def test_an_area_and_a_point_in_it_are_one_object(
     assert len(apart) == len(shapes)
 
 
-def test_an_area_of_another_class_or_layer_is_another_object() -> None:
+def test_area_of_another_class_or_layer_is_another_object() -> None:
     shapes = [AREA, shapely.Point(3, 4)]
     kinds = raw_layer(shapes, classes=["bench", "alignment_tree"])
     assert len(build(kinds)) == 2
     layers = [raw_layer([shape], name=name) for name, shape in zip("ab", shapes, strict=True)]
     assert len(build(*layers)) == 1
-    # Those of classes that are conflated are left to `conflate`.
+    # Objects of classes in `apart` are merged later by `conflate`.
     apart = ["alignment_tree"]
     objects, _ = build_objects(layers, taxonomy=TAXONOMY, crs=LAMBERT, apart=apart)
     assert len(objects) == 2
 
 
-def test_rows_without_a_place_are_dropped_and_counted() -> None:
+def test_rows_without_a_position_are_dropped_and_counted() -> None:
     empty = [None, *map(shapely.from_wkt, ("POINT EMPTY", "POLYGON EMPTY"))]
     empty += map(shapely.from_wkt, ("MULTILINESTRING EMPTY", "GEOMETRYCOLLECTION EMPTY"))
     with np.errstate(invalid="ignore"):
@@ -201,7 +201,7 @@ def test_rows_without_a_place_are_dropped_and_counted() -> None:
     assert report.layers[0].counts == RowCounts(read=16, missing=5, misplaced=9)
 
 
-def test_a_place_off_the_earth_is_misplaced() -> None:
+def test_position_off_the_earth_is_misplaced() -> None:
     with np.errstate(invalid="ignore"):
         broken = shapely.linestrings([(3.88, 43.61), (NAN, 43.61)])
     places = points((3.88, 43.61), (500, 900), (3.9, 43.6), (1e38, 0))
@@ -211,7 +211,7 @@ def test_a_place_off_the_earth_is_misplaced() -> None:
     assert objects.table["source_id"].tolist() == ["0", "2"]
 
 
-def test_layers_in_several_systems_meet_in_one() -> None:
+def test_layers_in_several_crs_are_joined() -> None:
     lon, lat = 3.876716, 43.610769
     x, y = Transformer.from_crs("EPSG:4171", LAMBERT, always_xy=True).transform(lon, lat)
     layers = [
@@ -239,14 +239,14 @@ NOWHERE = raw_layer(HERE, name="parks", crs=None)
         ),
     ],
 )
-def test_unknown_classes_and_other_systems_are_refused(
+def test_unknown_class_and_unusable_crs_are_refused(
     layer: RawLayer, crs: str, error: type[Exception], words: tuple[str, ...]
 ) -> None:
     with refused(error, *words):
         build_objects([raw_layer(HERE), layer], taxonomy=TAXONOMY, crs=crs)
 
 
-def test_nothing_left_is_an_error() -> None:
+def test_layers_without_objects_are_refused() -> None:
     nothing = raw_layer([None, shapely.Point(NAN, NAN)], filtered=7)
     for layers in ([], [raw_layer([])], [nothing], [nothing, raw_layer([], crs="EPSG:4326")]):
         with pytest.raises(EmptyResultError) as caught:
@@ -255,7 +255,7 @@ def test_nothing_left_is_an_error() -> None:
         assert_sentence(caught.value, f"of {rows} rows in {len(layers)} layers", "look at")
 
 
-def test_an_empty_layer_beside_a_full_one_is_fine() -> None:
+def test_empty_layer_next_to_a_full_one_is_accepted() -> None:
     for crs in ("EPSG:4326", LAMBERT):
         empty, bad = raw_layer([], name="a", crs=crs), raw_layer([None], name="b", crs=crs)
         layers = [empty, raw_layer(HERE), bad]
@@ -297,33 +297,33 @@ def raw_layers(draw: st.DrawFn) -> RawLayer:
     apart=st.sampled_from([(), ("bench",)]),
 )
 @settings(max_examples=100)
-def test_every_row_is_accounted_for(
+def test_counts_of_rows_equal_a_simple_implementation(
     *, layers: list[RawLayer], collapse: bool, apart: tuple[str, ...]
 ) -> None:
     things: dict[object, list[Any]] = {}  # the first of each class at a place, and their number
     ids = set()
     reports = []
     for number, layer in enumerate(layers):
-        source, gone = layer.spec.name, Counter[str]()
+        source, dropped = layer.spec.name, Counter[str]()
         for name, source_id, shape in layer.table.itertuples(index=False):
             if shape is None or shape.is_empty:
-                gone["missing"] += 1
+                dropped["missing"] += 1
                 continue
             x, y = (shape if shape.geom_type == "Point" else shape.centroid).coords[0]
             if not math.isfinite(x + y):
-                gone["misplaced"] += 1
+                dropped["misplaced"] += 1
                 continue
             place = (number if name in apart else None, name, round(x, 2), round(y, 2))
             key = place if collapse else len(things)
             if layer.spec.unique_id and source_id and (source, source_id) in ids:
-                gone["duplicates"] += 1
+                dropped["duplicates"] += 1
             elif key in things:
-                gone["collapsed"] += 1
+                dropped["collapsed"] += 1
                 things[key][-1] += 1
             else:
                 things[key] = [name, source, source_id, x, y, 1]
             ids.add((source, source_id))
-        counts = dataclasses.replace(layer.counts, **gone)
+        counts = dataclasses.replace(layer.counts, **dropped)
         notes = (*layer.notes, *layer.errors)
         reports.append(LayerReport(source, counts, notes, classes=layer.spec.classes))
     try:
@@ -352,7 +352,7 @@ LICENCE = st.builds(
 
 
 @given(st.lists(LICENCE, max_size=3).map(tuple), st.sets(st.text("ab,: ", max_size=4)))
-def test_licences_come_back_whatever_layers_are_called(
+def test_licences_are_read_back_for_any_layer_names(
     licenses: tuple[Licence, ...], sources: set[str]
 ) -> None:
     layers = sources.union(*(licence.layers for licence in licenses)) or {"trees"}
@@ -373,10 +373,10 @@ def test_licences_come_back_whatever_layers_are_called(
         ("Town (CC0)", ()),
     ],
 )
-def test_an_older_file_tells_layers_by_its_objects(
+def test_layers_of_licences_in_older_files_are_inferred(
     tmp_path: Path, line: str, layers: tuple[str, ...]
 ) -> None:
-    """Files of earlier versions have lines for people, and nothing beside them."""
+    """Files of earlier versions have only attribution lines."""
     names = ("parks, trees", "lamps", "x: y", "b", "b, b")
     objects = build(
         *(raw_layer(points((1, number)), name=name) for number, name in enumerate(names))
@@ -389,7 +389,7 @@ def test_an_older_file_tells_layers_by_its_objects(
     assert open_objects(path).licenses == objects.licenses
 
 
-def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
+def test_license_layers_are_stored_only_if_needed() -> None:
     lamps, benches = (raw_layer(HERE, name=name) for name in ("lamps", "benches"))
     assert "license_layers" not in objects_specs(build(lamps, benches, collapse=False))
     specs = objects_specs(build(lamps, raw_layer([], name="benches")))
@@ -397,7 +397,7 @@ def test_a_file_says_of_layers_only_what_its_lines_do_not_tell() -> None:
     assert specs["license_layers"] == [["lamps", "benches"]]
 
 
-def test_saved_objects_come_back(tmp_path: Path) -> None:
+def test_saved_objects_are_read_back(tmp_path: Path) -> None:
     taxonomy = load_catalog("montpellier").taxonomy
     layers = [
         raw_layer(points((700_000.123456789, 6_600_000.1)), ids=["Écusson n°7 - 東"], name="é"),
@@ -421,7 +421,7 @@ def scattered(count: int) -> StreetObjects:
     return build(raw_layer(points(*map(tuple, places.tolist()))))
 
 
-def test_saved_objects_come_back_in_an_order_that_stays(tmp_path: Path) -> None:
+def test_order_of_saved_objects_is_stable(tmp_path: Path) -> None:
     objects = scattered(3_000)
     path = tmp_path / "objects.parquet"
     save_objects(objects, path)
@@ -446,7 +446,7 @@ def test_saved_objects_come_back_in_an_order_that_stays(tmp_path: Path) -> None:
     keep_order=st.booleans(),
 )
 @settings(max_examples=60)
-def test_a_box_holds_exactly_the_objects_in_it(
+def test_box_returns_exactly_the_objects_in_it(
     *,
     places: list[tuple[int, int]],
     corner: tuple[int, int],
@@ -463,14 +463,14 @@ def test_a_box_holds_exactly_the_objects_in_it(
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setattr("semsig_gis.objects.table.GROUP_ROWS", group_rows)
         save_objects(objects, f"{folder}/objects.parquet", keep_order=keep_order)
-        found = open_objects(f"{folder}/objects.parquet", box=(west, south, east, north))
+        result = open_objects(f"{folder}/objects.parquet", box=(west, south, east, north))
     inside = [row for row, (x, y) in enumerate(placed) if west <= x <= east and south <= y <= north]
-    assert sorted(found.table["source_id"].astype(int)) == inside
-    assert found.xy.shape == (len(inside), 2)
-    assert found.taxonomy == objects.taxonomy
+    assert sorted(result.table["source_id"].astype(int)) == inside
+    assert result.xy.shape == (len(inside), 2)
+    assert result.taxonomy == objects.taxonomy
 
 
-def test_only_the_groups_near_a_box_are_read(
+def test_only_row_groups_near_the_box_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     save_objects(scattered(40_000), tmp_path / "objects.parquet")
@@ -486,7 +486,7 @@ def test_only_the_groups_near_a_box_are_read(
     assert read == [1]  # of five
 
 
-def test_other_programs_and_files_of_before_read_by_box_too(tmp_path: Path) -> None:
+def test_geopandas_and_older_files_support_reading_by_box(tmp_path: Path) -> None:
     objects = scattered(500)
     path = tmp_path / "objects.parquet"
     save_objects(objects, path)
@@ -499,7 +499,7 @@ def test_other_programs_and_files_of_before_read_by_box_too(tmp_path: Path) -> N
     assert open_objects(path, box=box).table["source_id"].tolist() == ids
 
 
-def test_a_cut_file_is_an_error(tmp_path: Path) -> None:
+def test_truncated_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "objects.parquet"
     save_objects(build(raw_layer(points((1, 2), (3, 4)))), path)
     content = path.read_bytes()
@@ -543,9 +543,7 @@ TREE = shapely.Point(1, 2)
         {"rows": 0},
     ],
 )
-def test_a_file_that_does_not_fit_itself_is_an_error(
-    tmp_path: Path, change: dict[str, Any]
-) -> None:
+def test_inconsistent_file_is_refused(tmp_path: Path, change: dict[str, Any]) -> None:
     objects = build(raw_layer(points((1, 2), (3, 4))))
     path = tmp_path / "objects.parquet"
     write(objects, path, change, rows=change.get("rows", 2))

@@ -1,4 +1,4 @@
-"""The experiments of the paper: what is run, what is refused, and the report."""
+"""The experiments of the paper: runs, invalid settings and the report."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from semsig_gis.reports import Number, Report
 
 
-def test_everything_that_the_paper_runs_is_there(snapshot: Callable[[str, str], None]) -> None:
+def test_all_experiments_of_the_paper_are_specified(snapshot: Callable[[str, str], None]) -> None:
     specs = paper_experiments(
         "city.parquet",
         ranges={20.0: "r20.parquet", 40.0: "r40.parquet"},
         scales={8: "q8.parquet", 24: "q24.parquet", 32: "q32.parquet"},
     )
-    snapshot("paper.toml", "\n".join(f"# {name}\n{one.to_toml()}" for name, one in specs.items()))
+    snapshot("paper.toml", "\n".join(f"# {name}\n{spec.to_toml()}" for name, spec in specs.items()))
     few = paper_experiments("city.parquet", ranges={}, scales={}, queries=7, seed=3)
     assert {(spec.queries, spec.seeds) for spec in few.values()} == {(7, (3,))}
 
@@ -42,7 +42,7 @@ def reproduction(reproduced: Path) -> Reproduction:
     return reproduce(reproduced, database=reproduced.parent / "city.parquet", queries=QUERIES)
 
 
-def test_everything_is_run(reproduction: Reproduction) -> None:
+def test_all_experiments_are_run(reproduction: Reproduction) -> None:
     assert len(reproduction.database) == len(TOWN.database)
     assert reproduction.settings["queries"] == QUERIES
     assert reproduction.missing == ()
@@ -62,12 +62,10 @@ def test_everything_is_run(reproduction: Reproduction) -> None:
     wide = reproduction.experiments["range-40"]["medium/stages-5-top1"]
     assert wide.database["radius_m"] == 40.0
     occurrences = reproduction.summary["occurrences"]
-    assert sum(one["objects"] for one in occurrences) <= len(TOWN.objects)
+    assert sum(item["objects"] for item in occurrences) <= len(TOWN.objects)
 
 
-def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
-    reproduced: Path, tmp_path: Path
-) -> None:
+def test_interrupted_run_ends_with_the_same_bytes(reproduced: Path, tmp_path: Path) -> None:
     save_town(tmp_path)
     calls = 0
 
@@ -83,10 +81,10 @@ def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
     options: dict[str, Any] = {"database": tmp_path / "city.parquet", "queries": QUERIES}
     with pytest.raises(KeyboardInterrupt):
         reproduce(tmp_path / "out", progress=progress, **options)
-    half = {path.name for path in (tmp_path / "out" / "experiments").iterdir()}
-    assert all(name.endswith(".partial") for name in half)
+    unfinished = {path.name for path in (tmp_path / "out" / "experiments").iterdir()}
+    assert all(name.endswith(".partial") for name in unfinished)
     reproduce(tmp_path / "out", **options)
-    # The same files but for reports, which other tests write; digests of the same town differ.
+    # The same files except reports, which other tests write; digests of the same town differ.
     ours, whole = contents(tmp_path / "out"), contents(reproduced)
     assert set(ours) == {name for name in whole if name.startswith(("exp", "var", "settings"))}
     figures = [name for name in ours if name.endswith(("figures.csv", "queries.parquet"))]
@@ -94,7 +92,7 @@ def test_a_run_that_was_interrupted_ends_with_the_same_bytes(
     assert [ours[name] for name in figures] == [whole[name] for name in figures]
 
 
-def test_a_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object, **__: object) -> None:
         raise AssertionError
 
@@ -103,8 +101,8 @@ def test_a_finished_run_is_opened(reproduced: Path, monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(f"semsig_gis.evaluation.paper.reproduction.{name}", never)
     monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", never)
     database = reproduced.parent / "city.parquet"
-    found = reproduce(reproduced, database=database, queries=QUERIES)
-    assert found.settings["queries"] == QUERIES
+    results = reproduce(reproduced, database=database, queries=QUERIES)
+    assert results.settings["queries"] == QUERIES
     assert contents(reproduced) == before
 
 
@@ -112,13 +110,13 @@ def test_other_settings_are_refused(reproduced: Path, tmp_path: Path) -> None:
     database = reproduced.parent / "city.parquet"
     options: dict[str, Any] = {"database": database, "queries": QUERIES}
     before = contents(reproduced)
-    moved = tmp_path / "city.parquet"
-    save_database(TOWN.database.select(slice(1, None)), moved)
+    other_database = tmp_path / "city.parquet"
+    save_database(TOWN.database.select(slice(1, None)), other_database)
     for change, word in (
         ({"queries": 11}, "queries"),
         ({"seed": 5}, "seed"),
         ({"size": "small"}, "size"),
-        ({"database": moved}, "database"),
+        ({"database": other_database}, "database"),
     ):
         with refused(InputError, "other settings", f"differ in {word}"):
             reproduce(reproduced, **{**options, **change})
@@ -127,7 +125,7 @@ def test_other_settings_are_refused(reproduced: Path, tmp_path: Path) -> None:
 
 @pytest.fixture
 def _few_methods(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave most methods out, where it is not they that count."""
+    """Use few methods, to save time."""
     module = "semsig_gis.evaluation.paper.reproduction"
     for name, methods in {
         "SINGLES": {"types-edit": "types:edit"},
@@ -139,33 +137,34 @@ def _few_methods(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_few_methods")
-def test_without_street_objects_one_part_is_left_out(tmp_path: Path) -> None:
+def test_visibility_ranges_are_omitted_without_street_objects(tmp_path: Path) -> None:
     save_database(TOWN.database, tmp_path / "city.parquet")
-    found = reproduce(tmp_path / "out", database=tmp_path / "city.parquet", queries=5, size="small")
-    assert found.variants == {}
-    assert not any(name.startswith("range") for name in found.experiments)
-    (sentence,) = found.missing
+    database = tmp_path / "city.parquet"
+    results = reproduce(tmp_path / "out", database=database, queries=5, size="small")
+    assert results.variants == {}
+    assert not any(name.startswith("range") for name in results.experiments)
+    (sentence,) = results.missing
     assert "visibility ranges" in sentence
-    assert {one["objects"] for one in found.summary["occurrences"]} == {None}
+    assert {item["objects"] for item in results.summary["occurrences"]} == {None}
 
 
 @pytest.mark.usefixtures("_few_methods")
-def test_a_city_is_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_synthetic_city_is_generated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = "semsig_gis.evaluation.paper.reproduction"
     cities = {"small": CitySpec(size=300.0), "full": CitySpec(size=400.0)}
     monkeypatch.setattr(f"{module}.CITIES", cities)
     monkeypatch.setattr(f"{module}.SMALL_QUERIES", 7)
     with refused(InputError, "1000000 queries"):
         reproduce(tmp_path / "out", queries=10**6)
-    # A run that came to nothing is not in the way.
+    # The refused run left nothing behind that prevents a valid one.
     notes: list[str] = []
-    found = reproduce(tmp_path / "out", size="small", note=notes.append)
+    results = reproduce(tmp_path / "out", size="small", note=notes.append)
     settings = {"size": "small", "database": "a made-up city", "queries": 7, "seed": 0}
-    assert found.settings == settings
+    assert results.settings == settings
     assert any("made up" in note for note in notes)
-    assert len(open_database(tmp_path / "out" / "city" / "city.parquet")) == len(found.database)
-    large = found.database.columns.max() - found.database.columns.min()
-    assert large * found.database.grid.step < 400.0
+    assert len(open_database(tmp_path / "out" / "city" / "city.parquet")) == len(results.database)
+    width = results.database.columns.max() - results.database.columns.min()
+    assert width * results.database.grid.step < 400.0
 
 
 @pytest.mark.parametrize(
@@ -179,7 +178,9 @@ def test_a_city_is_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ({"seed": -1}, ["a seed is -1", "from 0 to"]),
     ],
 )
-def test_what_is_refused(tmp_path: Path, options: dict[str, Any], words: list[str]) -> None:
+def test_invalid_options_are_refused(
+    tmp_path: Path, options: dict[str, Any], words: list[str]
+) -> None:
     save_town(tmp_path)
     with refused(SemsigError, *words):
         reproduce(
@@ -195,7 +196,7 @@ def test_settings_of_another_program_are_refused(tmp_path: Path) -> None:
         reproduce(tmp_path, size="small")
 
 
-def test_every_method_is_asked_that_often(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_method_is_timed_with_the_given_repetitions(monkeypatch: pytest.MonkeyPatch) -> None:
     lengths: list[int] = []
 
     def counted(database: object, queries: list[object], method: object) -> object:
@@ -204,22 +205,22 @@ def test_every_method_is_asked_that_often(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr("semsig_gis.evaluation.paper.reproduction.score_cells", counted)
     methods = {"types": Method.parse("types:edit"), "both": Method()}
-    told: list[tuple[int, int]] = []
+    steps: list[tuple[int, int]] = []
     times = time_queries(
-        TOWN.database, methods, length=5, repetitions=4, progress=lambda *done: told.append(done)
+        TOWN.database, methods, length=5, repetitions=4, progress=lambda *step: steps.append(step)
     )
     assert list(times) == ["types", "both"]
     assert min(times.values()) > 0
-    assert lengths == [5] * 12  # twice before the four that count
-    assert told == [(1, 2), (2, 2)]
+    assert lengths == [5] * 12  # for each method, two calls that are not timed and four that are
+    assert steps == [(1, 2), (2, 2)]
 
 
-def test_the_nearest_length_is_taken() -> None:
+def test_times_use_queries_of_the_nearest_length() -> None:
     longest = int(TOWN.database.lengths.max())
     assert time_queries(TOWN.database, {"a": Method()}, length=longest + 50, repetitions=1)["a"] > 0
 
 
-def test_no_repetitions_are_refused() -> None:
+def test_zero_repetitions_are_refused() -> None:
     with refused(InputError, "0 repetitions", "from 1"):
         time_queries(TOWN.database, {}, repetitions=0)
 
@@ -231,12 +232,12 @@ def report(reproduction: Reproduction) -> Report:
 
 def numbers(report: Report, section: str) -> dict[tuple[str, str], Number]:
     """Return the numbers of a section by row and column."""
-    (found,) = (one for one in report.sections if one.name == section)
-    return {(one.row, one.column): one for one in found.numbers}
+    (match,) = (item for item in report.sections if item.name == section)
+    return {(number.row, number.column): number for number in match.numbers}
 
 
-def test_every_figure_that_the_paper_prints_stands_beside_ours(report: Report) -> None:
-    told = [one.paper for part in report.sections for one in part.numbers if one.paper is not None]
+def test_report_contains_every_figure_of_the_paper(report: Report) -> None:
+    papers = [number.paper for section in report.sections for number in section.numbers]
     printed = [
         *paris.OCCURRENCES.values(),
         *paris.DATABASE.values(),
@@ -246,12 +247,14 @@ def test_every_figure_that_the_paper_prints_stands_beside_ours(report: Report) -
         *paris.QUERY_MS.values(),
         paris.UNAMBIGUOUS,
     ]  # fmt: skip
-    assert set(printed) <= set(told)
+    assert set(printed) <= set(papers)
     points = [y for part in report.sections for plot in part.plots for _, y, _ in plot.paper]
-    assert set(paris.READ_OFF.values()) <= {*told, *points}
+    assert set(paris.READ_OFF.values()) <= {*papers, *points}
 
 
-def test_figures_are_those_of_the_evaluations(report: Report, reproduction: Reproduction) -> None:
+def test_report_has_the_figures_of_the_evaluations(
+    report: Report, reproduction: Reproduction
+) -> None:
     experiments = reproduction.experiments
     medium = experiments["medium"]["medium/stages-5-top1"]
     shown = numbers(report, "levels")["medium", "P(error ≤ 50 m)"]
@@ -282,27 +285,28 @@ def test_figures_are_those_of_the_evaluations(report: Report, reproduction: Repr
     assert times.ours == 1000 * reproduction.seconds["angles:edit"]
 
 
-def test_unambiguous_queries_alone(report: Report, reproduction: Reproduction) -> None:
+def test_section_on_unambiguous_queries(report: Report, reproduction: Reproduction) -> None:
     queries = reproduction.experiments["levels"]["light/stages-5-top1"].queries
-    alone = queries[queries["type_group"] == 1]
-    found = numbers(report, "alone")
-    assert found["light", "P(error ≤ 50 m)"].ours == pytest.approx(alone["p50"].mean())
-    assert found["queries", "share alone"].ours == pytest.approx(len(alone) / QUERIES)
+    unambiguous = queries[queries["type_group"] == 1]
+    section = numbers(report, "alone")
+    assert section["light", "P(error ≤ 50 m)"].ours == pytest.approx(unambiguous["p50"].mean())
+    assert section["queries", "share alone"].ours == pytest.approx(len(unambiguous) / QUERIES)
 
 
-def test_the_share_of_unambiguous_queries_can_be_the_papers(
+def test_share_is_reweighted_to_the_papers_unambiguous_queries(
     report: Report, reproduction: Reproduction
 ) -> None:
     queries = reproduction.experiments["medium"]["medium/stages-5-top1"].queries
-    alone = queries["type_group"] == 1
+    unambiguous = queries["type_group"] == 1
     row = "as the first, with the paper's share of unambiguous queries"
     weighed = numbers(report, "readings")[row, "P(error ≤ 50 m)"]
-    expected = 0.418 * queries["p50"][alone].mean() + 0.582 * queries["p50"][~alone].mean()
+    means = queries["p50"][unambiguous].mean(), queries["p50"][~unambiguous].mean()
+    expected = 0.418 * means[0] + 0.582 * means[1]
     assert weighed.ours == pytest.approx(expected)
     assert (weighed.low or 1.0) < expected < (weighed.high or 0.0)
 
 
-def test_curves_end_where_they_must(report: Report) -> None:
+def test_curves_are_monotonic_and_recall_ends_at_one(report: Report) -> None:
     plots = [plot for part in report.sections for plot in part.plots]
     assert len(plots) >= 14
     for plot in plots:
@@ -315,7 +319,7 @@ def test_curves_end_where_they_must(report: Report) -> None:
                 assert curve.y[-1] == pytest.approx(1.0)
 
 
-def test_the_headline_tells_the_papers_figure_and_ours(
+def test_headline_has_the_papers_figure_and_ours(
     report: Report, reproduction: Reproduction
 ) -> None:
     ours = reproduction.experiments["ours"]["medium/likelihood-top1"].cdf([50])[0]
@@ -326,7 +330,7 @@ def test_the_headline_tells_the_papers_figure_and_ours(
     assert "recommended" in report.sections[0].title
 
 
-def test_the_papers_values_are_drawn_beside_ours(report: Report) -> None:
+def test_plots_have_the_papers_values_and_ours(report: Report) -> None:
     plots = {plot.name: plot for part in report.sections for plot in part.plots}
     ours, theirs, _, recalls = plots["ranges-shares"].curves
     assert theirs.x == recalls.x == (20.0, 30.0, 40.0)
@@ -335,16 +339,16 @@ def test_the_papers_values_are_drawn_beside_ours(report: Report) -> None:
     assert all(low <= y <= high for low, y, high in zip(ours.low, ours.y, ours.high, strict=True))
     _, theirs = plots["scales-shares"].curves
     assert (theirs.x, theirs.y) == ((8.0, 16.0, 24.0, 32.0), (0.3243, 0.3733, 0.3861, 0.3766))
-    drawn = {name: {(x, y) for x, y, _ in plot.paper} for name, plot in plots.items()}
-    assert drawn["levels-error"] == {(50.0, 0.3733), (10.0, 0.70), (10.0, 0.25)}
-    assert drawn["levels-recall"] == {(10.0, 0.6462), (10.0, 0.90), (10.0, 0.50)}
-    assert drawn["fusion-none-error"] == {(0.0, 0.93)}
+    points = {name: {(x, y) for x, y, _ in plot.paper} for name, plot in plots.items()}
+    assert points["levels-error"] == {(50.0, 0.3733), (10.0, 0.70), (10.0, 0.25)}
+    assert points["levels-recall"] == {(10.0, 0.6462), (10.0, 0.90), (10.0, 0.50)}
+    assert points["fusion-none-error"] == {(0.0, 0.93)}
     assert all(plot.log for name, plot in plots.items() if name.endswith(("error", "recall")))
 
 
-def test_parts_that_could_not_be_run_are_left_out(reproduction: Reproduction) -> None:
+def test_sections_of_missing_experiments_are_omitted(reproduction: Reproduction) -> None:
     less = {k: v for k, v in reproduction.experiments.items() if not k.startswith("range")}
-    found = replace(reproduction, experiments=less, variants={}, missing=("No ranges.",))
-    report = reproduction_report(found)
+    partial = replace(reproduction, experiments=less, variants={}, missing=("No ranges.",))
+    report = reproduction_report(partial)
     assert "ranges" not in [part.name for part in report.sections]
     assert "No ranges." in report.text

@@ -1,4 +1,4 @@
-"""Chains of distortions, and what distortions and drawn queries refuse."""
+"""Chains of distortions, and invalid distortions and queries."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ chains = st.lists(any_distortion, max_size=4).map(tuple)
 
 
 @given(chain=chains)
-def test_written_and_read_is_the_same(chain: tuple[QueryDistortion, ...]) -> None:
+def test_chain_text_round_trip(chain: tuple[QueryDistortion, ...]) -> None:
     assert parse_chain(chain_text(chain), noises=KNOWN) == chain
-    assert parse_chain((chain_text([one]) for one in chain), noises=KNOWN) == chain
+    assert parse_chain((chain_text([item]) for item in chain), noises=KNOWN) == chain
 
 
 @pytest.mark.parametrize(
@@ -95,38 +95,38 @@ def test_written_and_read_is_the_same(chain: tuple[QueryDistortion, ...]) -> Non
         "",
     ],
 )
-def test_texts_that_read_well(text: str) -> None:
+def test_shortest_texts_are_written(text: str) -> None:
     assert chain_text(parse_chain(text, noises=KNOWN)) == text
 
 
-@given(one=sights, chain=chains, seed=seeds, number=st.integers(0, 99))
-def test_any_order_of_any_distortions_gives_a_query(
-    one: Sight, chain: tuple[QueryDistortion, ...], seed: int, number: int
+@given(sight=sights, chain=chains, seed=seeds, number=st.integers(0, 99))
+def test_distortions_in_any_order_give_valid_reproducible_queries(
+    sight: Sight, chain: tuple[QueryDistortion, ...], seed: int, number: int
 ) -> None:
-    before = rows(one)
+    before = rows(sight)
     for order in itertools.islice(itertools.permutations(chain), 6):
-        seen, again = (prepare_chain(order, CITY)(one, seed, number) for _ in range(2))
-        assert set(seen.codes.tolist()) <= set(CLASSES)
-        assert ((seen.bearings >= 0) & (seen.bearings < 360)).all()
-        assert (seen.distances >= 0).all()
-        assert len(seen.signature) == len(seen)
-        assert seen.photo.sees(seen.bearings).all()
-        assert (rows(again), again.heading) == (rows(seen), seen.heading)
-    assert rows(one) == before
+        result, repeated = (prepare_chain(order, CITY)(sight, seed, number) for _ in range(2))
+        assert set(result.codes.tolist()) <= set(CLASSES)
+        assert ((result.bearings >= 0) & (result.bearings < 360)).all()
+        assert (result.distances >= 0).all()
+        assert len(result.signature) == len(result)
+        assert result.photo.sees(result.bearings).all()
+        assert (rows(repeated), repeated.heading) == (rows(result), result.heading)
+    assert rows(sight) == before
 
 
-@given(one=sights, chain=chains, seed=seeds)
-def test_a_kind_has_the_same_chances_in_any_company(
-    one: Sight, chain: tuple[QueryDistortion, ...], seed: int
+@given(sight=sights, chain=chains, seed=seeds)
+def test_random_numbers_of_a_kind_do_not_depend_on_other_distortions(
+    sight: Sight, chain: tuple[QueryDistortion, ...], seed: int
 ) -> None:
     others = tuple(item for item in chain if not isinstance(item, CompassBias))
-    alone = prepare_chain([CompassBias(sigma=20.0)], CITY)(one, seed, 3)
+    single = prepare_chain([CompassBias(sigma=20.0)], CITY)(sight, seed, 3)
     for place in (0, len(others)):
         order = (*others[:place], CompassBias(sigma=20.0), *others[place:])
-        assert prepare_chain(order, CITY)(one, seed, 3).heading == alone.heading
+        assert prepare_chain(order, CITY)(sight, seed, 3).heading == single.heading
 
 
-def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
+def test_random_numbers_differ_by_number_seed_and_repeat() -> None:
     spoil = prepare_chain([CompassBias(), CompassBias()], CITY)
     headings = {spoil(many(1), seed, number).heading for seed in (0, 1) for number in (0, 1, 2)}
     assert len(headings) == 6
@@ -135,17 +135,17 @@ def test_numbers_seeds_and_repeats_have_chances_of_their_own() -> None:
     assert twice != pytest.approx(2.0 * once % 360.0)
 
 
-def test_misses_and_clutter_add_up() -> None:
-    # Seen in half of the turn, half of what is left is detected.
+def test_distortions_of_a_chain_are_combined() -> None:
+    # Half of the turn is visible, and half of the visible objects are detected.
     half = NoiseSpec(detection=0.5, misnamed=0.0, clutter=0.0, name="half")
     spoil = prepare_chain(parse_chain("view:180, detector:half", noises={"half": half}), CITY)
-    kept = np.array([len(spoil(many(1), 0, number)) for number in range(4000)])
-    assert kept.mean() == pytest.approx(0.25, abs=0.04)
+    counts = np.array([len(spoil(many(1), 0, number)) for number in range(4000)])
+    assert counts.mean() == pytest.approx(0.25, abs=0.04)
 
 
-def test_the_streams_of_random_numbers_are_fixed() -> None:
-    # A change would change every seeded result that was ever written down.
-    streams = {name: one.stream for name, one in NAMED_DISTORTIONS.items() if name != "known"}
+def test_random_streams_are_fixed() -> None:
+    # Other streams would change all stored results with a seed.
+    streams = {name: item.stream for name, item in NAMED_DISTORTIONS.items() if name != "known"}
     for level in ("none", "light", "medium", "strong"):
         assert streams.pop(level) == streams["errors"]
     assert streams == {
@@ -190,7 +190,12 @@ ORIGIN = np.zeros(1)
         (QuerySpec, "seeds", [[-1]], ["-1", "from 0"]),
     ],
 )
-def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: list[str]) -> None:  # noqa: ANN401
+def test_invalid_settings_are_refused(
+    kind: Any,  # noqa: ANN401
+    name: str,
+    values: list[Any],
+    words: list[str],
+) -> None:
     for value in values:
         with refused(InputError, str(value).strip("[]"), *words):
             kind(**{name: value})
@@ -214,7 +219,7 @@ def test_settings_out_of_range(kind: Any, name: str, values: list[Any], words: l
         (InputError, "view:70:told=no", ["'no'", "true or false"]),
     ],
 )
-def test_texts_of_distortions(kind: type[SemsigError], text: str, words: list[str]) -> None:
+def test_invalid_texts_are_refused(kind: type[SemsigError], text: str, words: list[str]) -> None:
     with refused(kind, *words):
         prepare_chain(parse_chain(text, noises={**KNOWN, "misspelt": MISSPELT}), CITY)
 
@@ -226,8 +231,8 @@ def spoil(
     bearings: NDArray[np.float64] | None = ORIGIN,
     false: Any = "frequency",  # noqa: ANN401
 ) -> None:
-    one, rng = Signature(np.array([1], np.uint8), bearings), np.random.default_rng(0)
-    distort(one, Distortion(false_class=false), classes=classes, weights=weights, rng=rng)
+    sight, rng = Signature(np.array([1], np.uint8), bearings), np.random.default_rng(0)
+    distort(sight, Distortion(false_class=false), classes=classes, weights=weights, rng=rng)
 
 
 def draw(crs: int = 2154, **options: Any) -> None:  # noqa: ANN401
@@ -253,7 +258,7 @@ CASES: list[tuple[type[SemsigError], Callable[[], object], list[str]]] = [
 
 
 @pytest.mark.parametrize(("kind", "call", "words"), CASES)
-def test_what_cannot_be_used_is_refused(
+def test_invalid_arguments_are_refused(
     kind: type[SemsigError], call: Callable[[], object], words: list[str]
 ) -> None:
     with refused(kind, *words):

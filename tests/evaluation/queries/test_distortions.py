@@ -1,4 +1,4 @@
-"""What is seen, the errors of the paper, and everything else that happens to a query."""
+"""Sights, the errors of the paper, and all other distortions of a query."""
 
 from __future__ import annotations
 
@@ -63,28 +63,30 @@ if TYPE_CHECKING:
     from semsig_gis.evaluation import FalseClass, QueryDistortion, Sight
     from semsig_gis.localization import Noise, NoiseTable
 
-# --- What is seen -----------------------------------------------------------------------------
+# --- Sights -----------------------------------------------------------------------------------
 
 
-@given(one=sights, turn=st.floats(-400, 400))
-def test_a_turn_moves_all_bearings_and_is_remembered(one: Sight, turn: float) -> None:
-    there = one.turned(turn)
-    assert (np.diff(there.bearings) >= 0).all()
-    assert ((there.bearings >= 0) & (there.bearings < 360)).all()
-    expected = sorted(((code, distance) for code, _, distance in rows(one)))
-    assert sorted((code, distance) for code, _, distance in rows(there)) == expected
-    true = (there.bearings + there.heading) % 360.0
-    found = np.sort(np.exp(1j * np.radians(true)))
-    assert np.allclose(found, np.sort(np.exp(1j * np.radians(one.bearings))), atol=1e-6)
+@given(original=sights, turn=st.floats(-400, 400))
+def test_turning_adds_to_bearings_and_subtracts_from_the_heading(
+    original: Sight, turn: float
+) -> None:
+    result = original.turned(turn)
+    assert (np.diff(result.bearings) >= 0).all()
+    assert ((result.bearings >= 0) & (result.bearings < 360)).all()
+    expected = sorted(((code, distance) for code, _, distance in rows(original)))
+    assert sorted((code, distance) for code, _, distance in rows(result)) == expected
+    true = (result.bearings + result.heading) % 360.0
+    directions = np.sort(np.exp(1j * np.radians(true)))
+    assert np.allclose(directions, np.sort(np.exp(1j * np.radians(original.bearings))), atol=1e-6)
 
 
-def test_objects_on_one_bearing_stay_in_order() -> None:
-    one = sight([(3, 7.0, 1.0), (1, 7.0, 2.0), (5, 2.0, 3.0)])
-    assert one.clockwise().codes.tolist() == [5, 3, 1]
-    assert parts_of(one.signature)[0].tolist() == [3, 1, 5]
+def test_objects_of_equal_bearing_stay_in_order() -> None:
+    original = sight([(3, 7.0, 1.0), (1, 7.0, 2.0), (5, 2.0, 3.0)])
+    assert original.clockwise().codes.tolist() == [5, 3, 1]
+    assert parts_of(original.signature)[0].tolist() == [3, 1, 5]
 
 
-def test_what_there_is_to_see_in_a_database() -> None:
+def test_visible_classes_and_frequencies_of_a_database() -> None:
     database = random_database(3)
     city = CitySights.of(database)
     counts = Counter(database.codes.tolist())
@@ -93,7 +95,7 @@ def test_what_there_is_to_see_in_a_database() -> None:
 
 
 @given(seed=seeds)
-def test_false_things_are_anywhere_in_the_circle(seed: int) -> None:
+def test_false_distances_are_uniform_over_the_circle(seed: int) -> None:
     distances = CITY.false_distances(4000, np.random.default_rng(seed))
     assert ((distances >= 0) & (distances <= REACH)).all()
     # A uniform place in a circle has d^2 / R^2 uniform on [0, 1].
@@ -114,7 +116,7 @@ def signature(codes: list[int], bearings: Sequence[float] | None = None) -> Sign
 
 
 def distorted(
-    one: Signature,
+    original: Signature,
     how: Distortion,
     seed: int | np.random.Generator = 0,
     *,
@@ -123,10 +125,10 @@ def distorted(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
     """Return codes and bearings after a distortion."""
     rng = np.random.default_rng(seed)
-    return parts_of(distort(one, how, classes=classes, weights=weights, rng=rng))
+    return parts_of(distort(original, how, classes=classes, weights=weights, rng=rng))
 
 
-def test_the_levels_of_the_paper() -> None:
+def test_levels_have_the_settings_of_the_paper() -> None:
     levels = {"none": (0, 0.0), "light": (1, 5.0), "medium": (7, 5.0), "strong": (13, 5.0)}
     assert {
         name: Distortion(occurrences=count, bearing_sigma=sigma, bearing_clip=30.0)
@@ -134,72 +136,74 @@ def test_the_levels_of_the_paper() -> None:
     } == DISTORTIONS
 
 
-@given(one=sights, how=paper_errors, seed=seeds)
-def test_errors_change_so_many_objects(one: Sight, how: Distortion, seed: int) -> None:
-    codes, bearings = distorted(one.signature, how, seed)
-    assert abs(len(codes) - len(one)) <= how.occurrences
+@given(original=sights, how=paper_errors, seed=seeds)
+def test_at_most_the_given_number_of_objects_changes(
+    original: Sight, how: Distortion, seed: int
+) -> None:
+    codes, bearings = distorted(original.signature, how, seed)
+    assert abs(len(codes) - len(original)) <= how.occurrences
     assert codes.dtype == np.uint8
     if how.resort:
         assert (np.diff(bearings) >= 0).all()
-    none = distorted(one.signature, DISTORTIONS["none"], seed)
-    assert np.array_equal(none, parts_of(one.signature))
+    none = distorted(original.signature, DISTORTIONS["none"], seed)
+    assert np.array_equal(none, parts_of(original.signature))
 
 
-@given(one=sights, seed=seeds)
-def test_order_kept_or_sorted_again_hold_the_same_objects(one: Sight, seed: int) -> None:
-    kept, again = (
-        distorted(one.signature, replace(DISTORTIONS["strong"], resort=resort), seed)
+@given(original=sights, seed=seeds)
+def test_sorting_again_does_not_change_the_objects(original: Sight, seed: int) -> None:
+    kept_order, again = (
+        distorted(original.signature, replace(DISTORTIONS["strong"], resort=resort), seed)
         for resort in (False, True)
     )
-    assert sorted(zip(*kept, strict=True)) == sorted(zip(*again, strict=True))
+    assert sorted(zip(*kept_order, strict=True)) == sorted(zip(*again, strict=True))
 
 
-@given(one=sights, how=paper_errors, seed=seeds)
-def test_objects_keep_their_distances(one: Sight, how: Distortion, seed: int) -> None:
-    seen = how.prepare(CITY)(one, np.random.default_rng(seed))
-    codes, bearings = distorted(one.signature, how, seed, weights=CITY.frequencies.tolist())
-    assert seen.codes.tolist() == codes.tolist()
-    assert seen.bearings.tolist() == bearings.tolist()
-    assert ((seen.distances >= 0) & (seen.distances <= REACH)).all()
-    lost = Counter(one.distances.tolist()) - Counter(seen.distances.tolist())
-    false = Counter(seen.distances.tolist()) - Counter(one.distances.tolist())
-    assert lost.total() + false.total() <= how.occurrences
+@given(original=sights, how=paper_errors, seed=seeds)
+def test_true_distances_stay_with_the_objects(original: Sight, how: Distortion, seed: int) -> None:
+    result = how.prepare(CITY)(original, np.random.default_rng(seed))
+    codes, bearings = distorted(original.signature, how, seed, weights=CITY.frequencies.tolist())
+    assert result.codes.tolist() == codes.tolist()
+    assert result.bearings.tolist() == bearings.tolist()
+    assert ((result.distances >= 0) & (result.distances <= REACH)).all()
+    missed = Counter(original.distances.tolist()) - Counter(result.distances.tolist())
+    false = Counter(result.distances.tolist()) - Counter(original.distances.tolist())
+    assert missed.total() + false.total() <= how.occurrences
     if how.occurrences == 0:
-        assert sorted(seen.distances.tolist()) == sorted(one.distances.tolist())
+        assert sorted(result.distances.tolist()) == sorted(original.distances.tolist())
 
 
-def test_order_is_kept_or_sorted_again() -> None:
+def test_order_before_the_noise_is_kept_without_sorting() -> None:
     assert distorted(signature([3, 1, 3, 5], [7, 7, 7, 7]), QUIET)[0].tolist() == [3, 1, 3, 5]
     noise = replace(QUIET, bearing_sigma=40.0, resort=False)
     false_only = replace(QUIET, occurrences=6, resort=False)
     for seed in range(50):
-        # The order is that before the noise, and a false object stands where it belongs.
+        # The order is that before the noise, and a false object is inserted by its bearing.
         codes, _ = distorted(signature([1, 3, 5, 10], [10, 11, 12, 359]), noise, seed)
         assert codes.tolist() == [1, 3, 5, 10]
         _, bearings = distorted(signature([1, 1, 1], [10, 120, 240]), false_only, seed)
         assert (np.diff(bearings) >= 0).all()
 
 
-def test_the_three_operations_are_equally_likely() -> None:
-    one = signature([1, 3, 1, 3, 5])
+def test_the_three_errors_are_equally_likely() -> None:
+    original = signature([1, 3, 1, 3, 5])
     rng = np.random.default_rng(5)
     once = replace(QUIET, occurrences=1)
     trials = 6000
     counts = Counter[int]()
-    changed_places = np.zeros(len(one))
+    changed_places = np.zeros(len(original))
     for _ in range(trials):
-        codes, bearings = distorted(one, once, rng)
-        difference = len(codes) - len(one)
+        codes, bearings = distorted(original, once, rng)
+        difference = len(codes) - len(original)
         counts[difference] += 1
         if difference == 0:
-            assert bearings.tolist() == parts_of(one)[1].tolist()
-            changed = codes != parts_of(one)[0]
+            assert bearings.tolist() == parts_of(original)[1].tolist()
+            changed = codes != parts_of(original)[0]
             assert changed.sum() == 1  # a false classification always changes the class
             changed_places += changed
     spread = sqrt(trials * 2 / 9)
     assert counts.keys() == {-1, 0, 1}
     assert all(abs(count - trials / 3) < 4 * spread for count in counts.values())
-    share = counts[0] / len(one)
+    share = counts[0] / len(original)
     assert (np.abs(changed_places - share) < 4 * sqrt(share)).all()
 
 
@@ -214,9 +218,9 @@ def test_classes_and_bearings_of_false_objects(
     # one occurrence on nothing invents.
     once = replace(QUIET, occurrences=1, false_class=false_class)
     rng = np.random.default_rng(11)
-    drawn = [distorted(signature([]), once, rng) for _ in range(9000)]
-    invented = np.concatenate([codes for codes, _ in drawn])
-    bearings = np.concatenate([angles for _, angles in drawn])
+    samples = [distorted(signature([]), once, rng) for _ in range(9000)]
+    invented = np.concatenate([codes for codes, _ in samples])
+    bearings = np.concatenate([angles for _, angles in samples])
     assert abs(len(invented) - 3000) < 4 * sqrt(9000 * 2 / 9)
     for code, share in zip(CLASSES, shares, strict=True):
         mean = len(invented) * share
@@ -225,14 +229,14 @@ def test_classes_and_bearings_of_false_objects(
     assert np.abs(quadrants - 0.25).max() < 4 * sqrt(0.25 * 0.75 / len(bearings))
 
 
-def test_false_classes_leave_the_true_one_out() -> None:
+def test_misclassified_objects_get_another_class() -> None:
     how = replace(QUIET, occurrences=1, false_class="frequency")
     rng = np.random.default_rng(2)
-    drawn = [
+    samples = [
         distorted(signature([1]), how, rng, classes=[1, 3, 5], weights=[98, 1.5, 0.5])[0]
         for _ in range(3000)
     ]
-    renamed = np.array([codes[0] for codes in drawn if len(codes) == 1])
+    renamed = np.array([codes[0] for codes in samples if len(codes) == 1])
     assert set(renamed.tolist()) == {3, 5}
     assert abs((renamed == 3).mean() - 0.75) < 4 * sqrt(0.75 * 0.25 / len(renamed))
     # Without another class, a false classification changes nothing.
@@ -243,10 +247,10 @@ def test_false_classes_leave_the_true_one_out() -> None:
         assert set(codes.tolist()) <= {3}
 
 
-def test_the_noise_of_bearings_is_normal_and_clipped() -> None:
-    one = signature([1] * 40_000, [1.0] * 40_000)  # wrapped below north, too
+def test_bearing_noise_is_normal_and_clipped() -> None:
+    original = signature([1] * 40_000, [1.0] * 40_000)  # wrapped below north, too
     little, much = (
-        away(distorted(one, replace(QUIET, bearing_sigma=sigma, resort=False))[1], 1.0)
+        away(distorted(original, replace(QUIET, bearing_sigma=sigma, resort=False))[1], 1.0)
         for sigma in (5.0, 20.0)
     )
     assert abs(little.mean()) < 4 * 5 / sqrt(40_000)
@@ -263,79 +267,87 @@ PERFECT = NoiseSpec(detection=1.0, misnamed=0.0, clutter=0.0, bearing_sigma=1e-9
 NAMES = {1: "alignment_tree", 3: "street_light", 5: "traffic_light", 10: "bench"}
 
 
-def spoiled(how: QueryDistortion, one: Sight, seed: int = 0) -> Sight:
-    return how.prepare(CITY)(one, np.random.default_rng(seed))
+def distorted_sight(how: QueryDistortion, original: Sight, seed: int = 0) -> Sight:
+    return how.prepare(CITY)(original, np.random.default_rng(seed))
 
 
 def assert_shown(how: QueryDistortion, seed: int, chance: float, distance: float = 10.0) -> None:
-    """Check how often one object is left."""
-    spoil, rng = how.prepare(CITY), np.random.default_rng(seed)
-    shown = sum(len(spoil(many(1, distance=distance), rng)) for _ in range(1500))
-    assert_rate(shown, 1500, chance)
+    """Check how often a single object remains."""
+    apply, rng = how.prepare(CITY), np.random.default_rng(seed)
+    count = sum(len(apply(many(1, distance=distance), rng)) for _ in range(1500))
+    assert_rate(count, 1500, chance)
 
 
 @settings(max_examples=30)
 @given(sigma=st.floats(0.5, 40.0), seed=seeds)
-def test_moments_of_a_compass(sigma: float, seed: int) -> None:
-    spoil = CompassBias(sigma=sigma).prepare(CITY)
+def test_compass_bias_is_normal_and_equal_for_all_objects(sigma: float, seed: int) -> None:
+    apply = CompassBias(sigma=sigma).prepare(CITY)
     rng = np.random.default_rng(seed)
-    off = np.array([away(spoil(many(2), rng).bearings, 90.0) for _ in range(1500)])
+    off = np.array([away(apply(many(2), rng).bearings, 90.0) for _ in range(1500)])
     assert (off[:, 0] == off[:, 1]).all()  # the same for all objects of a query
     if sigma < 30.0:  # else some are turned by more than half a turn
         assert abs(off[:, 0].mean()) < 6 * sigma / sqrt(1500)
         assert abs(off[:, 0].std() / sigma - 1.0) < 6 / sqrt(2 * 1500)
 
 
-@given(one=sights, names=st.sets(st.sampled_from(sorted(NAMES.values()))), seed=seeds)
-def test_missing_and_known_share_the_objects_out(one: Sight, names: set[str], seed: int) -> None:
-    missing = spoiled(MissingClasses(classes=tuple(names)), one, seed)
-    known = spoiled(MissingClasses(classes=tuple(names), others=True), one, seed)
-    assert rows(missing) == [row for row in rows(one) if NAMES[row[0]] not in names]
-    assert rows(known) == [row for row in rows(one) if NAMES[row[0]] in names]
+@given(original=sights, names=st.sets(st.sampled_from(sorted(NAMES.values()))), seed=seeds)
+def test_missing_and_known_classes_are_complementary(
+    original: Sight, names: set[str], seed: int
+) -> None:
+    missing = distorted_sight(MissingClasses(classes=tuple(names)), original, seed)
+    known = distorted_sight(MissingClasses(classes=tuple(names), others=True), original, seed)
+    assert rows(missing) == [row for row in rows(original) if NAMES[row[0]] not in names]
+    assert rows(known) == [row for row in rows(original) if NAMES[row[0]] in names]
 
 
-@given(degrees=st.floats(1.0, 360.0), one=sights, seed=seeds)
-def test_a_view_holds_what_fits_in_its_angle(degrees: float, one: Sight, seed: int) -> None:
-    there = spoiled(FieldOfView(degrees=degrees), one, seed)
-    kept = rows(there)
-    assert kept == [row for row in rows(one) if row in kept]
-    if len(kept) > 1:
-        gaps = np.diff([*there.bearings, there.bearings[0] + 360.0])
+@given(degrees=st.floats(1.0, 360.0), original=sights, seed=seeds)
+def test_view_contains_objects_within_its_angle(degrees: float, original: Sight, seed: int) -> None:
+    view_result = distorted_sight(FieldOfView(degrees=degrees), original, seed)
+    kept_order = rows(view_result)
+    assert kept_order == [row for row in rows(original) if row in kept_order]
+    if len(kept_order) > 1:
+        gaps = np.diff([*view_result.bearings, view_result.bearings[0] + 360.0])
         assert gaps.max() >= 360.0 - degrees - 1e-6  # the part of the turn that is out of view
     if degrees == 360.0:
-        assert kept == rows(one)
+        assert kept_order == rows(original)
 
 
 @settings(max_examples=30)
 @given(degrees=st.floats(5.0, 360.0), seed=seeds)
-def test_each_object_is_in_view_as_often_as_the_view_is_wide(degrees: float, seed: int) -> None:
+def test_probability_of_being_in_view_is_proportional_to_its_width(
+    degrees: float, seed: int
+) -> None:
     view = FieldOfView(degrees=degrees)
     assert_shown(view, seed, degrees / 360.0)
-    # Of objects all round, just the width of the view is shown every time.
-    assert abs(len(spoiled(view, all_round(3600), seed)) - 10.0 * degrees) <= 1.5
+    # With objects in all directions, the visible share is the width of the view.
+    assert abs(len(distorted_sight(view, all_round(3600), seed)) - 10.0 * degrees) <= 1.5
 
 
-@given(degrees=st.floats(1.0, 360.0), turn=st.floats(-400, 400), one=sights, seed=seeds)
-def test_a_view_tells_where_it_looked(degrees: float, turn: float, one: Sight, seed: int) -> None:
-    there = spoiled(FieldOfView(degrees=degrees), one, seed)
-    untold = spoiled(FieldOfView(degrees=degrees, told=False), one, seed)
-    assert rows(there) == rows(untold)
-    assert untold.photo == FULL_VIEW
-    assert there.photo.width == pytest.approx(degrees)
-    middle = np.deg2rad(there.photo.turned(turn).sectors[0]).mean() if there.photo.sectors else 0.0
-    turned = there.turned(turn)
-    if there.photo.sectors:  # they turn with the objects in them
-        found = np.deg2rad(turned.photo.sectors[0]).mean()
-        assert np.exp(1j * found) == pytest.approx(np.exp(1j * middle), abs=1e-9)
+@given(degrees=st.floats(1.0, 360.0), turn=st.floats(-400, 400), original=sights, seed=seeds)
+def test_view_states_its_sectors_unless_switched_off(
+    degrees: float, turn: float, original: Sight, seed: int
+) -> None:
+    view_result = distorted_sight(FieldOfView(degrees=degrees), original, seed)
+    without_sectors = distorted_sight(FieldOfView(degrees=degrees, told=False), original, seed)
+    assert rows(view_result) == rows(without_sectors)
+    assert without_sectors.photo == FULL_VIEW
+    assert view_result.photo.width == pytest.approx(degrees)
+    middle = (
+        np.deg2rad(view_result.photo.turned(turn).sectors[0]).mean()
+        if view_result.photo.sectors
+        else 0.0
+    )
+    turned = view_result.turned(turn)
+    if view_result.photo.sectors:  # they turn with the objects in them
+        new_middle = np.deg2rad(turned.photo.sectors[0]).mean()
+        assert np.exp(1j * new_middle) == pytest.approx(np.exp(1j * middle), abs=1e-9)
         view = turned.signature
         assert isinstance(view, View)
         assert view.photos == (turned.photo,)
 
 
 @given(first=st.floats(1.0, 359.0), second=st.floats(1.0, 359.0), seed=seeds)
-def test_of_a_view_of_a_view_the_common_part_is_told(
-    first: float, second: float, seed: int
-) -> None:
+def test_two_views_state_their_intersection(first: float, second: float, seed: int) -> None:
     chain = (FieldOfView(degrees=first), FieldOfView(degrees=second))
     both = prepare_chain(chain, CITY)(all_round(3600), seed, 0)
     if len(both):
@@ -343,111 +355,121 @@ def test_of_a_view_of_a_view_the_common_part_is_told(
         assert both.photo.sees(both.bearings).all()
 
 
-def test_nothing_false_is_out_of_a_view_that_is_told() -> None:
+def test_false_objects_outside_a_stated_view_are_dropped() -> None:
     for text, inside in (("view:40, errors:13", True), ("view:40:told=false, errors:13", False)):
-        seen = [prepare_chain(parse_chain(text), CITY)(many(0), 0, number) for number in range(300)]
-        gaps = [np.diff([*one.bearings, one.bearings[0] + 360.0]).max() for one in seen if len(one)]
+        result = [
+            prepare_chain(parse_chain(text), CITY)(many(0), 0, number) for number in range(300)
+        ]
+        gaps = [
+            np.diff([*view.bearings, view.bearings[0] + 360.0]).max()
+            for view in result
+            if len(view)
+        ]
         assert bool(min(gaps) >= 320.0) is inside
 
 
 @pytest.mark.parametrize("percent", [10.0, 25.0, 80.0])
-def test_rough_ranges_are_off_by_their_error(percent: float) -> None:
-    seen = spoiled(RoughRanges(percent=percent), many(TRIALS, distance=12.0))
-    assert seen.ranges is not None
-    off = np.log(seen.ranges / 12.0) / (percent / 100.0)
+def test_rough_ranges_have_the_stated_error(percent: float) -> None:
+    result = distorted_sight(RoughRanges(percent=percent), many(TRIALS, distance=12.0))
+    assert result.ranges is not None
+    off = np.log(result.ranges / 12.0) / (percent / 100.0)
     assert abs(off.mean()) < 6.0 / sqrt(TRIALS)
     assert abs(off.std() - 1.0) < 6.0 / sqrt(2 * TRIALS)
-    view = seen.signature
+    view = result.signature
     assert isinstance(view, View)
     assert view.range_errors is not None
     assert (view.range_errors == percent / 100.0).all()
 
 
 @pytest.mark.parametrize("text", ["errors:200, ranges:80", "ranges:80, errors:200", "ranges:80, F"])
-def test_false_objects_are_anywhere_on_the_disc(text: str) -> None:
+def test_rough_ranges_of_false_objects_are_uniform_over_the_circle(text: str) -> None:
     noise = replace(PERFECT, clutter=70.0, name="F")
     chain = parse_chain(text.replace("F", "detector:F"), noises={"F": noise})
-    seen = [prepare_chain(chain, CITY)(many(0), 0, number) for number in range(40)]
-    squares = (np.concatenate([one.ranges for one in seen if one.ranges is not None]) / REACH) ** 2
+    result = [prepare_chain(chain, CITY)(many(0), 0, number) for number in range(40)]
+    squares = (
+        np.concatenate([view.ranges for view in result if view.ranges is not None]) / REACH
+    ) ** 2
     assert len(squares) > 300
     assert 0.0 < squares.min() <= squares.max() <= 1.0
     assert abs(squares.mean() - 0.5) < 6.0 / sqrt(12 * len(squares))
 
 
 @pytest.mark.parametrize("right", [0.55, 0.8, 0.95])
-def test_scores_can_be_trusted(right: float) -> None:
+def test_class_scores_are_calibrated(right: float) -> None:
     each = TRIALS * 2
     codes = np.repeat(np.array(CLASSES, np.uint8), each)
     here = sight([(code, 90.0, 10.0) for code in codes.tolist()])
-    seen = spoiled(ClassScores(right=right), here)
-    assert seen.scores is not None
-    assert (seen.codes == seen.scores.argmax(axis=1)).all()
-    own = seen.scores[np.arange(len(codes)), codes]
+    result = distorted_sight(ClassScores(right=right), here)
+    assert result.scores is not None
+    assert (result.codes == result.scores.argmax(axis=1)).all()
+    own = result.scores[np.arange(len(codes)), codes]
     assert own.mean() == pytest.approx(right, abs=0.02)
-    for code in CLASSES:  # of all that is given such a score of a class, so much is of the class
-        said = seen.scores[:, code]
+    for code in CLASSES:  # the share of objects of a class equals the mean score of the class
+        scores = result.scores[:, code]
         for low in np.arange(0.0, 1.0, 0.2):
-            some = (said >= low) & (said < low + 0.2)
+            some = (scores >= low) & (scores < low + 0.2)
             spread = sqrt(0.25 / max(some.sum(), 1))
-            assert abs(said[some].mean() - (codes[some] == code).mean()) < 4 * spread
-    # What is misnamed or made up afterwards, the detector is sure of.
-    after = spoiled(Distortion(occurrences=40), seen.only(np.arange(20)))
+            assert abs(scores[some].mean() - (codes[some] == code).mean()) < 4 * spread
+    # Objects that are misclassified or added later have a score of 1.
+    after = distorted_sight(Distortion(occurrences=40), result.only(np.arange(20)))
     assert after.scores is not None
     sure = after.scores.max(axis=1) == 1.0
     assert 15 < sure.sum() < len(after)
     assert (after.codes[sure] == after.scores[sure].argmax(axis=1)).all()
 
 
-def test_types_and_bearings_alone_are_no_view() -> None:
-    assert type(spoiled(Distortion(), all_round(9)).signature) is Signature
+def test_types_and_bearings_are_reported_as_signature() -> None:
+    assert type(distorted_sight(Distortion(), all_round(9)).signature) is Signature
 
 
-@given(one=sights, width=st.floats(0.0, 5.0))
-def test_hidden_behind_nearer_objects(one: Sight, width: float) -> None:
+@given(original=sights, width=st.floats(0.0, 5.0))
+def test_objects_behind_nearer_ones_are_hidden(original: Sight, width: float) -> None:
     expected = [
         row
-        for row in rows(one)
+        for row in rows(original)
         if not any(
             near < row[2]
             and angular_distance(row[1], other) < degrees(atan(width / 2 / max(near, 0.01)))
-            for _, other, near in rows(one)
+            for _, other, near in rows(original)
         )
     ]
-    assert rows(spoiled(HiddenBehind(width=width), one)) == expected
+    assert rows(distorted_sight(HiddenBehind(width=width), original)) == expected
 
 
-@given(one=sights, seed=seeds)
-def test_obstacles_only_take_away(one: Sight, seed: int) -> None:
-    seen = rows(spoiled(Obstacles(count=3.0), one, seed))
-    assert seen == [row for row in rows(one) if row in seen]
+@given(original=sights, seed=seeds)
+def test_obstacles_only_remove_objects(original: Sight, seed: int) -> None:
+    result = rows(distorted_sight(Obstacles(count=3.0), original, seed))
+    assert result == [row for row in rows(original) if row in result]
     for harmless in (Obstacles(count=0.0), Obstacles(count=9.0, width=0.0)):
-        assert rows(spoiled(harmless, one, seed)) == rows(one)
+        assert rows(distorted_sight(harmless, original, seed)) == rows(original)
 
 
 @settings(max_examples=30)
 @given(
     count=st.floats(0.2, 5.0), width=st.floats(0.5, 8.0), distance=st.floats(5.0, 30.0), seed=seeds
 )
-def test_how_often_obstacles_hide(count: float, width: float, distance: float, seed: int) -> None:
+def test_obstacles_hide_with_the_expected_probability(
+    count: float, width: float, distance: float, seed: int
+) -> None:
     # The chance of one obstacle, over its distance r with density 2 r / R^2: atan(w / 2r) / pi.
     middles = (np.arange(20_000) + 0.5) * (distance / 20_000)
-    one = (np.arctan(width / 2 / middles) / pi * 2 * middles / REACH**2).mean() * distance
-    assert_shown(Obstacles(count=count, width=width), seed, exp(-count * one), distance)
+    share = (np.arctan(width / 2 / middles) / pi * 2 * middles / REACH**2).mean() * distance
+    assert_shown(Obstacles(count=count, width=width), seed, exp(-count * share), distance)
 
 
 @settings(max_examples=30)
 @given(
     count=st.integers(0, 6), width=st.floats(1.0, 359.0), distance=st.floats(0, REACH), seed=seeds
 )
-def test_how_often_sectors_are_blocked(
+def test_sectors_block_with_the_expected_probability(
     count: int, width: float, distance: float, seed: int
 ) -> None:
     sectors = BlockedSectors(count=count, degrees=width)
     assert_shown(sectors, seed, (1.0 - width / 360.0) ** count, distance)
-    left = len(spoiled(sectors, all_round(3600), seed)) / 10.0
-    assert left >= 360.0 - count * width - 1.0 * count - 0.2
+    visible = len(distorted_sight(sectors, all_round(3600), seed)) / 10.0
+    assert visible >= 360.0 - count * width - 1.0 * count - 0.2
     if count == 1:
-        assert left == pytest.approx(360.0 - width, abs=0.2)
+        assert visible == pytest.approx(360.0 - width, abs=0.2)
 
 
 def table_of(noise: Noise) -> NoiseTable:
@@ -462,16 +484,16 @@ def table_of(noise: Noise) -> NoiseTable:
 
 
 @given(noise=noise_specs(), code=st.sampled_from(CLASSES), seed=seeds)
-def test_detection_naming_and_bearings_are_those_of_the_model(
-    noise: NoiseSpec, code: int, seed: int
-) -> None:
+def test_detector_has_the_rates_of_the_noise_model(noise: NoiseSpec, code: int, seed: int) -> None:
     noise = replace(noise, bearing_sigma_by_class={"bench": noise.bearing_sigma / 3})
     table = table_of(noise)
     kind = int(table.row_of[code])
-    seen = spoiled(SimulatedDetector(noise=noise), many(TRIALS, code=code, distance=17.0), seed)
-    assert (np.diff(seen.bearings) >= 0).all()
-    assert seen.heading == 0.0
-    true = seen.only(seen.distances == 17.0)  # false objects seem to be anywhere else
+    result = distorted_sight(
+        SimulatedDetector(noise=noise), many(TRIALS, code=code, distance=17.0), seed
+    )
+    assert (np.diff(result.bearings) >= 0).all()
+    assert result.heading == 0.0
+    true = result.only(result.distances == 17.0)  # false objects seem to be anywhere else
     assert_rate(len(true), TRIALS, 1.0 - table.missed[LONGEST_TABLE, kind])
     for name, chance in zip(table.codes, table.named[LONGEST_TABLE, kind], strict=True):
         assert_rate(int((true.codes == name).sum()), len(true), float(min(chance, 1.0)))
@@ -484,39 +506,41 @@ def test_detection_naming_and_bearings_are_those_of_the_model(
 
 @settings(max_examples=12)
 @given(noise=noise_specs(), seed=seeds)
-def test_false_objects_are_those_of_the_model(noise: NoiseSpec, seed: int) -> None:
+def test_false_objects_have_the_rates_of_the_noise_model(noise: NoiseSpec, seed: int) -> None:
     table = table_of(noise)
-    spoil = SimulatedDetector(noise=noise).prepare(CITY)
+    apply = SimulatedDetector(noise=noise).prepare(CITY)
     rng = np.random.default_rng(seed)
-    found = [spoil(many(0), rng) for _ in range(600)]
+    samples = [apply(many(0), rng) for _ in range(600)]
     for code, mean in zip(table.codes, table.clutter, strict=True):
-        count = sum(int((one.codes == code).sum()) for one in found)
-        # Poisson, too, with the mean of all: neither tail is unheard of.
+        count = sum(int((sample.codes == code).sum()) for sample in samples)
+        # The sum is a Poisson variable, too; neither tail is extremely unlikely.
         assert min(poisson.cdf(count, 600 * mean), poisson.sf(count - 1, 600 * mean)) > 1e-9
-    bearings, distances = np.concatenate([(one.bearings, one.distances) for one in found], axis=1)
+    bearings, distances = np.concatenate(
+        [(sample.bearings, sample.distances) for sample in samples], axis=1
+    )
     if len(bearings) > 50:
         assert abs(np.exp(1j * np.radians(bearings)).mean()) < 6.0 / sqrt(len(bearings))
         assert abs(((distances / REACH) ** 2).mean() - 0.5) < 6.0 / sqrt(12 * len(distances))
 
 
 @given(half=st.floats(3.0, 60.0), distance=st.floats(0.0, REACH), seed=seeds)
-def test_detection_falls_with_distance(half: float, distance: float, seed: int) -> None:
-    seen = spoiled(
+def test_detection_decreases_with_distance(half: float, distance: float, seed: int) -> None:
+    result = distorted_sight(
         SimulatedDetector(noise=PERFECT, half=half), many(TRIALS, distance=distance), seed
     )
     nearby = 1.0 - float(table_of(PERFECT).missed[LONGEST_TABLE, 1])
     chance = nearby * 0.5 ** ((distance / half) ** 2)
-    # Hardly a false object in a thousand signatures.
-    true = int((seen.distances == distance).sum())
+    # False objects are very rare.
+    true = int((result.distances == distance).sum())
     assert_rate(true, TRIALS, chance)
 
 
-def test_a_step_aside_turns_near_objects_most() -> None:
-    spoil = SimulatedDetector(noise=replace(PERFECT, position_sigma=0.5)).prepare(CITY)
+def test_moved_observer_changes_bearings_of_near_objects_most() -> None:
+    apply = SimulatedDetector(noise=replace(PERFECT, position_sigma=0.5)).prepare(CITY)
     rng = np.random.default_rng(1)
     for distance in (5.0, 25.0):
         bearings = np.concatenate(
-            [spoil(many(1, distance=distance), rng).bearings for _ in range(TRIALS)]
+            [apply(many(1, distance=distance), rng).bearings for _ in range(TRIALS)]
         )
         sigma = degrees(0.5 / distance)
         turned = away(bearings, 90.0)
@@ -525,22 +549,22 @@ def test_a_step_aside_turns_near_objects_most() -> None:
         assert abs(turned.mean()) < 6 * sigma / sqrt(TRIALS)
 
 
-def test_of_a_mixture_one_model_makes_a_query() -> None:
+def test_one_model_of_a_mixture_applies_to_a_whole_query() -> None:
     both = NoiseMixture(specs=(replace(PERFECT, detection=0.05), PERFECT), weights=(0.25, 0.75))
-    spoil = SimulatedDetector(noise=both).prepare(CITY)
+    apply = SimulatedDetector(noise=both).prepare(CITY)
     rng = np.random.default_rng(2)
-    shares = np.array([len(spoil(many(200), rng)) / 200 for _ in range(800)])
+    shares = np.array([len(apply(many(200), rng)) / 200 for _ in range(800)])
     assert ((shares < 0.2) | (shares > 0.9)).all()
     assert_rate(float((shares > 0.9).sum()), 800, 0.75)
 
 
-def test_the_levels_of_the_paper_lose_objects_by_number() -> None:
-    # Of few objects, seven errors leave a smaller share than of many.
-    spoil = SimulatedDetector(noise=named_noise("medium")).prepare(CITY)
+def test_noise_model_of_a_level_misses_a_larger_share_of_few_objects() -> None:
+    # Seven errors leave a smaller share of few objects than of many.
+    apply = SimulatedDetector(noise=named_noise("medium")).prepare(CITY)
     rng = np.random.default_rng(3)
-    few, lots = (
-        np.mean([(spoil(many(n), rng).distances == 10.0).sum() / n for _ in range(600)])
+    few_share, many_share = (
+        np.mean([(apply(many(n), rng).distances == 10.0).sum() / n for _ in range(600)])
         for n in (4, 40)
     )
-    assert few == pytest.approx((1 - 1 / 4) ** (7 / 3), abs=0.05)
-    assert lots == pytest.approx((1 - 1 / 40) ** (7 / 3), abs=0.02)
+    assert few_share == pytest.approx((1 - 1 / 4) ** (7 / 3), abs=0.05)
+    assert many_share == pytest.approx((1 - 1 / 40) ** (7 / 3), abs=0.02)
