@@ -32,11 +32,11 @@ from .likelihood.answer_rule import save_rule as save_rule
 from .likelihood.association import Association as Association
 from .likelihood.association import Detections as Detections
 from .likelihood.association import Pairs as Pairs
-from .likelihood.association import align_cells as align_cells
 from .likelihood.association import associate as associate
 from .likelihood.association import associate_pairs as associate_pairs
 from .likelihood.association import near_pairs as near_pairs
 from .likelihood.association import rerank as rerank
+from .likelihood.association import score_associations as score_associations
 from .likelihood.estimate import PlaceEstimate as PlaceEstimate
 from .likelihood.estimate import cell_estimate as cell_estimate
 from .likelihood.estimate import refined_estimate as refined_estimate
