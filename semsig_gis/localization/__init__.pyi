@@ -59,7 +59,7 @@ from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import visible_objects_off_centre as visible_objects_off_centre
 from .likelihood.photo import PhotoTable as PhotoTable
 from .likelihood.photo import photo_loglik as photo_loglik
-from .likelihood.posterior import KEPT as KEPT
+from .likelihood.posterior import DIVIDED_PARTS as DIVIDED_PARTS
 from .likelihood.posterior import Posterior as Posterior
 from .likelihood.posterior import Refinement as Refinement
 from .likelihood.posterior import open_posterior as open_posterior

@@ -60,7 +60,7 @@ ELSEWHERE = Sample(signature=ONE, xy=(5e6, 5e6))
 
 
 def refined(query: Signature, cells: np.ndarray, **options: Any) -> None:  # noqa: ANN401
-    refine(query, cells, NOISE, objects=OBJECTS, index=STORE.index, **options)
+    refine(query, cells, NOISE, store=STORE, **options)
 
 
 def table(**fields: Any) -> Any:  # noqa: ANN401
