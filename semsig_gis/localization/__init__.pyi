@@ -88,12 +88,12 @@ from .noise.age import fresh_noise as fresh_noise
 from .noise.age import named_drift as named_drift
 from .noise.age import open_drift as open_drift
 from .noise.fit import ALL as ALL
-from .noise.fit import drawn_rates as drawn_rates
 from .noise.fit import estimated_rates as estimated_rates
 from .noise.fit import expected_counts as expected_counts
 from .noise.fit import gather_evidence as gather_evidence
 from .noise.fit import model_change as model_change
 from .noise.fit import next_model as next_model
+from .noise.fit import shrunk_rates as shrunk_rates
 from .noise.learn import NoiseEstimate as NoiseEstimate
 from .noise.learn import Sample as Sample
 from .noise.learn import learn_noise as learn_noise
