@@ -32,11 +32,11 @@ from .likelihood.answer_rule import save_rule as save_rule
 from .likelihood.association import Association as Association
 from .likelihood.association import Detections as Detections
 from .likelihood.association import Pairs as Pairs
-from .likelihood.association import align_cells as align_cells
 from .likelihood.association import associate as associate
 from .likelihood.association import associate_pairs as associate_pairs
 from .likelihood.association import near_pairs as near_pairs
 from .likelihood.association import rerank as rerank
+from .likelihood.association import score_associations as score_associations
 from .likelihood.estimate import PlaceEstimate as PlaceEstimate
 from .likelihood.estimate import cell_estimate as cell_estimate
 from .likelihood.estimate import refined_estimate as refined_estimate
@@ -59,7 +59,7 @@ from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import visible_objects_off_centre as visible_objects_off_centre
 from .likelihood.photo import PhotoTable as PhotoTable
 from .likelihood.photo import photo_loglik as photo_loglik
-from .likelihood.posterior import KEPT as KEPT
+from .likelihood.posterior import DIVIDED_PARTS as DIVIDED_PARTS
 from .likelihood.posterior import Posterior as Posterior
 from .likelihood.posterior import Refinement as Refinement
 from .likelihood.posterior import open_posterior as open_posterior

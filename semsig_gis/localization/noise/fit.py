@@ -481,7 +481,7 @@ def _quantities(
         found.append(quantity(name, hits, trials, chances[:, number], distances=metres))
     pairs = sample, evidence.pair_kinds
     false = np.zeros((photos, size))
-    np.add.at(false, evidence.seen.givers, counts.false)
+    np.add.at(false, evidence.seen.photo_rows, counts.false)
     turns = float(evidence.seen.turns.sum())
     exposed = np.repeat(evidence.seen.turns[:, None], size, axis=1)
     wrong = by_photo(*pairs, np.maximum(counts.chances - counts.right, 0.0))
