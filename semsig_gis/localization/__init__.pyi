@@ -57,6 +57,7 @@ from .likelihood.locate import locate as locate
 from .likelihood.locate import locate_route as locate_route
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
 from .likelihood.off_centre import visible_objects_off_centre as visible_objects_off_centre
+from .likelihood.photo import LOST_SHARE as LOST_SHARE
 from .likelihood.photo import PhotoTable as PhotoTable
 from .likelihood.photo import photo_loglik as photo_loglik
 from .likelihood.posterior import DIVIDED_PARTS as DIVIDED_PARTS

@@ -28,6 +28,7 @@ from worlds import CODES, World, random_town
 from semsig_gis.core import ObjectIndex, Signature
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization import (
+    LOST_SHARE,
     Detections,
     NoiseMixture,
     NoiseSpec,
@@ -48,7 +49,6 @@ from semsig_gis.localization import (
     score_associations,
     visible_objects_off_centre,
 )
-from semsig_gis.localization.likelihood.photo import LOST_SHARE
 from semsig_gis.observation import FULL_VIEW, Photo, View
 
 if TYPE_CHECKING:
