@@ -8,6 +8,7 @@ from .export import export_database as export_database
 from .export import export_item as export_item
 from .files import as_written as as_written
 from .files import formula_safe as formula_safe
+from .geopackage import GeopackageContents as GeopackageContents
 from .geopackage import read_geopackage as read_geopackage
 from .hexagons import hexagons_layer as hexagons_layer
 from .layers import answer_layers as answer_layers
