@@ -71,8 +71,8 @@ def _query_lines(
 ) -> Iterator[QueryLine]:
     def read(row: Row) -> tuple[View, Codes, Codes]:
         require_seen(row)
-        seen, unplaced, absent = unplaced_codes(str(row_value(row, "see") or ""), taxonomy)
-        view = parse_view({**row, "see": seen}, taxonomy=taxonomy, radius=radius)
+        sentence, unplaced, absent = unplaced_codes(str(row_value(row, "see") or ""), taxonomy)
+        view = parse_view({**row, "see": sentence}, taxonomy=taxonomy, radius=radius)
         return view, unplaced, absent
 
     for line, row, result in scan_rows(rows, source, read, what="query"):

@@ -269,18 +269,18 @@ def unplaced_parts(text: str) -> tuple[str, list[str], list[str]]:
     """
     parts = _parts(text)
     absent = [match[1] for part in parts if (match := _ABSENT.fullmatch(part))]
-    seen = [part for part in parts if not _ABSENT.fullmatch(part)]
-    placed = [part for part in seen if _PLACED.fullmatch(part)]
+    visible = [part for part in parts if not _ABSENT.fullmatch(part)]
+    placed = [part for part in visible if _PLACED.fullmatch(part)]
     if not placed:
-        return ", ".join(seen), [], absent
-    return ", ".join(placed), [part for part in seen if part not in placed], absent
+        return ", ".join(visible), [], absent
+    return ", ".join(placed), [part for part in visible if part not in placed], absent
 
 
 def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
     """Return the result of `unplaced_parts` with class codes in place of words."""
     sentence, *others = unplaced_parts(text)
-    seen, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
-    return sentence, seen, absent
+    unplaced, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
+    return sentence, unplaced, absent
 
 
 def _parts(text: str) -> list[str]:

@@ -65,7 +65,10 @@ class Track:
             )
         outside = np.flatnonzero((seconds < self.times[0]) | (seconds > self.times[-1]))
         if len(outside):
-            own, first, last = map(_time_text, (seconds[outside[0]], self.times[0], self.times[-1]))
+            own, first, last = (
+                dt.datetime.fromtimestamp(value, dt.UTC).isoformat(timespec="seconds")
+                for value in (seconds[outside[0]], self.times[0], self.times[-1])
+            )
             raise InputError(
                 f"view {outside[0] + 1} of the route is from {own}, and "
                 f"{self.source} from {first} to {last}; give the track of that walk, or times "
@@ -93,7 +96,11 @@ def read_track(path: str | Path, *, crs: CRS) -> Track:
         degrees = np.array(
             [[float(point.attrib[key]) for key in ("lon", "lat")] for point in points]
         )
-        times = [_time(point) for point in points]
+        texts = [
+            next((child.text for child in point if _name(child) == "time"), None)
+            for point in points
+        ]
+        times = [parse_time(text) for text in texts if text and text.strip()]
     except (OSError, ET.ParseError, KeyError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"track {path} cannot be read ({reason}); give a GPX file.") from error
@@ -103,7 +110,7 @@ def read_track(path: str | Path, *, crs: CRS) -> Track:
         raise InputError(
             f"track {path} has points that are not on the globe; give latitudes and longitudes."
         )
-    seconds = np.array([time.timestamp() for time in times if time is not None])
+    seconds = np.array([time.timestamp() for time in times])
     if len(seconds) < len(points):
         return Track(source=str(path), xy=xy, times=None)
     order = np.argsort(seconds, kind="stable")
@@ -121,16 +128,6 @@ def parse_time(text: object) -> dt.datetime:
     return time if time.tzinfo else time.replace(tzinfo=dt.UTC)
 
 
-def _time(point: ET.Element) -> dt.datetime | None:
-    """Return the time of a point; None if it has none."""
-    text = next((child.text for child in point if _name(child) == "time"), None)
-    return parse_time(text) if text and text.strip() else None
-
-
 def _name(element: ET.Element) -> str:
     """Return the name of an element without its namespace; GPX has several."""
     return element.tag.rpartition("}")[2]
-
-
-def _time_text(seconds: float) -> str:
-    return dt.datetime.fromtimestamp(seconds, dt.UTC).isoformat(timespec="seconds")

@@ -1,4 +1,4 @@
-"""Queries answered by a method of either kind, and by the one that nobody names."""
+"""Locate queries by both kinds of methods, and by the default method."""
 
 from __future__ import annotations
 
@@ -35,22 +35,22 @@ QUERY = CITY.signature(LONGEST)
 INDEX = build_index(CITY, cell_noise(named_noise("generic"), CITY.grid.step))
 
 
-def test_nobody_names_another_method() -> None:
+def test_default_method_is_likelihood() -> None:
     assert isinstance(parse_method(DEFAULT_METHOD), LikelihoodMethod)
     assert isinstance(parse_method(PAPER_METHOD), Method)
     for function in (semsig_gis.localize, semsig_gis.evaluate):
         assert inspect.signature(function).parameters["method"].default is DEFAULT_METHOD
 
 
-def test_a_database_is_asked_by_likelihood() -> None:
+def test_database_is_searched_by_likelihood() -> None:
     assert localize(CITY, QUERY).to_dict() == locate(INDEX, QUERY).to_dict()
-    met = localize(CITY, QUERY, requirement=Requirement.parse("?<=3", CITY.taxonomy))
-    assert met.candidates["length"].max() <= 3
+    limited = localize(CITY, QUERY, requirement=Requirement.parse("?<=3", CITY.taxonomy))
+    assert limited.candidates["length"].max() <= 3
     with refused(InputError, "store"):
         localize(CITY, QUERY, method="likelihood:generic:refined")
 
 
-def test_a_city_tells_the_place_between_the_cells(tmp_path: Path) -> None:
+def test_place_is_refined_between_cells_of_city(tmp_path: Path) -> None:
     city = open_city(save_town(tmp_path, TOWN))
     refined = locate(INDEX, QUERY, store=city.store, refined=True)
     assert localize(city, QUERY).to_dict() == refined.to_dict()
@@ -62,13 +62,13 @@ def test_a_city_tells_the_place_between_the_cells(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", [DEFAULT_METHOD, PAPER_METHOD])
-def test_evaluations_take_the_text_of_a_method(method: str) -> None:
+def test_evaluation_accepts_text_of_method(method: str) -> None:
     settings: dict[str, Any] = {"queries": 12, "seed": 3}
-    named = evaluate(CITY, method=method, **settings)
+    evaluation = evaluate(CITY, method=method, **settings)
     grid = build_index(CITY, named_noise("generic"))
-    given = grid if method == DEFAULT_METHOD else Method.parse(method)
-    same = evaluate(CITY, method=given, **settings)
-    assert named.queries.equals(same.queries)
-    assert str(named.method) == str(same.method)
+    used = grid if method == DEFAULT_METHOD else Method.parse(method)
+    same = evaluate(CITY, method=used, **settings)
+    assert evaluation.queries.equals(same.queries)
+    assert str(evaluation.method) == str(same.method)
     with refused(InputError, "refined"):
         evaluate(CITY, method="likelihood:generic:refined", **settings)

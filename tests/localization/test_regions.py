@@ -1,4 +1,4 @@
-"""Regions to search: they hold exactly the cells they should, and tell what they cost."""
+"""Regions to search: their cells and their areas."""
 
 from __future__ import annotations
 
@@ -29,41 +29,41 @@ GRID = GridSpec(2.5, (0.1, -7.3))
 
 
 def located(database: SignatureDatabase, chances: np.ndarray) -> Location:
-    """Return an answer with these chances; nothing else of it matters here."""
+    """Return an answer with these probabilities."""
     return dataclasses.replace(
         small_location(), posterior=Posterior(database=database, chances=chances)
     )
 
 
-def flooded(cells: set[Cell]) -> set[frozenset[Cell]]:
-    """Return the groups of cells that share sides, one step at a time."""
+def connected_groups(cells: set[Cell]) -> set[frozenset[Cell]]:
+    """Return the groups of cells that share sides, by flood fill."""
     groups = set()
-    left = set(cells)
-    while left:
-        group, edge = set(), [left.pop()]
+    others = set(cells)
+    while others:
+        group, edge = set(), [others.pop()]
         while edge:
             column, row = cell = edge.pop()
             group.add(cell)
             sides = {(column + 1, row), (column - 1, row), (column, row + 1), (column, row - 1)}
-            edge += sides & left
-            left -= sides
+            edge += sides & others
+            others -= sides
         groups.add(frozenset(group))
     return groups
 
 
-@given(st.lists(st.tuples(PLACES, st.integers(0, 9)), min_size=1, unique_by=lambda one: one[0]))
-@example([((0, 0), 1), ((1, 1), 1)])  # they touch in a corner alone
+@given(st.lists(st.tuples(PLACES, st.integers(0, 9)), min_size=1, unique_by=lambda item: item[0]))
+@example([((0, 0), 1), ((1, 1), 1)])  # they share only a corner
 @example([((x, y), int((x, y) != (1, 1))) for x in range(3) for y in range(3)])  # a hole
-def test_regions_are_the_cells_that_share_sides(weighted: list[tuple[Cell, int]]) -> None:
+def test_regions_consist_of_cells_that_share_sides(weighted: list[tuple[Cell, int]]) -> None:
     weights = np.array([weight for _, weight in sorted(weighted)], float)
     weights[0] += not weights.any()
     database = cells_at(*np.array([cell for cell, _ in weighted]).T, grid=GRID)
     chances = weights / weights.sum()
-    found = search_regions(located(database, chances), database, share=0.8)
-    chosen = Posterior(database=database, chances=chances).credible_cells(0.8)
+    result = search_regions(located(database, chances), database, share=0.8)
+    cells = Posterior(database=database, chances=chances).credible_cells(0.8)
     places = np.stack([database.columns, database.rows], axis=1)
-    expected = flooded({(int(x), int(y)) for x, y in places[chosen]})
-    table = found.table
+    expected = connected_groups({(int(x), int(y)) for x, y in places[cells]})
+    table = result.table
     assert table.is_valid.all()
     assert set(table.geom_type) == {"Polygon"}
     points = shapely.points(database.xy)
@@ -83,10 +83,10 @@ def test_regions_are_the_cells_that_share_sides(weighted: list[tuple[Cell, int]]
     assert (np.diff(table["chance"]) <= 1e-12).all()
     assert np.allclose(table["searched_chance"], table["chance"].cumsum())
     assert np.allclose(table["searched_percent"], table["cells"].cumsum() / len(database) * 100)
-    told = found.to_dict()
-    assert (told["regions"], told["cells"]) == (len(expected), len(chosen))
-    assert told["chance"] >= 0.8 - 1e-9
-    assert np.isclose(told["percent"], 100 * len(chosen) / len(database))
+    total = result.to_dict()
+    assert (total["regions"], total["cells"]) == (len(expected), len(cells))
+    assert total["chance"] >= 0.8 - 1e-9
+    assert np.isclose(total["percent"], 100 * len(cells) / len(database))
 
 
 @given(
@@ -94,24 +94,24 @@ def test_regions_are_the_cells_that_share_sides(weighted: list[tuple[Cell, int]]
     st.integers(0, 48),
     st.sampled_from([0.0, 1.0, 2.5, 3.6, 100.0]),
 )
-def test_cells_within_are_searched_too(cells: list[Cell], best: int, within: float) -> None:
+def test_cells_within_margin_are_added(cells: list[Cell], best: int, within: float) -> None:
     database = cells_at(*np.array(cells).T, grid=GRID)
     chances = np.zeros(len(cells))
     chances[best % len(cells)] = 1.0
-    found = search_regions(located(database, chances), database, within=within)
+    result = search_regions(located(database, chances), database, within=within)
     off = np.hypot(*(database.xy - database.xy[best % len(cells)]).T)
-    assert found.to_dict()["cells"] == (off <= within + 1e-6).sum()
+    assert result.to_dict()["cells"] == (off <= within + 1e-6).sum()
 
 
-def test_candidates_of_other_methods() -> None:
+def test_candidates_of_distance_are_regions() -> None:
     database, answer = small_city()[0], small_localization()
-    found = search_regions(answer, database)
-    assert "chance" not in found.table.columns
-    assert "chance" not in found.to_dict()
-    assert found.to_dict()["cells"] == len(answer.candidates)
-    assert found.table["best_cell_id"].iloc[0] == answer.candidates["cell_id"].iloc[0]
+    result = search_regions(answer, database)
+    assert "chance" not in result.table.columns
+    assert "chance" not in result.to_dict()
+    assert result.to_dict()["cells"] == len(answer.candidates)
+    assert result.table["best_cell_id"].iloc[0] == answer.candidates["cell_id"].iloc[0]
     order = answer.candidates["cell_id"].tolist()
-    firsts = [order.index(cell) for cell in found.table["best_cell_id"]]
+    firsts = [order.index(cell) for cell in result.table["best_cell_id"]]
     assert firsts == sorted(firsts)
 
 
@@ -126,7 +126,7 @@ def test_candidates_of_other_methods() -> None:
     ],
 )
 @pytest.mark.parametrize("answer", [small_location, small_localization])
-def test_other_numbers_and_databases_are_refused(
+def test_invalid_numbers_and_other_databases_are_refused(
     answer: Callable[[], Location | Localization],
     rows: slice,
     options: dict[str, float],

@@ -186,9 +186,9 @@ def _score_compiled(
         return memo.get((name, *metrics, *query), compute)
 
     def fuse() -> NDArray[np.float32]:
-        left, right = _shares(method, by_types, by_angles)
+        type_steps, angle_steps = _shares(method, by_types, by_angles)
         scores = np.empty(len(types.inverse), np.float32)
-        kernels.fuse(left, types.inverse, right, angles.inverse, _SCORE_STEP, scores)
+        kernels.fuse(type_steps, types.inverse, angle_steps, angles.inverse, _SCORE_STEP, scores)
         return scores
 
     if method.keep is None:
@@ -356,14 +356,14 @@ def _fused(
     angles: NDArray[np.int64],
 ) -> NDArray[np.float32]:
     """Return the fused distances of cells; `types` and `angles` are rows of the distances."""
-    left, right = _shares(method, by_types, by_angles)
+    type_steps, angle_steps = _shares(method, by_types, by_angles)
     scores = np.empty(len(types), np.float32)
-    total, other = np.empty(_CHUNK_CELLS), np.empty(_CHUNK_CELLS, right.dtype)
+    total, other = np.empty(_CHUNK_CELLS), np.empty(_CHUNK_CELLS, angle_steps.dtype)
     for low in range(0, len(types), _CHUNK_CELLS):
         high = min(low + _CHUNK_CELLS, len(types))
-        chunk, right_chunk = total[: high - low], other[: high - low]
-        left.take(types[low:high], out=chunk, mode="wrap")
-        chunk += right.take(angles[low:high], out=right_chunk, mode="wrap")
+        chunk, angle_chunk = total[: high - low], other[: high - low]
+        type_steps.take(types[low:high], out=chunk, mode="wrap")
+        chunk += angle_steps.take(angles[low:high], out=angle_chunk, mode="wrap")
         np.rint(chunk, out=chunk)
         np.multiply(chunk, _SCORE_STEP, out=scores[low:high], casting="same_kind")
     return scores
@@ -374,8 +374,8 @@ def _shares(
 ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
     """Return the weighted distances of types and of angles, in steps."""
     # Division by a step that is a power of two is exact.
-    left = method.alpha / _SCORE_STEP * by_types.astype(np.float64)
-    return left, (1 - method.alpha) / _SCORE_STEP * by_angles
+    type_steps = method.alpha / _SCORE_STEP * by_types.astype(np.float64)
+    return type_steps, (1 - method.alpha) / _SCORE_STEP * by_angles
 
 
 def _spread(values: NDArray[_Value], table: SequenceTable) -> NDArray[_Value]:

@@ -142,8 +142,8 @@ class DistanceLocator:
         if isinstance(self.database, PartitionedDatabase):
             columns["cell"] = self.database.row_numbers(columns["cell_id"])
         elif self.requirement is not None:
-            met = self.requirement.met(self.database.type_sequences)
-            columns["cell"] = np.flatnonzero(met)[columns["cell"]]
+            mask = self.requirement.met(self.database.type_sequences)
+            columns["cell"] = np.flatnonzero(mask)[columns["cell"]]
         return Localization(
             query=query,
             method=self.method,
@@ -170,9 +170,9 @@ class DistanceLocator:
             if self.requirement is None:
                 shortlist.add(part, scores)
                 continue
-            met = self.requirement.met(part.type_sequences)
-            if met.any():
-                shortlist.add(part.select(met), scores[met])
+            mask = self.requirement.met(part.type_sequences)
+            if mask.any():
+                shortlist.add(part.select(mask), scores[mask])
         if shortlist.cells == 0:
             cells = len(self.database)
             raise EmptyResultError(

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import yaml
 
 from semsig_gis.core import InputError
-from semsig_gis.observation.detectors.mapillary import mapillary_images, mapillary_pictures
+from semsig_gis.observation.detectors.mapillary import mapillary_images, mapillary_picture
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, bounds, box_of, turned
 from semsig_gis.storage import parse_json, read_text
 
@@ -41,7 +41,14 @@ def read_pictures(paths: Iterable[str | Path]) -> list[AnnotatedPicture]:
     of images and categories among the files. InputError if a file cannot be read or has another
     format.
     """
-    files = [file for path in paths for file in _files(Path(path))]
+    files: list[Path] = []
+    for path in map(Path, paths):
+        inside = [path]
+        if path.is_dir():
+            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+        if not inside:
+            raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
+        files += inside
     names = next((file for file in files if _has_class_names(file)), None)
     documents = {file: _json(file) for file in files if file.suffix.lower() == ".json"}
     images = next((document for document in documents.values() if _is_coco(document)), None)
@@ -60,15 +67,6 @@ def read_pictures(paths: Iterable[str | Path]) -> list[AnnotatedPicture]:
         elif suffix != ".json":
             raise InputError(f"{file} is not in a supported format; {ACCEPTED}.")
     return pictures
-
-
-def _files(path: Path) -> list[Path]:
-    if not path.is_dir():
-        return [path]
-    files = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
-    if not files:
-        raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
-    return files
 
 
 def _has_class_names(file: Path) -> bool:
@@ -107,7 +105,7 @@ def _json_pictures(document: Any, source: str, images: Any) -> list[AnnotatedPic
         if _is_list_with(document, "data"):
             return [_label_studio(task, source) for task in document]
         if (shots := mapillary_images(document)) is not None:
-            return mapillary_pictures(shots, source)
+            return [mapillary_picture(image, source) for image in shots]
     except INVALID as error:
         if isinstance(error, InputError):
             raise
@@ -248,7 +246,11 @@ def _label_studio(task: dict[str, Any], source: str) -> AnnotatedPicture:
         corners = _label_studio_corners(value, size or (1, 1))
         boxes.append(box_of(label, corners, where, score=item.get("score")))
     values = [text for text in task["data"].values() if isinstance(text, str)]
-    name = _picture_name(str(task["data"].get("image") or next(iter(values), task.get("id", "?"))))
+    address = str(task["data"].get("image") or next(iter(values), task.get("id", "?")))
+    parts = urlsplit(address)
+    path = (parse_qs(parts.query).get("d") or [parts.path])[0]
+    # Uploads have a prefix of eight hexadecimal digits.
+    name = re.sub(r"^[0-9a-f]{8}-", "", PurePosixPath(path).name) or address
     return AnnotatedPicture(
         name=name, boxes=tuple(boxes), shares=True, others=others, shot=Shot(size=size)
     )
@@ -269,14 +271,6 @@ def _label_studio_corners(value: dict[str, Any], size: tuple[int, int]) -> Corne
             corners = box[0] / wide, box[1] / high, box[2] / wide, box[3] / high
     first, second, third, fourth = (number / PERCENT for number in corners)
     return first, second, third, fourth
-
-
-def _picture_name(address: str) -> str:
-    """Return the file name in an address of Label Studio."""
-    parts = urlsplit(address)
-    path = (parse_qs(parts.query).get("d") or [parts.path])[0]
-    # Uploads have a prefix of eight hexadecimal digits.
-    return re.sub(r"^[0-9a-f]{8}-", "", PurePosixPath(path).name) or address
 
 
 def _cvat(file: Path) -> list[AnnotatedPicture]:

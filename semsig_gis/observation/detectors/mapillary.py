@@ -58,12 +58,8 @@ def mapillary_images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN
     return list(images.values())
 
 
-def mapillary_pictures(images: list[dict[str, Any]], source: str) -> list[AnnotatedPicture]:
-    """Return the pictures of the result of `mapillary_images`."""
-    return [_picture(image, source) for image in images]
-
-
-def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
+def mapillary_picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
+    """Return the picture of an image in the result of `mapillary_images`."""
     name = str(image.get("id") or "") or source
     detections = image["detections"]
     detections = detections["data"] if isinstance(detections, dict) else detections
@@ -80,25 +76,21 @@ def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
             left, top, right, bottom = corners
             corners = left / size[0], top / size[1], right / size[0], bottom / size[1]
         boxes.append(box_of(item["value"], corners, where))
-    shot = _shot(image, size)
-    return AnnotatedPicture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
-
-
-def _shot(image: dict[str, Any], size: tuple[int, int] | None) -> Shot:
     computed, compass = image.get("computed_compass_angle"), image.get("compass_angle")
     heading = compass if computed is None else computed
     camera = CAMERAS.get(str(image.get("camera_type", "")).lower())
     focal = next(iter(image.get("camera_parameters") or []), None)
-    where = (image.get("computed_geometry") or image.get("geometry") or {}).get("coordinates")
-    return Shot(
+    point = (image.get("computed_geometry") or image.get("geometry") or {}).get("coordinates")
+    shot = Shot(
         camera=camera,
         focal=float(focal) if focal and camera in {"pinhole", "fisheye"} else None,
         heading=None if heading is None else float(heading) % 360.0,
         heading_error=COMPASS_ERROR if computed is None else COMPUTED_ERROR,
         north="true",
         size=size,
-        position=(float(where[1]), float(where[0])) if where else None,
+        position=(float(point[1]), float(point[0])) if point else None,
     )
+    return AnnotatedPicture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
 
 
 def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401 - any JSON
@@ -140,25 +132,22 @@ def _tile_points(tile: bytes) -> list[tuple[float, float]]:
 
 def _outline(geometry: bytes) -> Iterator[tuple[int, int]]:
     """Yield the points of a geometry, which has commands with counts and steps between points."""
-    numbers = iter(_varints(geometry))
+    numbers, position = [], 0
+    while position < len(geometry):
+        number, position = _varint(geometry, position)
+        numbers.append(number)
+    steps = iter(numbers)
     x = y = 0
-    for command in numbers:
+    for command in steps:
         if command & 7 in {MOVE, LINE}:
             for _ in range(command >> 3):
-                x, y = x + _zigzag(next(numbers)), y + _zigzag(next(numbers))
+                x, y = x + _zigzag(next(steps)), y + _zigzag(next(steps))
                 yield x, y
 
 
 def _zigzag(number: int) -> int:
     """Decode a signed number."""
     return (number >> 1) ^ -(number & 1)
-
-
-def _varints(data: bytes) -> Iterator[int]:
-    position = 0
-    while position < len(data):
-        number, position = _varint(data, position)
-        yield number
 
 
 def _varint(data: bytes, position: int) -> tuple[int, int]:

@@ -31,7 +31,7 @@ angles:histogram edit+edit:5% edit+jaccard:0.25%:alpha=0.125:raw:weights=1/2/100
 
 
 @pytest.mark.parametrize("text", TEXTS.split())
-def test_text_of_a_method_is_read_back(text: str) -> None:
+def test_text_of_method_is_parsed_and_written(text: str) -> None:
     assert str(Method.parse(text)) == text
 
 
@@ -55,11 +55,11 @@ LIKELIHOODS = st.builds(
 
 @settings(max_examples=100)
 @given(DISTANCES | LIKELIHOODS)
-def test_every_method_has_a_text_of_its_own(method: Method | LikelihoodMethod) -> None:
+def test_text_of_every_method_is_parsed_to_equal_method(method: Method | LikelihoodMethod) -> None:
     assert parse_method(str(method), noises=MINE) == method
 
 
-def test_either_kind_is_read() -> None:
+def test_both_kinds_of_methods_are_parsed() -> None:
     assert parse_method("edit+jaccard:5%") == Method.parse("edit+jaccard:5%")
     assert parse_method(" likelihood ") == LikelihoodMethod(noise=NOISES["generic"])
     assert str(parse_method("likelihood:light:heading=unknown:refined")) == (
@@ -74,7 +74,7 @@ edit+edit:raw:raw edit+edit:weights=1/1/1/1 edit+edit:weights=1/x/1 edit+edit:be
 
 
 @pytest.mark.parametrize("text", ["", *NO_METHOD.split()])
-def test_text_that_is_no_method(text: str) -> None:
+def test_invalid_text_is_refused(text: str) -> None:
     with refused(InputError, f"method {text!r} cannot be read; give two measures as"):
         parse_method(text)
 
@@ -99,11 +99,11 @@ def test_text_that_is_no_method(text: str) -> None:
         ("likelihood:light:on_grid:refined", InputError, "refined and on_grid exclude"),
     ],
 )
-def test_values_that_no_method_has(text: str, error: type[SemsigError], words: str) -> None:
+def test_invalid_values_are_refused(text: str, error: type[SemsigError], words: str) -> None:
     with refused(error, words):
         parse_method(text)
 
 
-def test_a_method_compares_something() -> None:
+def test_method_without_metrics_is_refused() -> None:
     with refused(InputError, "neither types nor angles"):
         Method(types=None, angles=None)

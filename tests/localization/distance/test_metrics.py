@@ -1,4 +1,4 @@
-"""Laws that every measure keeps, and what the distances are."""
+"""Properties of all metrics, and the values of each."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ def between(
 
 @each
 @given(queries=SOME, rows=SOME)
-def test_distances_are_symmetric_on_the_unit_interval_and_none_to_oneself(
+def test_distances_are_symmetric_in_unit_interval_and_zero_for_equal_sequences(
     measure: Distances, queries: Sequences, rows: Sequences
 ) -> None:
-    found = between(measure, queries, rows)
-    assert found.shape == (len(queries), len(rows))
-    assert found.dtype == np.float32
-    assert ((found >= 0) & (found <= 1)).all()
+    result = between(measure, queries, rows)
+    assert result.shape == (len(queries), len(rows))
+    assert result.dtype == np.float32
+    assert ((result >= 0) & (result <= 1)).all()
     assert not np.diagonal(between(measure, rows, rows)).any()
     for normalized in (True, False):
         there = between(measure, queries, rows, normalized=normalized)
@@ -71,7 +71,7 @@ def test_distances_are_symmetric_on_the_unit_interval_and_none_to_oneself(
 
 @each
 @given(row=st.lists(VALUES, min_size=1, max_size=7))
-def test_nothing_in_common_is_the_largest_distance(measure: Distances, row: Sequence[int]) -> None:
+def test_distance_is_one_without_common_values(measure: Distances, row: Sequence[int]) -> None:
     strangers = [value + 100 for value in row]
     for other in ([], strangers):
         assert between(measure, [other, row], [other, row]).tolist() == [[0, 1], [1, 0]]
@@ -79,7 +79,7 @@ def test_nothing_in_common_is_the_largest_distance(measure: Distances, row: Sequ
 
 @pytest.mark.parametrize("name", ["jaccard", "histogram"])
 @given(data=st.data(), queries=SOME, rows=SOME)
-def test_order_does_not_matter(
+def test_order_of_values_does_not_matter(
     name: str, data: st.DataObject, queries: Sequences, rows: Sequences
 ) -> None:
     mixed = [data.draw(st.permutations(row)) for row in rows]
@@ -89,7 +89,7 @@ def test_order_does_not_matter(
 
 @each
 @scaled
-def test_a_query_does_not_depend_on_the_others_or_on_the_rows_asked_for(
+def test_distances_do_not_depend_on_other_queries_or_rows(
     measure: Distances, *, normalized: bool
 ) -> None:
     rng = np.random.default_rng(1)
@@ -99,14 +99,14 @@ def test_a_query_does_not_depend_on_the_others_or_on_the_rows_asked_for(
     together = measure(queries, table, normalized=normalized)
     only = np.array([5, 3, 250 % len(table)])
     for query, expected in zip(queries, together, strict=True):
-        alone = measure([query], table, normalized=normalized)
-        np.testing.assert_array_equal(alone[0], expected)
+        single = measure([query], table, normalized=normalized)
+        np.testing.assert_array_equal(single[0], expected)
         some = measure([query], table, normalized=normalized, only=only)
         np.testing.assert_array_equal(some[0], expected[only])
 
 
 @each
-def test_no_queries_no_rows_and_no_bytes(measure: Distances) -> None:
+def test_empty_queries_and_rows_are_accepted_and_other_types_refused(measure: Distances) -> None:
     assert between(measure, [[1]], []).shape == (1, 0)
     assert between(measure, [], [[1]]).shape == (0, 1)
     with pytest.raises(InputError, match="int64 values in 1 dimensions"):
@@ -115,26 +115,24 @@ def test_no_queries_no_rows_and_no_bytes(measure: Distances) -> None:
 
 @scaled
 @given(query=ONE, row=ONE)
-def test_jaccard_is_one_minus_common_over_all(
+def test_jaccard_distance_equals_definition(
     *, normalized: bool, query: Sequence[int], row: Sequence[int]
 ) -> None:
     either = {*query, *row}
     expected = 1 - len({*query} & {*row}) / len(either) if either else 0
-    found = between(METRICS["jaccard"], [query], [row], normalized=normalized)
-    assert found[0, 0] == np.float32(expected)
+    result = between(METRICS["jaccard"], [query], [row], normalized=normalized)
+    assert result[0, 0] == np.float32(expected)
 
 
 @given(query=ONE, row=ONE)
-def test_histogram_is_minus_the_sum_or_one_minus_the_mean_of_quotients(
-    query: Sequence[int], row: Sequence[int]
-) -> None:
+def test_histogram_distance_equals_definition(query: Sequence[int], row: Sequence[int]) -> None:
     x, y = Counter(query), Counter(row)
     quotients = [min(x[value], y[value]) / max(x[value], y[value]) for value in {*x, *y}]
     raw = between(METRICS["histogram"], [query], [row], normalized=False)
     assert raw[0, 0] == pytest.approx(-sum(quotients), abs=1e-6)
     mean = 1 - np.mean(quotients) if quotients else 0
-    found = between(METRICS["histogram"], [query], [row])
-    assert found[0, 0] == pytest.approx(mean, abs=1e-6)
+    result = between(METRICS["histogram"], [query], [row])
+    assert result[0, 0] == pytest.approx(mean, abs=1e-6)
 
 
 # --- The edit distance ------------------------------------------------------------------------
@@ -161,7 +159,7 @@ def slow_cost(
 
 
 @given(ONE, ONE, WEIGHTS | st.just(UNIT))
-def test_the_edit_distance_is_the_cost_or_its_share_of_the_largest(
+def test_edit_distance_equals_slow_cost(
     query: list[int], row: list[int], weights: EditWeights
 ) -> None:
     measure = metric("edit", weights=weights)
@@ -175,9 +173,9 @@ def test_the_edit_distance_is_the_cost_or_its_share_of_the_largest(
     assert between(measure, [query], [row])[0, 0] == pytest.approx(share, abs=1e-6)
 
 
-def test_each_step_of_an_edit_has_its_weight() -> None:
+def test_edit_operations_have_their_weights() -> None:
     measure = metric("edit", weights=EditWeights(insert=2, delete=5, substitute=3))
-    # Inserted is what the query missed, deleted what it saw falsely.
+    # Insertions are objects that the query missed, deletions are false detections.
     costs = between(measure, [[1], [1, 2]], [[1, 2], [1], [2]], normalized=False)
     assert costs[[0, 1, 0], [0, 1, 2]].tolist() == [2, 5, 3]
     heavy = metric("edit", weights=EditWeights(insert=100, delete=100, substitute=100))
@@ -193,7 +191,7 @@ def table() -> SequenceTable:
 
 
 @scaled
-def test_the_kernel_and_rapidfuzz_agree(
+def test_kernel_equals_rapidfuzz(
     *, monkeypatch: pytest.MonkeyPatch, table: SequenceTable, normalized: bool
 ) -> None:
     queries = [table[place] for place in range(0, len(table), 50)]
@@ -209,7 +207,7 @@ def test_the_kernel_and_rapidfuzz_agree(
     np.testing.assert_array_equal(measure(only=some), expected[:, some])
 
 
-def test_a_large_table_gets_the_kernel_when_it_is_asked_again(
+def test_kernel_is_used_for_second_search_of_large_table(
     monkeypatch: pytest.MonkeyPatch, table: SequenceTable
 ) -> None:
     monkeypatch.setattr(edit, "_LARGE_TABLE_VALUES", len(table.values))
@@ -220,21 +218,21 @@ def test_a_large_table_gets_the_kernel_when_it_is_asked_again(
 
 
 @given(st.lists(VALUES, max_size=4), ONE)
-def test_a_wildcard_is_the_best_of_all_values(query: list[int], row: list[int]) -> None:
+def test_wildcard_equals_best_of_all_values(query: list[int], row: list[int]) -> None:
     table = SequenceTable.from_csr(*flat([row]))
-    found = edit.distances([np.array(query, np.uint8)], table, normalized=False, wildcard=0)
-    meant = itertools.product(*(KINDS if value == 0 else [value] for value in query))
-    assert found.tolist() == [[min(slow_cost(one, row) for one in meant)]]
+    result = edit.distances([np.array(query, np.uint8)], table, normalized=False, wildcard=0)
+    candidates = itertools.product(*(KINDS if value == 0 else [value] for value in query))
+    assert result.tolist() == [[min(slow_cost(candidate, row) for candidate in candidates)]]
 
 
-def test_a_wildcard_has_no_weights(table: SequenceTable) -> None:
+def test_wildcard_with_weights_is_refused(table: SequenceTable) -> None:
     with pytest.raises(InputError, match="wildcard was given with edit weights 2/1/1"):
         edit.distances([table[0]], table, wildcard=0, weights=EditWeights(insert=2))
 
 
 @pytest.mark.parametrize("weight", [0, -1, 101, 1.5, True, "1", None])
 @pytest.mark.parametrize("name", ["insert", "delete", "substitute"])
-def test_weights_are_whole_numbers_in_range(name: str, weight: object) -> None:
+def test_weights_out_of_range_are_refused(name: str, weight: object) -> None:
     with pytest.raises(InputError, match=f"edit weight '{name}' is .*from 1 to 100"):
         EditWeights(**{name: weight})  # type: ignore[arg-type]
 
@@ -243,18 +241,18 @@ def test_weights_are_whole_numbers_in_range(name: str, weight: object) -> None:
 
 
 def by_rapidfuzz(queries: Sequence[Bytes], rows: Sequence[Bytes], *, normalized: bool) -> Bytes:
-    texts = [[one.tobytes().decode("latin-1") for one in some] for some in (queries, rows)]
+    texts = [[row.tobytes().decode("latin-1") for row in part] for part in (queries, rows)]
     scorer = Levenshtein.normalized_distance if normalized else Levenshtein.distance
-    found: Bytes = cdist(*texts, scorer=scorer, dtype=np.float32)
-    return found
+    result: Bytes = cdist(*texts, scorer=scorer, dtype=np.float32)
+    return result
 
 
 def random_rows(seed: int, count: int, longest: int, values: int) -> list[Bytes]:
     """Return rows over some of the values, the lengths in no order, some equal."""
     rng = np.random.default_rng(seed)
-    known = rng.permutation(256)[:values]
+    choices = rng.permutation(256)[:values]
     rows = [
-        rng.choice(known, length).astype(np.uint8) for length in rng.integers(0, longest, count)
+        rng.choice(choices, length).astype(np.uint8) for length in rng.integers(0, longest, count)
     ]
     return rows + rows[: count // 10]
 
@@ -263,11 +261,13 @@ SHORT = st.lists(st.sampled_from([0, 1, 2, 255]), max_size=9)
 
 
 @given(query=SHORT, rows=st.lists(SHORT, max_size=6), wildcard=st.sampled_from([None, 0, 2, 77]))
-def test_equals_the_textbook(query: list[int], rows: list[list[int]], wildcard: int | None) -> None:
-    found = BitPlanes.build(*flat(rows)).edit_distances(
+def test_bit_planes_equal_slow_cost(
+    query: list[int], rows: list[list[int]], wildcard: int | None
+) -> None:
+    result = BitPlanes.build(*flat(rows)).edit_distances(
         [np.array(query, np.uint8)], normalized=False, wildcard=wildcard
     )
-    assert found.tolist() == [[slow_cost(query, row, wildcard=wildcard) for row in rows]]
+    assert result.tolist() == [[slow_cost(query, row, wildcard=wildcard) for row in rows]]
 
 
 @settings(deadline=None)  # the first call compiles
@@ -277,37 +277,39 @@ def test_equals_the_textbook(query: list[int], rows: list[list[int]], wildcard: 
     longest=st.sampled_from([1, 20, 200]),
     values=st.sampled_from([1, 2, 11, 16, 255, 256]),
 )
-def test_equals_rapidfuzz(*, normalized: bool, seed: int, longest: int, values: int) -> None:
+def test_bit_planes_equal_rapidfuzz(
+    *, normalized: bool, seed: int, longest: int, values: int
+) -> None:
     rows = random_rows(seed, 40, longest, values)
     queries = [*rows[:3], *random_rows(seed + 1, 3, longest, values)]
     planes = BitPlanes.build(*flat(rows))
-    found = planes.edit_distances(queries, normalized=normalized)
-    np.testing.assert_array_equal(found, by_rapidfuzz(queries, rows, normalized=normalized))
+    result = planes.edit_distances(queries, normalized=normalized)
+    np.testing.assert_array_equal(result, by_rapidfuzz(queries, rows, normalized=normalized))
 
 
 @scaled
-def test_several_blocks_and_a_thousand_objects(*, normalized: bool) -> None:
+def test_bit_planes_of_several_blocks_and_long_sequences(*, normalized: bool) -> None:
     rows = sorted(random_rows(3, 2 * BLOCK_SEQUENCES, 30, 11), key=len)
     rows += random_rows(4, 3, 1000, 255)
     queries = [rows[0], rows[BLOCK_SEQUENCES], rows[-1], np.tile(rows[-2], 3)[:1000], rows[5][:0]]
     planes = BitPlanes.build(*flat(rows))
-    found = planes.edit_distances(queries, normalized=normalized)
-    np.testing.assert_array_equal(found, by_rapidfuzz(queries, rows, normalized=normalized))
-    for query, expected in zip(queries, found, strict=True):
-        alone = planes.edit_distances([query], normalized=normalized)
-        np.testing.assert_array_equal(alone[0], expected)
+    result = planes.edit_distances(queries, normalized=normalized)
+    np.testing.assert_array_equal(result, by_rapidfuzz(queries, rows, normalized=normalized))
+    for query, expected in zip(queries, result, strict=True):
+        single = planes.edit_distances([query], normalized=normalized)
+        np.testing.assert_array_equal(single[0], expected)
 
 
-def test_a_wildcard_in_a_long_query() -> None:
+def test_bit_planes_with_wildcard_in_long_query() -> None:
     rng = np.random.default_rng(0)
     rows = [rng.integers(0, 5, length).tolist() for length in (0, 1, 80, 150)]
     query = rng.integers(0, 5, 150).tolist()
     planes, queries = BitPlanes.build(*flat(rows)), [np.array(query, np.uint8)]
-    found = planes.edit_distances(queries, normalized=False, wildcard=3)
-    assert found.tolist() == [[slow_cost(query, row, wildcard=3) for row in rows]]
+    result = planes.edit_distances(queries, normalized=False, wildcard=3)
+    assert result.tolist() == [[slow_cost(query, row, wildcard=3) for row in rows]]
 
 
-def test_neither_sequences_nor_queries() -> None:
+def test_bit_planes_without_sequences_or_queries() -> None:
     query = np.array([1], np.uint8)
     assert BitPlanes.build(*flat([])).edit_distances([query]).shape == (1, 0)
     assert BitPlanes.build(*flat([[1]])).edit_distances([]).shape == (0, 1)
@@ -316,7 +318,7 @@ def test_neither_sequences_nor_queries() -> None:
 
 
 @pytest.mark.parametrize(("values", "bits"), [(11, 8), (16, 9), (256, 33)])
-def test_planes_need_few_bits_an_object(values: int, bits: int) -> None:
+def test_bit_planes_need_few_bits_per_object(values: int, bits: int) -> None:
     rows = np.resize(np.arange(values), 20 * BLOCK_SEQUENCES).astype(np.uint8)
     planes = BitPlanes.build(rows, np.arange(0, len(rows) + 1, 20))
     assert planes.planes.nbytes * 8 == bits * len(rows)

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import math
+import time
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,11 +19,13 @@ from semsig_gis.localization.distance.scores import _MANY_QUERIES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from semsig_gis.database import SignatureDatabase
 
 
 CITY = database_of(random_cells(400))
-FUSIONS = [one for one in METHODS if "+" in one]
+FUSIONS = [text for text in METHODS if "+" in text]
 
 
 def slow_scores(database: SignatureDatabase, query: Signature, method: Method) -> np.ndarray:
@@ -31,7 +35,7 @@ def slow_scores(database: SignatureDatabase, query: Signature, method: Method) -
         "types": (query.codes, database.type_sequences),
         "angles": (query.levels(database.spec.levels), database.angle_sequences),
     }
-    found = {}
+    distances = {}
     for part, name in method.measures.items():
         sequence, table = parts[part]
         measure = metric(name, weights=method.weights)
@@ -39,20 +43,20 @@ def slow_scores(database: SignatureDatabase, query: Signature, method: Method) -
             measure([sequence], table, normalized=method.normalized, only=row).item()
             for row in np.arange(len(table))[:, None]
         ]
-        found[part] = np.array(measured)[table.inverse]
-    if len(found) == 1:
-        return next(iter(found.values()))
-    fused = method.alpha * found["types"] + (1 - method.alpha) * found["angles"]
+        distances[part] = np.array(measured)[table.inverse]
+    if len(distances) == 1:
+        return next(iter(distances.values()))
+    fused = method.alpha * distances["types"] + (1 - method.alpha) * distances["angles"]
     if method.keep is None:
         return fused
-    first = np.rint(found["types"] * 2**16) / 2**16
+    first = np.rint(distances["types"] * 2**16) / 2**16
     cut = np.sort(first)[math.ceil(Fraction(str(method.keep)) * len(first) / 100) - 1]
     worst = fused[first <= cut].max()
     return np.where(first <= cut, fused, worst + first - cut)
 
 
-@pytest.mark.parametrize("text", METHODS + [f"{one}:10%" for one in FUSIONS])
-def test_scores_equal_those_of_one_cell_at_a_time(text: str) -> None:
+@pytest.mark.parametrize("text", METHODS + [f"{fusion}:10%" for fusion in FUSIONS])
+def test_scores_equal_slow_scores(text: str) -> None:
     method = Method.parse(text)
     queries = [CITY.signature(cell) for cell in (3, 50)]
     queries.append(asked("DKDBDDD", [1, 2, 100, 200, 201, 202, 359]))
@@ -61,32 +65,35 @@ def test_scores_equal_those_of_one_cell_at_a_time(text: str) -> None:
         np.testing.assert_allclose(scores, slow_scores(CITY, query, method), atol=2**-16)
 
 
-def test_sums_that_are_equal_are_equal_scores() -> None:
-    # In float32, 1/7 + 2/7 and 3/7 + 0 differ, and so would cells that deserve the same rank.
+def test_equal_sums_are_equal_scores() -> None:
+    # In float32, 1/7 + 2/7 and 3/7 + 0 differ; the scores must not.
     seven = [10.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0]
 
-    moved = [seven, *([one + 22.5 for one in seven[:to]] + seven[to:] for to in (1, 2, 3))]
-    cells = list(zip(["BBBDDDD", "BBDDDDD", "BDDDDDD", "DDDDDDD"], moved, strict=True))
+    shifted = [
+        seven,
+        *([angle + 22.5 for angle in seven[:count]] + seven[count:] for count in (1, 2, 3)),
+    ]
+    cells = list(zip(["BBBDDDD", "BBDDDDD", "BDDDDDD", "DDDDDDD"], shifted, strict=True))
     query = asked("DDDDDDD", seven)
     (scores,) = score_cells(database_of(cells), [query], Method.parse("edit+edit:alpha=0.5"))
     assert len(set(scores.tolist())) == 1
 
 
-def assert_scored_as_alone(queries: Sequence[Signature], method: Method) -> None:
+def assert_scores_equal_single_scores(queries: Sequence[Signature], method: Method) -> None:
     for query, scores in zip(queries, score_cells(CITY, queries, method), strict=True):
-        (alone,) = score_cells(CITY, [query], method)
-        np.testing.assert_array_equal(scores, alone)
-        assert scores.dtype == alone.dtype
+        (single,) = score_cells(CITY, [query], method)
+        np.testing.assert_array_equal(scores, single)
+        assert scores.dtype == single.dtype
 
 
-def test_queries_that_know_different_parts_may_be_mixed() -> None:
+def test_queries_with_different_parts_may_be_mixed() -> None:
     whole = [CITY.signature(cell) for cell in range(6)]
     queries = [
         *whole[:2],
-        *(Signature(one.codes, None) for one in whole[2:4]),
-        *(Signature(None, one.bearings) for one in whole[4:]),
+        *(Signature(query.codes, None) for query in whole[2:4]),
+        *(Signature(None, query.bearings) for query in whole[4:]),
     ]
-    assert_scored_as_alone([queries[place] for place in (2, 0, 4, 1, 5, 3)], Method())
+    assert_scores_equal_single_scores([queries[place] for place in (2, 0, 4, 1, 5, 3)], Method())
 
 
 @pytest.mark.parametrize("keep", [None, 5.0])
@@ -94,21 +101,21 @@ def test_batches_do_not_change_scores(keep: float | None, monkeypatch: pytest.Mo
     queries = [CITY.signature(cell) for cell in range(10)]
     together = np.array(list(score_cells(CITY, queries, Method(keep=keep))))
     monkeypatch.setattr("semsig_gis.localization.distance.scores._BATCH_BYTES", 1)
-    alone = np.array(list(score_cells(CITY, queries, Method(keep=keep))))
-    np.testing.assert_array_equal(alone, together)
+    separate = np.array(list(score_cells(CITY, queries, Method(keep=keep))))
+    np.testing.assert_array_equal(separate, together)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("raw", ["", ":raw"])
-def test_many_queries_are_scored_as_one(seed: int, raw: str) -> None:
+def test_many_queries_have_scores_of_single_queries(seed: int, raw: str) -> None:
     rng = np.random.default_rng(seed)
     queries = [CITY.signature(int(cell)) for cell in rng.integers(0, len(CITY), _MANY_QUERIES)]
     for text in ("edit+edit", "edit+edit:alpha=0.3", "edit+edit:5%", "histogram+jaccard:33%"):
-        assert_scored_as_alone(queries, Method.parse(text + raw))
+        assert_scores_equal_single_scores(queries, Method.parse(text + raw))
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_methods_that_share_a_memo_score_as_alone(seed: int) -> None:
+def test_memo_does_not_change_scores(seed: int) -> None:
     rng = np.random.default_rng(seed)
     queries = [CITY.signature(int(cell)) for cell in rng.integers(0, len(CITY), 9)]
     texts = [
@@ -119,9 +126,9 @@ def test_methods_that_share_a_memo_score_as_alone(seed: int) -> None:
     memo = DistanceMemo()
     for text in rng.permutation([*texts, *texts]).tolist():
         method = Method.parse(text)
-        alone = list(score_cells(CITY, queries, method))
+        expected = list(score_cells(CITY, queries, method))
         shared = list(score_cells(CITY, queries, method, memo=memo))
-        np.testing.assert_array_equal(shared, alone)
+        np.testing.assert_array_equal(shared, expected)
     assert memo.spared > 0
 
 
@@ -132,17 +139,33 @@ def test_methods_that_share_a_memo_score_as_alone(seed: int) -> None:
         (asked(None, [1.0]), "types:edit", "compares types, but the query has only bearings"),
     ],
 )
-def test_a_query_without_the_part_is_refused_at_once(
+def test_query_without_compared_part_is_refused_before_iteration(
     query: Signature, text: str, words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
         score_cells(CITY, [query], Method.parse(text))
 
 
-def test_nothing_is_as_far_as_can_be_from_every_cell() -> None:
+def test_empty_query_has_distance_one_to_every_cell() -> None:
     (scores,) = score_cells(CITY, [NOTHING])
     assert scores.tolist() == [1] * len(CITY)
     assert list(score_cells(CITY, [])) == []
+
+
+def test_memo_computes_distances_once_and_counts_saved_time() -> None:
+    names: list[str] = []
+
+    def measure(name: str) -> NDArray[np.float32]:
+        names.append(name)
+        time.sleep(0.01)
+        return np.array([len(names)], np.float32)
+
+    memo = DistanceMemo()
+    distances = [float(memo.get(name, partial(measure, name))[0]) for name in "abaab"]
+    assert distances == [1.0, 2.0, 1.0, 1.0, 2.0]
+    assert names == ["a", "b"]
+    # Three of the distances, which take 0.01 s each, were computed before.
+    assert memo.spared >= 0.03
 
 
 # --- Two-stage fusion -------------------------------------------------------------------------
@@ -150,17 +173,17 @@ def test_nothing_is_as_far_as_can_be_from_every_cell() -> None:
 
 @pytest.mark.parametrize("keep", [0.1, 1, 5, 30, 99, 100])
 @pytest.mark.parametrize("method", ["edit+edit", "histogram+edit:raw:weights=100/100/100"])
-def test_the_rest_follows_in_the_order_of_the_first_stage(method: str, keep: float) -> None:
+def test_other_cells_follow_in_order_of_first_stage(method: str, keep: float) -> None:
     parsed = Method.parse(f"{method}:{keep}%")
-    types_alone = Method(types=parsed.types, angles=None, normalized=parsed.normalized)
+    only_types = Method(types=parsed.types, angles=None, normalized=parsed.normalized)
     query = CITY.signature(7)
-    (first,) = score_cells(CITY, [query], types_alone)
+    (first,) = score_cells(CITY, [query], only_types)
     (scores,) = score_cells(CITY, [query], parsed)
     (fused,) = score_cells(CITY, [query], Method.parse(method))
     cut = np.sort(first)[math.ceil(len(CITY) * keep / 100) - 1]
-    kept, rest = first <= cut, first > cut
-    np.testing.assert_array_equal(scores[kept], fused[kept])
-    assert scores[rest].min(initial=np.inf) > scores[kept].max()
+    passing, rest = first <= cut, first > cut
+    np.testing.assert_array_equal(scores[passing], fused[passing])
+    assert scores[rest].min(initial=np.inf) > scores[passing].max()
     # The same order, with the same ties.
     np.testing.assert_array_equal(
         np.unique(scores[rest], return_inverse=True)[1],
@@ -174,7 +197,7 @@ def test_the_rest_follows_in_the_order_of_the_first_stage(method: str, keep: flo
     st.sampled_from(["edit+edit", "histogram+jaccard", "jaccard+edit:raw", "histogram+edit:raw"]),
     st.floats(0.01, 100),
 )
-def test_what_is_kept_is_what_sorting_all_cells_keeps(seed: int, text: str, keep: float) -> None:
+def test_two_stage_scores_equal_slow_scores(seed: int, text: str, keep: float) -> None:
     database = database_of(random_cells(80, seed=seed))
     method = Method.parse(f"{text}:{keep}%")
     query = database.signature(seed % 80)
@@ -182,8 +205,8 @@ def test_what_is_kept_is_what_sorting_all_cells_keeps(seed: int, text: str, keep
     np.testing.assert_allclose(scores, slow_scores(database, query, method), atol=2**-15)
 
 
-def test_the_rest_stays_behind_where_the_gap_is_lost_in_rounding() -> None:
-    # By type the cells are 1/180 - 1/181 apart, less than float32 tells at the worst kept score.
+def test_other_cells_stay_behind_when_the_difference_is_rounded_to_zero() -> None:
+    # By type the cells are 1/180 - 1/181 apart, less than the float32 step at the worst score.
     cells = [("D" * count, np.linspace(1, 359, count).tolist()) for count in (180, 181)]
     method = Method.parse("histogram+edit:10%:raw:alpha=0.01:weights=100/100/100")
     (scores,) = score_cells(database_of(cells), [asked("D", [180.0])], method)
@@ -191,22 +214,26 @@ def test_the_rest_stays_behind_where_the_gap_is_lost_in_rounding() -> None:
     assert scores[1] > scores[0]
 
 
-@pytest.mark.parametrize(("keep", "kept"), [(7, 7), (1.5, 2), (28.999, 29), (29.001, 30), (99, 99)])
-def test_how_many_are_kept_is_exact(keep: float, kept: int) -> None:
-    # Taken naively, 7 % of 100 cells are 0.07 * 100, a little more than 7, and so 8.
+@pytest.mark.parametrize(
+    ("keep", "count"), [(7, 7), (1.5, 2), (28.999, 29), (29.001, 30), (99, 99)]
+)
+def test_number_of_passing_cells_is_exact(keep: float, count: int) -> None:
+    # In floating point, 7 % of 100 cells are 0.07 * 100, a little more than 7, and so 8.
     types = ["D" + "B" * place for place in range(100)]  # one cell after the other by type
-    shifts = [180.0 if place < kept else 0.0 for place in range(100)]  # the rest better by angle
-    cells = [(one, [shift] * len(one)) for one, shift in zip(types, shifts, strict=True)]
+    shifts = [180.0 if place < count else 0.0 for place in range(100)]  # the rest better by angle
+    cells = [
+        (symbols, [shift] * len(symbols)) for symbols, shift in zip(types, shifts, strict=True)
+    ]
     database, query = database_of(cells), asked("D", [0.0])
     (scores,) = score_cells(database, [query], Method(keep=keep))
     (fused,) = score_cells(database, [query], Method())
-    assert fused[kept] < fused[kept - 1]
-    assert scores[:kept].tolist() == fused[:kept].tolist()
-    assert (np.diff(scores[kept - 1 :]) > 0).all()
+    assert fused[count] < fused[count - 1]
+    assert scores[:count].tolist() == fused[:count].tolist()
+    assert (np.diff(scores[count - 1 :]) > 0).all()
 
 
 @given(st.permutations(range(60)), st.sampled_from([None, 2.0, 10.0]))
-def test_the_order_of_the_cells_does_not_matter(order: list[int], keep: float | None) -> None:
+def test_order_of_cells_does_not_change_scores(order: list[int], keep: float | None) -> None:
     cells = random_cells(60, seed=3)
     mixed = database_of([cells[place] for place in order])
     query = asked("DBD", [20.0, 80.0, 300.0])

@@ -34,10 +34,10 @@ TOWN = random_town().database
 @pytest.mark.parametrize("top", [1, 2, 7, 100, 400, 1000])
 def test_candidates_are_the_best_cells_with_their_ranks(top: int) -> None:
     query = CITY.signature(11)
-    found = localize(CITY, query, top=top, method=Method())
+    result = localize(CITY, query, top=top, method=Method())
     (scores,) = score_cells(CITY, [query])
     ranked = sorted(range(len(CITY)), key=lambda cell: (scores[cell], cell))[:top]
-    table = found.candidates
+    table = result.candidates
     assert table["cell"].tolist() == ranked
     for row in table.to_dict(orient="records"):
         cell, distance = row["cell"], row["distance"]
@@ -49,9 +49,9 @@ def test_candidates_are_the_best_cells_with_their_ranks(top: int) -> None:
         assert [row["x"], row["y"]] == CITY.xy[cell].tolist()
         assert row["types"] == CITY.types(cell)
         assert row["length"] == CITY.lengths[cell]
-    assert found.cells == len(CITY)
+    assert result.cells == len(CITY)
     last = table["distance"].iloc[-1]
-    assert found.tied_beyond == (scores == last).sum() - (table["distance"] == last).sum()
+    assert result.tied_beyond == (scores == last).sum() - (table["distance"] == last).sum()
 
 
 @pytest.mark.parametrize(
@@ -64,54 +64,54 @@ def test_candidates_are_the_best_cells_with_their_ranks(top: int) -> None:
         ("DB", [10.0, 20.0], "angles:jaccard", "angles"),
     ],
 )
-def test_a_fusion_falls_back_to_what_the_query_has(
+def test_fusion_uses_parts_of_query(
     types: str | None, bearings: list[float] | None, text: str, used: str
 ) -> None:
     query, method = asked(types, bearings), Method.parse(text)
-    found = localize(CITY, query, method=method, top=100)
-    assert found.used == used
+    result = localize(CITY, query, method=method, top=100)
+    assert result.used == used
     if used != "types+angles":
-        alone = localize(
+        single = localize(
             CITY, query, method=Method.parse(f"{used}:{method.measures[used]}"), top=100
         )
-        assert found.candidates.equals(alone.candidates)
+        assert result.candidates.equals(single.candidates)
 
 
-def test_what_cannot_be_searched_is_refused() -> None:
+def test_too_few_candidates_are_refused() -> None:
     for top in (0, -1):
         with refused(InputError, f"{top} candidates were asked for; give a whole number from 1"):
             localize(CITY, asked("D"), top=top, method=Method())
 
 
-def test_candidates_as_points_in_the_crs_of_the_database() -> None:
-    found = localize(CITY, asked("DD"), top=5, method=Method())
-    points = found.to_geodataframe()
+def test_candidates_become_points_in_crs_of_database() -> None:
+    result = localize(CITY, asked("DD"), top=5, method=Method())
+    points = result.to_geodataframe()
     assert points.crs == CITY.crs
-    assert points.get_coordinates().equals(found.candidates[["x", "y"]])
-    assert "geometry" not in found.candidates
+    assert points.get_coordinates().equals(result.candidates[["x", "y"]])
+    assert "geometry" not in result.candidates
 
 
 @pytest.mark.parametrize(("types", "bearings"), [("DB", [10.0, 20.0]), ("DB", None), (None, [5.0])])
-def test_everything_fits_into_json(types: str | None, bearings: list[float] | None) -> None:
-    found = localize(CITY, asked(types, bearings), method=Method(keep=5), top=3)
-    told = found.to_dict()
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
+def test_answer_is_valid_json(types: str | None, bearings: list[float] | None) -> None:
+    result = localize(CITY, asked(types, bearings), method=Method(keep=5), top=3)
+    values = result.to_dict()
+    assert json.loads(json.dumps(values, allow_nan=False)) == values
     length = len(types or bearings or "")
     expected = {
         "query": {"types": types, "bearings": bearings, "length": length},
         "method": "edit+edit:5%",
-        "used": found.used,
+        "used": result.used,
         "crs": "EPSG:2154",
         "cells": 400,
-        "tied_beyond": found.tied_beyond,
+        "tied_beyond": result.tied_beyond,
         "licenses": ["trees: the city (CC0)"],
     }
-    assert {name: told[name] for name in expected} == expected
-    assert [one["cell"] for one in told["candidates"]] == found.candidates["cell"].tolist()
+    assert {name: values[name] for name in expected} == expected
+    assert [row["cell"] for row in values["candidates"]] == result.candidates["cell"].tolist()
     back = Transformer.from_crs("EPSG:4326", "EPSG:2154", always_xy=True)
-    for one in told["candidates"]:
-        place = back.transform(one["lon"], one["lat"])
-        assert place == pytest.approx((one["x"], one["y"]), abs=0.02)
+    for row in values["candidates"]:
+        place = back.transform(row["lon"], row["lat"])
+        assert place == pytest.approx((row["x"], row["y"]), abs=0.02)
 
 
 def in_parts(database: SignatureDatabase, owner: NDArray[np.int64], folder: str | Path) -> Any:  # noqa: ANN401
@@ -123,19 +123,21 @@ def in_parts(database: SignatureDatabase, owner: NDArray[np.int64], folder: str 
     return PartitionedDatabase(tuple(files), len(database))
 
 
-def assert_parts_answer_alike(
+def assert_parts_give_same_answer(
     whole: SignatureDatabase, owner: NDArray[np.int64], query: Signature, method: Method, top: int
 ) -> None:
     with tempfile.TemporaryDirectory() as folder:
         parted = in_parts(whole, owner, folder)
-        one, other = (localize(cells, query, method=method, top=top) for cells in (parted, whole))
-    pd.testing.assert_frame_equal(one.candidates, other.candidates)
-    assert one.to_dict() == other.to_dict()
+        answer, expected = (
+            localize(cells, query, method=method, top=top) for cells in (parted, whole)
+        )
+    pd.testing.assert_frame_equal(answer.candidates, expected.candidates)
+    assert answer.to_dict() == expected.to_dict()
 
 
 PARTED_METHODS = [
     *METHODS,
-    *(f"{one}:{keep}%" for one in METHODS if "+" in one for keep in (0.5, 5, 40, 100)),
+    *(f"{text}:{keep}%" for text in METHODS if "+" in text for keep in (0.5, 5, 40, 100)),
 ]
 
 
@@ -148,12 +150,12 @@ PARTED_METHODS = [
     part=st.sampled_from(["both", "types", "angles"]),
 )
 @settings(max_examples=120)
-def test_a_database_in_parts_answers_as_in_one_piece(
+def test_partitioned_database_gives_same_answer(
     *, seed: int, count: int, parts: int, text: str, top: int, part: str
 ) -> None:
     rng = np.random.default_rng(seed)
     whole = database_of(random_cells(count, seed=seed))
-    # Another one of the cells, or one that a person made up of the classes that there are.
+    # The signature of a cell, or random objects of the classes of the city.
     query = whole.signature(int(rng.integers(count)))
     if rng.random() < 0.5:
         codes = rng.choice(whole.present_codes, int(rng.integers(1, 9)))
@@ -163,20 +165,22 @@ def test_a_database_in_parts_answers_as_in_one_piece(
         query = Signature(
             query.codes if part == "types" else None, query.bearings if part == "angles" else None
         )
-    assert_parts_answer_alike(whole, rng.integers(0, parts, count), query, method, top)
+    assert_parts_give_same_answer(whole, rng.integers(0, parts, count), query, method, top)
 
 
-def test_the_gate_of_the_second_stage_is_that_of_all_parts() -> None:
-    # More cells are listed than pass, so that the worst that passes shows in the distances.
+def test_gate_of_second_stage_is_that_of_all_parts() -> None:
+    # More cells are listed than pass: their distances depend on the worst passing score.
     rng = np.random.default_rng(8)
     for seed in range(12):
         whole, owner = database_of(random_cells(60, seed=seed)), rng.integers(0, 4, 60)
         for keep in (1, 10, 50):
-            assert_parts_answer_alike(whole, owner, whole.signature(seed), Method(keep=keep), 60)
+            assert_parts_give_same_answer(
+                whole, owner, whole.signature(seed), Method(keep=keep), 60
+            )
 
 
 @pytest.mark.parametrize("text", ["edit+edit:2%:raw:weights=40/50/60", "histogram+edit:2%:raw"])
-def test_parts_rank_the_cells_beyond_the_second_stage_alike(text: str) -> None:
+def test_parts_rank_other_cells_as_the_whole_database(text: str) -> None:
     rng = np.random.default_rng(4)
     cells = [
         ("".join(rng.choice(list("DBG"), length)), np.sort(rng.uniform(0, 360, length)).tolist())
@@ -185,16 +189,18 @@ def test_parts_rank_the_cells_beyond_the_second_stage_alike(text: str) -> None:
     whole = database_of(cells)
     owner, method = rng.integers(0, 3, 200), Method.parse(text)
     for cell in (0, 100):
-        assert_parts_answer_alike(whole, owner, whole.signature(cell), method, 200)
+        assert_parts_give_same_answer(whole, owner, whole.signature(cell), method, 200)
 
 
-def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_one_part_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     parted = in_parts(CITY, np.arange(len(CITY)) % 4, tmp_path)
     opened: list[weakref.ref[SignatureDatabase]] = []
 
     def watched(path: Path) -> SignatureDatabase:
         gc.collect()
-        assert sum(one() is not None for one in opened) <= 2  # one is taken while one is let go
+        assert (
+            sum(part() is not None for part in opened) <= 2
+        )  # the next is opened before the last is freed
         database = open_database(path)
         opened.append(weakref.ref(database))
         return database
@@ -204,55 +210,55 @@ def test_one_part_at_a_time_is_in_memory(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(opened) == 8  # twice in two stages
 
 
-def test_cells_in_parts_are_ranked_together(tmp_path: Path) -> None:
+def test_rankings_cover_cells_of_all_parts(tmp_path: Path) -> None:
     parted = in_parts(CITY, np.arange(len(CITY)) % 3, tmp_path)
     locators = DistanceLocator(database=parted), DistanceLocator(database=CITY)
-    one, other = (next(iter(one.rankings([CITY.signature(3)]))) for one in locators)
-    assert one.scores.tolist() == other.scores.tolist()
+    parts, whole = (next(iter(item.rankings([CITY.signature(3)]))) for item in locators)
+    assert parts.scores.tolist() == whole.scores.tolist()
 
 
 @pytest.mark.parametrize("text", METHODS)
-def test_a_class_that_no_part_sees_is_a_false_detection(tmp_path: Path, text: str) -> None:
+def test_absent_class_is_false_detection(tmp_path: Path, text: str) -> None:
     parted, method = in_parts(CITY, np.arange(len(CITY)) % 3, tmp_path), Method.parse(text)
-    alone = localize(CITY, asked("D", [1.0]), method=method, top=100)
+    expected = localize(CITY, asked("D", [1.0]), method=method, top=100)
     for database in (parted, CITY):
-        found = localize(database, asked("MD", [0.5, 1.0]), method=method, top=100)
-        pd.testing.assert_frame_equal(found.candidates, alone.candidates)
-        assert len(found.query) == 2
-        (note,) = found.notes
+        result = localize(database, asked("MD", [0.5, 1.0]), method=method, top=100)
+        pd.testing.assert_frame_equal(result.candidates, expected.candidates)
+        assert len(result.query) == 2
+        (note,) = result.notes
         assert "M (bus stop)" in note
-    assert not alone.notes
+    assert not expected.notes
 
 
 @pytest.mark.parametrize("query", [NOTHING, asked("M", [1.0])])
 @pytest.mark.parametrize("text", ["edit+edit:5%", "types:jaccard", "angles:histogram"])
-def test_nothing_tells_no_cell_from_another(query: Signature, text: str) -> None:
-    found = localize(CITY, query, method=Method.parse(text), top=3)
-    assert found.candidates["tied"].tolist() == [len(CITY)] * 3
-    assert len(found.notes) == 1
+def test_all_cells_tie_for_empty_query(query: Signature, text: str) -> None:
+    result = localize(CITY, query, method=Method.parse(text), top=3)
+    assert result.candidates["tied"].tolist() == [len(CITY)] * 3
+    assert len(result.notes) == 1
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["D", "2B", "D>=1,?<=6", "B=0", "?>=3"]))
 @settings(max_examples=25)
-def test_a_requirement_leaves_cells_out_and_changes_nothing_else(seed: int, text: str) -> None:
+def test_requirement_only_removes_cells(seed: int, text: str) -> None:
     cell = int(np.random.default_rng(seed).integers(len(TOWN)))
     requirement = Requirement.parse(text, TOWN.taxonomy)
     everything = localize(TOWN, TOWN.signature(cell), top=len(TOWN), method=Method()).candidates
-    met = requirement.met(TOWN.type_sequences)
-    wanted = everything[met[everything["cell"].to_numpy()]]
-    if wanted.empty:
+    mask = requirement.met(TOWN.type_sequences)
+    expected = everything[mask[everything["cell"].to_numpy()]]
+    if expected.empty:
         with pytest.raises(EmptyResultError):
             localize(TOWN, TOWN.signature(cell), requirement=requirement, method=Method(), top=100)
         return
-    found = localize(
+    result = localize(
         TOWN, TOWN.signature(cell), requirement=requirement, top=len(TOWN), method=Method()
     )
-    assert found.candidates["cell"].tolist() == wanted["cell"].tolist()
-    assert found.candidates["distance"].tolist() == wanted["distance"].tolist()
-    assert found.cells == int(met.sum())
+    assert result.candidates["cell"].tolist() == expected["cell"].tolist()
+    assert result.candidates["distance"].tolist() == expected["distance"].tolist()
+    assert result.cells == int(mask.sum())
 
 
-def test_an_object_of_unknown_class_may_be_any() -> None:
+def test_unknown_class_matches_any_class() -> None:
     cell = int(TOWN.lengths.argmax())
     types = TOWN.types(cell)
     query = Signature.parse("?" + types[1:], None, taxonomy=TOWN.taxonomy)

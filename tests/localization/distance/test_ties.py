@@ -25,7 +25,7 @@ Errors = st.lists(st.integers(0, 60).map(float), max_size=6)
 @given(
     size=st.integers(1, 3000), levels=st.integers(1, 400), seed=st.integers(0, 99), data=st.data()
 )
-def test_the_best_cells_are_those_up_to_the_last_wanted(
+def test_best_cells_include_ties_with_last(
     size: int, levels: int, seed: int, data: st.DataObject
 ) -> None:
     scores = np.random.default_rng(seed).integers(0, levels, size).astype(np.float32)
@@ -34,7 +34,7 @@ def test_the_best_cells_are_those_up_to_the_last_wanted(
     assert best_cells(scores, count).tolist() == np.flatnonzero(scores <= cut).tolist()
 
 
-def test_many_ties_stay_exact() -> None:
+def test_expectation_is_exact_for_many_ties() -> None:
     tied = np.repeat([5.0, 500.0], [7, 13])
     _, within = expected_best([], tied, slots=4, thresholds=[5])
     assert within[0] == pytest.approx(1 - math.comb(13, 4) / math.comb(20, 4), rel=1e-12)
@@ -43,11 +43,11 @@ def test_many_ties_stay_exact() -> None:
 
 
 @given(better=Errors, tied=Errors.filter(bool), data=st.data())
-def test_expectation_equals_every_draw(
+def test_expectation_equals_mean_of_all_draws(
     better: list[float], tied: list[float], data: st.DataObject
 ) -> None:
     slots = data.draw(st.integers(1, len(tied)))
-    draws = [min((*better, *drawn)) for drawn in itertools.combinations(tied, slots)]
+    draws = [min((*better, *draw)) for draw in itertools.combinations(tied, slots)]
     limits = [*THRESHOLDS, *better, *tied]
     expected, within = expected_best(better, tied, slots=slots, thresholds=limits)
     assert expected == pytest.approx(np.mean(draws), abs=1e-9)
@@ -62,7 +62,7 @@ def test_expectation_equals_every_draw(
     percent=st.integers(1, 100),
     data=st.data(),
 )
-def test_cut_and_ranks_equal_every_order_of_the_ties(
+def test_cut_and_ranks_equal_all_orders_of_ties(
     scores: list[int], percent: int, data: st.DataObject
 ) -> None:
     n = len(scores)
@@ -83,14 +83,14 @@ def test_cut_and_ranks_equal_every_order_of_the_ties(
     assert recall[0] == pytest.approx((ranks <= percent * n // 100).mean())
 
 
-def test_recall_rounds_the_number_kept_down() -> None:
-    # 7 % of 100 cells are seven, though 0.07 * 100 is a little more.
+def test_recall_rounds_number_of_cells_down() -> None:
+    # 7 % of 100 cells are seven, although 0.07 * 100 is slightly more.
     assert expected_recall([7, 8], [7, 8], cells=100, percent=7).tolist() == [1, 0]
     assert expected_recall([2], [2], cells=199, percent=1).tolist() == [0]
     assert expected_recall([290], [290], cells=1000, percent=29).tolist() == [1]
 
 
 @pytest.mark.parametrize("percent", [0, -1, 100.5, math.nan])
-def test_a_percentage_out_of_range_is_refused(percent: float) -> None:
+def test_percentage_out_of_range_is_refused(percent: float) -> None:
     with pytest.raises(InputError, match="percentage above 0 and at most 100"):
         expected_recall([1], [1], cells=10, percent=percent)

@@ -165,9 +165,16 @@ def distances(
             "wildcards are compared with weights of 1 only."
         )
     few = only is not None and len(only) * _KERNEL_SPEEDUP < len(table)
-    if wildcard is not None or (
-        costs == EditWeights() and not few and _kernel_pays(len(sequences), table)
-    ):
+    unit_weights = costs == EditWeights() and not few
+    pays = False
+    if unit_weights and wildcard is None:
+        # Use the kernel if it saves more time than it takes to load: not for a single query.
+        repeated = table in _searched_tables
+        _searched_tables.add(table)
+        values = len(table.values)
+        pays = len(sequences) * values >= _VALUES_OF_LOADING
+        pays |= repeated and values >= _LARGE_TABLE_VALUES
+    if wildcard is not None or pays:
         if table not in _planes:
             _planes[table] = BitPlanes.build(table.values, table.offsets)
         planes = _planes[table]
@@ -182,11 +189,3 @@ def distances(
         dtype=np.float32,
     )
     return result
-
-
-def _kernel_pays(queries: int, table: SequenceTable) -> bool:
-    """Whether the kernel saves more time than it takes to load; not for a single query."""
-    repeated = table in _searched_tables
-    _searched_tables.add(table)
-    values = len(table.values)
-    return queries * values >= _VALUES_OF_LOADING or (repeated and values >= _LARGE_TABLE_VALUES)

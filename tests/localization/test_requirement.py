@@ -1,9 +1,9 @@
+"""Requirements on the objects that a cell sees."""
+
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,29 +14,11 @@ from sentences import refused
 
 from semsig_gis.core import WILDCARD, InputError, UnknownNameError
 from semsig_gis.database import SequenceTable
-from semsig_gis.localization import DistanceMemo, Requirement
+from semsig_gis.localization import Requirement
 from semsig_gis.sources import paper_taxonomy
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from semsig_gis.core import SemsigError
-
-
-def test_distances_are_measured_once_and_the_time_is_told() -> None:
-    asked: list[str] = []
-
-    def measure(name: str) -> NDArray[np.float32]:
-        asked.append(name)
-        time.sleep(0.01)
-        return np.array([len(asked)], np.float32)
-
-    memo = DistanceMemo()
-    found = [float(memo.get(name, partial(measure, name))[0]) for name in "abaab"]
-    assert found == [1.0, 2.0, 1.0, 1.0, 2.0]
-    assert asked == ["a", "b"]
-    # Three times a distance was known that takes a hundredth of a second to measure.
-    assert memo.spared >= 0.03
 
 
 PAPER = paper_taxonomy()
@@ -50,13 +32,13 @@ LIMIT = st.tuples(
 
 
 @given(ROWS, st.lists(LIMIT, max_size=3))
-def test_requirement_is_checked_as_if_cell_by_cell(
+def test_mask_equals_check_of_each_cell(
     rows: list[list[int]], limits: list[tuple[int, int, float]]
 ) -> None:
     expected = []
     for row in rows:
-        seen = Counter(row) | Counter({WILDCARD: len(row)})
-        expected.append(all(low <= seen[code] <= high for code, low, high in limits))
+        counts = Counter(row) | Counter({WILDCARD: len(row)})
+        expected.append(all(low <= counts[code] <= high for code, low, high in limits))
     flat = np.array([value for row in rows for value in row], np.uint8)
     table = SequenceTable.from_csr(flat, np.cumsum([0, *map(len, rows)]))
     assert Requirement(tuple(limits)).met(table).tolist() == expected
@@ -74,7 +56,7 @@ def test_requirement_is_checked_as_if_cell_by_cell(
         ("2B,B<=5,M", {1: (2, 5), 11: (1, math.inf)}),
     ],
 )
-def test_parse(text: str, limits: dict[int, tuple[int, float]]) -> None:
+def test_requirement_is_parsed(text: str, limits: dict[int, tuple[int, float]]) -> None:
     read = Requirement.parse(text, PAPER).limits
     assert {code: (low, high) for code, low, high in read} == limits
 
@@ -88,6 +70,6 @@ def test_parse(text: str, limits: dict[int, tuple[int, float]]) -> None:
         (UnknownNameError, "Z", "'Z'"),
     ],
 )
-def test_text_that_is_no_requirement(kind: type[SemsigError], text: str, words: str) -> None:
+def test_invalid_text_is_refused(kind: type[SemsigError], text: str, words: str) -> None:
     with refused(kind, words):
         Requirement.parse(text, PAPER)
