@@ -1,22 +1,11 @@
-"""All commands."""
+"""All commands: importing this module registers them, in the order of the help."""
+
+from importlib import import_module
 
 from semsig_gis.cli.console import app
-
-# The order of these imports is that of the help.
-# isort: off
-from semsig_gis.cli import (  # noqa: F401
-    demo,
-    load,
-    build,
-    maps,
-    view,
-    localize,
-    route,
-    suggest,
-    serve,
-    learn,
-    evaluate,
-    export,
-)
+from semsig_gis.cli.run import MODULES
 
 __all__ = ["app"]
+
+for module in MODULES:
+    import_module(f"semsig_gis.cli.{module}")

@@ -24,7 +24,7 @@ from semsig_gis.cli.console import (
     remark,
     require_suffix,
     say,
-    tell_if_online,
+    warn_if_online,
 )
 from semsig_gis.cli.maps import draw_ground
 from semsig_gis.cli.options import (
@@ -272,7 +272,7 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
             else:
                 map_ = localization_map(answer, city.database)
             draw_ground(map_, city)
-            tell_if_online(save_map(map_, options.map_))
+            warn_if_online(save_map(map_, options.map_))
     result = answer.to_dict()
     if options.out is not None:
         searched = _write(options, options.out, city, answer, locator)

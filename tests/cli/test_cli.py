@@ -377,7 +377,7 @@ def test_what_lies_beside_a_database_is_told_and_removed(city: Path, done: Done)
     told = json.loads(done("clean city.parquet --json"))
     assert (told["dry_run"], told["bytes"], told["removed"]) == (False, 300_000, beside[1:])
     assert not old.exists()
-    assert "nothing to remove beside city.parquet" in done("clean city.parquet")
+    assert "nothing to remove next to city.parquet" in done("clean city.parquet")
     assert "street objects" in done("clean city.parquet --objects")
     assert not (city / "city.objects").exists()
 
