@@ -55,6 +55,7 @@ lint: $(DEV) ## style, types, import layers, dead code, spelling, dependencies, 
 	$(BIN)/numpydoc lint $$(find semsig_gis -name '*.py')
 	$(BIN)/vulture
 	$(BIN)/codespell
+	.ci/words/check $(BIN)
 	$(BIN)/deptry semsig_gis
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml

@@ -45,8 +45,7 @@ from .likelihood.explain import VERDICTS as VERDICTS
 from .likelihood.explain import Explanation as Explanation
 from .likelihood.explain import explain as explain
 from .likelihood.explain import explain_cell as explain_cell
-from .likelihood.incremental import TurnMemo as TurnMemo
-from .likelihood.index import TURNS as TURNS
+from .likelihood.incremental import IncrementalIndex as IncrementalIndex
 from .likelihood.index import CellScores as CellScores
 from .likelihood.index import LikelihoodIndex as LikelihoodIndex
 from .likelihood.index import build_index as build_index
@@ -57,7 +56,7 @@ from .likelihood.locate import Location as Location
 from .likelihood.locate import locate as locate
 from .likelihood.locate import locate_route as locate_route
 from .likelihood.method import LikelihoodMethod as LikelihoodMethod
-from .likelihood.off_centre import views_aside as views_aside
+from .likelihood.off_centre import visible_objects_off_centre as visible_objects_off_centre
 from .likelihood.photo import PhotoTable as PhotoTable
 from .likelihood.photo import photo_loglik as photo_loglik
 from .likelihood.posterior import KEPT as KEPT
@@ -75,6 +74,7 @@ from .likelihood.priors import weight_prior as weight_prior
 from .likelihood.route import LOST as LOST
 from .likelihood.route import moved_chances as moved_chances
 from .likelihood.route import route_posteriors as route_posteriors
+from .likelihood.turns import TURNS as TURNS
 from .locator import AnyMethod as AnyMethod
 from .locator import Locator as Locator
 from .locator import localize as localize

@@ -30,9 +30,9 @@ from semsig_gis.evaluation import CitySights, Sight, SimulatedDetector, prepare_
 from semsig_gis.exports import export_answer
 from semsig_gis.localization import (
     NOISES,
+    IncrementalIndex,
     KnownPosition,
     LikelihoodMethod,
-    TurnMemo,
     make_locator,
     method_index,
     next_questions,
@@ -121,7 +121,7 @@ class Workbench:
     _indexes: dict[tuple[str, str], LikelihoodIndex] = field(default_factory=dict)
     _last: tuple[object, tuple[Location, ...]] | None = None
     _scores: dict[str, CellScores] = field(default_factory=dict)
-    _memo: TurnMemo = field(default_factory=TurnMemo)
+    _incremental: IncrementalIndex | None = None
 
     @property
     def database(self) -> SignatureDatabase:
@@ -361,15 +361,18 @@ class Workbench:
 
     def _locator(self, question: Question) -> LikelihoodLocator:
         """Return the locator for a question."""
+        index = self._index(question)
+        if self._incremental is None or self._incremental.index is not index:
+            self._incremental = IncrementalIndex(index)
         locator = make_locator(
             self.database,
             self._method(question),
-            index=self._index(question),
+            index=index,
             store=self.store,
             top=question.top,
             explained=question.top,
         )
-        locator = replace(locator, memo=self._memo)
+        locator = replace(locator, incremental=self._incremental)
         if self._is_quick(question):
             locator = replace(locator, refined=False, quick=True, explained=QUICKLY_EXPLAINED)
         if question.near is not None:

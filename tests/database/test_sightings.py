@@ -29,7 +29,7 @@ from semsig_gis.database import (
     visible_objects_at,
     visible_objects_in,
 )
-from semsig_gis.localization import views_aside
+from semsig_gis.localization import visible_objects_off_centre
 
 if TYPE_CHECKING:
     from semsig_gis.database import ViewpointMode
@@ -191,7 +191,7 @@ def test_cells_tell_what_is_seen_between_their_middles() -> None:
     assert len(cells) > 20
     index = ObjectIndex(objects.xy)
     places = np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 2.0], [0.0, -4.0]])
-    seen = views_aside(database, cells, places)
+    seen = visible_objects_off_centre(database, cells, places)
     assert len(seen) == len(places) * len(cells)
     for number, place in enumerate(places):
         views = np.arange(number, len(seen), len(places))

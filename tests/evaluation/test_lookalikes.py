@@ -143,7 +143,9 @@ def test_rise_without_a_class_agrees_with_a_plain_loop(
     length = np.minimum(database.lengths, len(table.missed) - 1)[owner]
     kinds, far = table.row_of[database.codes], database.distance_units
     detected = table.detected[length, kinds]
-    missed = np.log1p(-detected * table.seen[kinds, far]) - detected * table.left[kinds, far]
+    missed = (
+        np.log1p(-detected * table.remaining[kinds, far]) - detected * table.leaving[kinds, far]
+    )
     for cell in range(0, len(database), 13):
         beyond = distances_from(index, cell) > radius
         sums = []
@@ -332,8 +334,8 @@ def test_columns_agree_with_the_noise_table(noise: NoiseSpec, seed: int, cells: 
     owner = np.repeat(np.arange(cells), database.lengths)
     length = np.minimum(database.lengths, len(table.missed) - 1)[owner]
     detected, far = table.detected[length, kinds], database.distance_units
-    chance = detected * table.seen[kinds, far]
-    density = chance / (1.0 - chance) * inside + detected * table.left[kinds, far] / 360.0
+    chance = detected * table.remaining[kinds, far]
+    density = chance / (1.0 - chance) * inside + detected * table.leaving[kinds, far] / 360.0
     density *= table.named[length, kinds, name]
     expected = np.log1p(np.bincount(owner, density, cells) / table.density[name])
     # A byte holds at most 255 steps; standard deviations are rounded to levels if they differ.

@@ -35,7 +35,7 @@ def signature_of(line: QueryLine) -> Signature:
 
 
 @given(ROWS)
-def test_json_lines_and_csv_say_the_same(
+def test_json_lines_and_csv_give_same_queries(
     tmp_path_factory: pytest.TempPathFactory, rows: list[list[tuple[str, int]]]
 ) -> None:
     folder = tmp_path_factory.mktemp("queries")
@@ -48,15 +48,17 @@ def test_json_lines_and_csv_say_the_same(
     table = folder / "queries.csv"
     text = [f"{q['id']},{q['types']},{' '.join(map(str, q['bearings']))}" for q in plain]
     table.write_text("\ufeffid,types,bearings\n" + "\n".join(text))
-    one, other = (list(read_queries(path, taxonomy=TAXONOMY)) for path in (lines, table))
-    assert [line.name for line in one] == [line.name for line in other] == [q["id"] for q in plain]
-    for line, same, row in zip(one, other, rows, strict=True):
+    first, second = (list(read_queries(path, taxonomy=TAXONOMY)) for path in (lines, table))
+    assert (
+        [line.name for line in first] == [line.name for line in second] == [q["id"] for q in plain]
+    )
+    for line, same, row in zip(first, second, rows, strict=True):
         codes, bearings = parts_of(signature_of(line))
         assert np.array_equal(parts_of(signature_of(same)), (codes, bearings))
         assert bearings.tolist() == sorted(b for _, b in row)
 
 
-def test_sentences_tell_of_what_has_no_direction_and_of_what_is_not_there() -> None:
+def test_sentences_with_unplaced_and_absent_objects() -> None:
     lines = [
         json.dumps({"see": text})
         for text in ("bench at 40, bus stop, lamp at 80", "no tree", "lamp, bench", "no lampe")
@@ -70,19 +72,19 @@ def test_sentences_tell_of_what_has_no_direction_and_of_what_is_not_there() -> N
     assert isinstance(slip.query, InputError)
 
 
-def test_a_part_may_be_missing_and_lines_are_numbered() -> None:
+def test_missing_parts_and_names_from_line_numbers() -> None:
     lines = ["", '{"types": "DB"}', '{"bearings": [5, 6]}', '{"types": ""}', '{"bearings": []}']
-    found = list(parse_queries(lines, "x", taxonomy=TAXONOMY))
-    assert [one.name for one in found] == [2, 3, 4, 5]
-    assert signature_of(found[0]).bearings is None
-    assert signature_of(found[1]).codes is None
-    assert [len(signature_of(one)) for one in found] == [2, 2, 0, 0]
+    result = list(parse_queries(lines, "x", taxonomy=TAXONOMY))
+    assert [line.name for line in result] == [2, 3, 4, 5]
+    assert signature_of(result[0]).bearings is None
+    assert signature_of(result[1]).codes is None
+    assert [len(signature_of(line)) for line in result] == [2, 2, 0, 0]
 
 
-def test_queries_are_read_when_they_are_needed() -> None:
+def test_queries_are_read_lazily() -> None:
     lines = iter([b'{"types": "D"}', b"{"])
-    found = parse_queries(lines, "x", taxonomy=TAXONOMY)
-    assert next(found).line == 1
+    result = parse_queries(lines, "x", taxonomy=TAXONOMY)
+    assert next(result).line == 1
     assert next(lines) == b"{"
 
 
@@ -99,28 +101,34 @@ BAD_LINES: list[tuple[str | bytes, str]] = [
 ]
 
 
-def test_a_bad_line_takes_no_other_with_it() -> None:
+def test_invalid_line_does_not_affect_others() -> None:
     lines: list[str | bytes] = []
     for text, _ in BAD_LINES:
         lines += [text, '{"types": "D"}']
-    found = list(parse_queries(lines, "these lines", taxonomy=TAXONOMY))
-    assert [one.line for one in found] == list(range(1, len(lines) + 1))
-    for number, (one, (_, word)) in enumerate(zip(found[::2], BAD_LINES, strict=True)):
-        assert isinstance(one.query, InputError)
-        assert_sentence(one.query, f"line {2 * number + 1} of these lines", word)
-    assert all(len(signature_of(one)) == 1 for one in found[1::2])
+    result = list(parse_queries(lines, "these lines", taxonomy=TAXONOMY))
+    assert [line.line for line in result] == list(range(1, len(lines) + 1))
+    for number, (line, (_, message)) in enumerate(zip(result[::2], BAD_LINES, strict=True)):
+        assert isinstance(line.query, InputError)
+        assert_sentence(line.query, f"line {2 * number + 1} of these lines", message)
+    assert all(len(signature_of(line)) == 1 for line in result[1::2])
 
 
-def test_a_bad_row_of_a_table_takes_no_other_with_it(tmp_path: Path) -> None:
+def test_invalid_row_of_table_does_not_affect_others(tmp_path: Path) -> None:
     rows = ["id,types", "a,D", f"b,{'D' * 200_000}", "c,Z", "d,", "e"]
     (tmp_path / "q.csv").write_text("\n".join(rows))
-    found = list(read_queries(tmp_path / "q.csv", taxonomy=TAXONOMY))
-    assert [one.line for one in found] == [2, 3, 4, 5, 6]
-    assert [one.name for one in found] == ["a", 3, "c", "d", "e"]
-    assert [isinstance(one.query, InputError) for one in found] == [False, True, True, False, True]
+    result = list(read_queries(tmp_path / "q.csv", taxonomy=TAXONOMY))
+    assert [line.line for line in result] == [2, 3, 4, 5, 6]
+    assert [line.name for line in result] == ["a", 3, "c", "d", "e"]
+    assert [isinstance(line.query, InputError) for line in result] == [
+        False,
+        True,
+        True,
+        False,
+        True,
+    ]
 
 
-def test_a_route_tells_the_way_from_view_to_view() -> None:
+def test_route_has_legs_between_views() -> None:
     lines = """
 {"id": "start", "types": "DB", "bearings": [10, 200]}
 {"dx": 3, "dy": -4, "sigma": 2}
@@ -132,13 +140,13 @@ def test_a_route_tells_the_way_from_view_to_view() -> None:
     assert legs == [Leg(dx=3.0, dy=-4.0, sigma=2.0), Leg.towards(90.0, 20.0, sigma=0.0)]
 
 
-def test_a_route_counts_its_bearings_from_the_north_of_its_views() -> None:
+def test_bearings_of_route_are_from_given_north() -> None:
     lines = ['{"types": "D"}', '{"types": "D", "bearing": 80, "distance": 20}']
     (leg,) = parse_route(lines, "x", taxonomy=TAXONOMY, north=North(name="true", turn=10.0))[1]
     assert (leg.dx, leg.dy) == pytest.approx((20.0, 0.0))
 
 
-def test_a_route_in_a_table(tmp_path: Path) -> None:
+def test_route_in_table_is_read(tmp_path: Path) -> None:
     (tmp_path / "route.csv").write_text("types,dx,dy\nDB,,\nD,0,5.5\n")
     views, legs = read_route(tmp_path / "route.csv", taxonomy=TAXONOMY)
     assert [name for name, _ in views] == [2, 3]
@@ -163,13 +171,13 @@ def test_a_route_in_a_table(tmp_path: Path) -> None:
         ('{"types": "D"}\n{"dx": 1, "dy": 2, "sigma": -1.0}', ["line 2", "-1.0"]),
     ],
 )
-def test_lines_of_a_route(text: str, words: list[str]) -> None:
+def test_invalid_lines_of_route_are_refused(text: str, words: list[str]) -> None:
     with refused(InputError, "these lines", *words):
         parse_route(text.split("\n"), "these lines", taxonomy=TAXONOMY)
 
 
 @pytest.mark.parametrize("read", [read_queries, read_route])
-def test_files_that_cannot_be_read(tmp_path: Path, read: Callable[..., object]) -> None:
+def test_unreadable_files_are_refused(tmp_path: Path, read: Callable[..., object]) -> None:
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
     for name in ("a.csv", "b.csv"):
         with refused(InputError, name, "cannot be read"):

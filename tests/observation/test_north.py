@@ -1,4 +1,4 @@
-"""What bearings count from: grid, true and magnetic north."""
+"""Grid, true and magnetic north of bearings."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ def moved(crs: str, x: float, y: float, step: float = 10.0) -> Any:  # noqa: ANN
 
 @pytest.mark.parametrize(
     ("lon", "lat", "day", "expected"),
-    [  # of the World Magnetic Model, which is another one
+    [  # from another model, the World Magnetic Model
         (24.94, 60.17, dt.date(2026, 11, 22), 10.49),
         (2.35, 48.86, dt.date(2020, 1, 1), 1.04),
         (-122.4, 37.8, dt.date(2025, 1, 1), 12.99),
     ],
 )
-def test_the_declination_of_the_reference_field(
+def test_declination_equals_world_magnetic_model(
     lon: float, lat: float, day: dt.date, expected: float
 ) -> None:
-    found = declination(np.array([lon]), np.array([lat]), day)
-    assert found == pytest.approx(expected, abs=0.05)
+    result = declination(np.array([lon]), np.array([lat]), day)
+    assert result == pytest.approx(expected, abs=0.05)
 
 
-def test_north_is_that_of_the_middle_of_the_city(tmp_path: Path) -> None:
+def test_north_is_that_of_middle_of_city(tmp_path: Path) -> None:
     # West of the middle of its zone, grid north lies west of true north.
     helsinki = moved("EPSG:32635", 386_000.0, 6_672_000.0)
     convergence = grid_convergence(helsinki.crs, helsinki.xy).mean()
@@ -65,7 +65,7 @@ def test_north_is_that_of_the_middle_of_the_city(tmp_path: Path) -> None:
         assert North.of("true", helsinki) == true
 
 
-def test_a_city_where_north_differs_is_told_of() -> None:
+def test_note_if_north_varies_within_city() -> None:
     narrow = moved("EPSG:32635", 386_000.0, 6_672_000.0)
     assert not North.of("true", narrow.crs, narrow.bounds).notes
     city = moved("EPSG:32635", 386_000.0, 6_672_000.0, step=5000.0)
@@ -75,7 +75,7 @@ def test_a_city_where_north_differs_is_told_of() -> None:
     assert localize(CITY, CITY.signature(CELL), north=wide, method=Method()).notes == (note,)
 
 
-def test_bearings_are_turned_and_told_in_their_north() -> None:
+def test_bearings_are_converted_from_and_to_their_north() -> None:
     north = North(name="magnetic", turn=12.0, date=DAY)
     codes, bearings = parts_of(CITY.signature(CELL))
     query = Signature(codes, bearings).turned(-12.0)
@@ -83,12 +83,17 @@ def test_bearings_are_turned_and_told_in_their_north() -> None:
     assert np.allclose(parts_of(north.to_grid(query))[1], bearings)
     index = build_index(CITY, named_noise("light"))
     plain = locate(index, Signature(codes, bearings), explained=1)
-    found = locate(index, query, north=north, explained=1)
-    assert np.allclose(found.chances, plain.chances)
-    told, expected = found.to_dict(), plain.to_dict()
-    assert told["north"] == {"name": "magnetic", "turn": 12.0, "spread": 0.0, "date": "2024-05-31"}
-    assert told["query"]["bearings"] == parts_of(query)[1].tolist()
-    rows, others = (one["candidates"][0]["explanation"]["rows"] for one in (told, expected))
+    answer = locate(index, query, north=north, explained=1)
+    assert np.allclose(answer.chances, plain.chances)
+    values, expected = answer.to_dict(), plain.to_dict()
+    assert values["north"] == {
+        "name": "magnetic",
+        "turn": 12.0,
+        "spread": 0.0,
+        "date": "2024-05-31",
+    }
+    assert values["query"]["bearings"] == parts_of(query)[1].tolist()
+    rows, others = (item["candidates"][0]["explanation"]["rows"] for item in (values, expected))
     for name in ("query_bearing", "object_bearing"):
         here, there = (
             np.array(sorted(row[name] for row in part if row[name] is not None))
@@ -98,21 +103,21 @@ def test_bearings_are_turned_and_told_in_their_north() -> None:
     ranked = localize(CITY, query, north=north, method=Method())
     assert ranked.candidates["cell"][0] == CELL
     assert ranked.candidates["distance"][0] == 0.0
-    # A view is turned with all that is known of it.
+    # The photos of a view are turned, too.
     photo = Photo.looking(heading=float(bearings[0]), fov=200)
     view = View.of(CITY.signature(CELL), ranges=np.full(len(codes), 12.0), photos=(photo,))
     here, there, other = (
-        answer.candidates["loglik"].to_numpy()
-        for answer in (locate(index, view), locate(index, view.turned(-12.0), north=north), plain)
+        item.candidates["loglik"].to_numpy()
+        for item in (locate(index, view), locate(index, view.turned(-12.0), north=north), plain)
     )
     assert np.allclose(here, there)
     assert not np.allclose(here, other)
-    # What was turned on purpose is found as a heading in the north of the query.
+    # The heading of the answer is relative to the north of the query.
     turned = locate(index, query.turned(-30.0), north=north, north_sigma=float("inf"))
     assert turned.estimate.heading == pytest.approx(30.0, abs=3.0)
 
 
-def test_what_is_no_north_is_refused() -> None:
+def test_invalid_norths_are_refused() -> None:
     with refused(UnknownNameError, "'tru'", "nearest is 'true'"):
         North.of("tru", CITY.crs, CITY.bounds)  # type: ignore[arg-type]
     with refused(InputError, "true north"):

@@ -1,4 +1,4 @@
-"""Views that are told in rows and in words."""
+"""Parse views from rows and sentences."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read(row: dict[str, Any], radius: float = 30.0) -> View:
     return parse_view(row, taxonomy=TAXONOMY, radius=radius)
 
 
-def told(row: dict[str, Any]) -> dict[str, Any]:
+def parsed(row: dict[str, Any]) -> dict[str, Any]:
     return read(row).to_dict(TAXONOMY)
 
 
@@ -71,8 +71,8 @@ SAME = """
 
 
 @pytest.mark.parametrize("rows", SAME.strip().split("\n\n"))
-def test_one_view_in_all_forms(rows: str) -> None:
-    first, *others = [told(json.loads(row)) for row in rows.replace("\n ", " ").split("\n")]
+def test_all_forms_give_same_view(rows: str) -> None:
+    first, *others = [parsed(json.loads(row)) for row in rows.replace("\n ", " ").split("\n")]
     assert others
     for other in others:
         assert other == first
@@ -81,11 +81,11 @@ def test_one_view_in_all_forms(rows: str) -> None:
 @pytest.mark.parametrize(
     "bearings", [[360, -10, -360], "360;-10;-360", "360, -10,-360", " 360 -10 -360 "]
 )
-def test_bearings_in_any_shape_and_beyond_the_circle(bearings: object) -> None:
-    assert told({"types": " DBL ", "bearings": bearings})["bearings"] == [0.0, 0.0, 350.0]
+def test_bearings_in_all_forms_and_beyond_full_turn(bearings: object) -> None:
+    assert parsed({"types": " DBL ", "bearings": bearings})["bearings"] == [0.0, 0.0, 350.0]
 
 
-def test_without_a_heading_the_north_of_offsets_is_not_known() -> None:
+def test_offsets_without_heading_have_unknown_north() -> None:
     view = read({"see": "bench 20 left, lamp 10 right", "fov": 70})
     assert view.bearings is not None
     assert view.bearings.tolist() == [10.0, 340.0]
@@ -93,10 +93,10 @@ def test_without_a_heading_the_north_of_offsets_is_not_known() -> None:
     assert view.photos[0].sees(view.bearings).all()
 
 
-def test_likeliest_class_stands_for_scores() -> None:
+def test_types_are_likeliest_classes_of_scores() -> None:
     rows = [{"lamp": 0.4, "bench": 0.3}, {"lamp": 0.3}, {"lamp": 0.5}, {}]
     items = [{"class": scores, "bearing": 10} for scores in rows]
-    assert told({"detections": items})["types"] == "D?D?"
+    assert parsed({"detections": items})["types"] == "D?D?"
 
 
 WORDS = {
@@ -108,7 +108,7 @@ WORDS = {
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_words_stand_for_what_lies_anywhere_in_a_ring(word: str) -> None:
+def test_words_give_mean_and_error_of_uniform_ring(word: str) -> None:
     low, high = WORDS[word]
     rng = np.random.default_rng(0)
     logs = np.log(np.sqrt(rng.uniform(low**2, high**2, 200_000)))
@@ -119,7 +119,7 @@ def test_words_stand_for_what_lies_anywhere_in_a_ring(word: str) -> None:
     assert view.range_errors[0] == pytest.approx(math.hypot(logs.std(), GUESS_ERROR), rel=0.01)
 
 
-def test_near_and_far_go_by_the_range_of_the_class() -> None:
+def test_far_depends_on_range_of_class() -> None:
     row = {"types": "DF?", "bearings": [1, 2, 3], "ranges": "far,far,far"}
     ranges = read(row, radius=60.0).ranges
     assert ranges is not None
@@ -128,14 +128,14 @@ def test_near_and_far_go_by_the_range_of_the_class() -> None:
     assert 40.0 < ranges[0] < 60.0
 
 
-def test_an_error_that_is_told_goes_before_that_of_a_word() -> None:
+def test_given_error_has_priority_over_error_of_word() -> None:
     row = {"types": "DDD", "bearings": [1, 2, 3], "ranges": ["near", "far", 5]}
     errors = read(row | {"range_errors": [0.1, None, None]}).range_errors
     assert errors is not None
     assert errors[0] == 0.1
     assert errors[1] > GUESS_ERROR
     assert math.isnan(errors[2])
-    assert told(row | {"range_errors": 0.3})["range_errors"] == [0.3] * 3
+    assert parsed(row | {"range_errors": 0.3})["range_errors"] == [0.3] * 3
 
 
 NUMBERS = st.floats(0.5, 100.0)
@@ -158,7 +158,7 @@ LOOKS: st.SearchStrategy[dict[str, Any]] = st.one_of(
     st.fixed_dictionaries({"sectors": st.lists(PAIRS, max_size=3)}),
 )
 PHOTOS = st.builds(
-    lambda seen, look, error: {"detections": seen} | look | error,
+    lambda detections, look, error: {"detections": detections} | look | error,
     DETECTIONS,
     LOOKS,
     st.sampled_from([{}, {"heading_error": 10}, {"heading_error": "unknown"}]),
@@ -166,10 +166,10 @@ PHOTOS = st.builds(
 
 
 @given(st.lists(PHOTOS, min_size=1, max_size=3))
-def test_what_was_read_can_be_written_and_read(photos: list[dict[str, Any]]) -> None:
+def test_view_is_written_and_parsed_again(photos: list[dict[str, Any]]) -> None:
     row = {"photos": photos} if len(photos) > 1 else photos[0]
-    once = told(row)
-    assert told(json.loads(json.dumps(once))) == once
+    once = parsed(row)
+    assert parsed(json.loads(json.dumps(once))) == once
     assert once["length"] == sum(len(photo["detections"]) for photo in photos)
 
 
@@ -225,6 +225,6 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("row", "words"), REFUSED, ids=range(len(REFUSED)))
-def test_what_cannot_be_used_is_told(row: dict[str, Any], words: str) -> None:
+def test_invalid_rows_are_refused(row: dict[str, Any], words: str) -> None:
     with refused(SemsigError, words):
         read(row)

@@ -24,24 +24,24 @@ def _width(low: float, high: float) -> float:
     return high - low if 0 < high - low <= 360.0 else (high - low) % 360.0
 
 
-SECTORS = st.tuples(ANGLES, ANGLES).filter(lambda one: _width(*one) > 0)
+SECTORS = st.tuples(ANGLES, ANGLES).filter(lambda sector: _width(*sector) > 0)
 
 
 @given(st.lists(SECTORS, max_size=5))
-def test_a_photo_sees_what_any_of_its_sectors_sees(sectors: list[tuple[float, float]]) -> None:
+def test_photo_sees_bearings_of_all_sectors(sectors: list[tuple[float, float]]) -> None:
     photo = Photo(sectors=tuple(sectors))
     bearings = np.arange(0.5, 360.0, 7.3)
-    seen = np.full(len(bearings), not sectors)
+    inside = np.full(len(bearings), not sectors)
     rounded = np.zeros(len(bearings), bool)
     for low, high in sectors:
         beyond = (bearings - low) % 360.0 - _width(low, high)
-        seen |= beyond <= 0
+        inside |= beyond <= 0
         rounded |= np.abs(beyond) < 1e-6
-    assert (photo.sees(bearings) == seen)[~rounded].all()
+    assert (photo.sees(bearings) == inside)[~rounded].all()
     assert 0 < photo.width <= 360.0
 
 
-def test_turning_a_view_turns_its_photos() -> None:
+def test_turned_view_has_turned_photos() -> None:
     view = View.of(
         Signature(np.array([3, 1], np.uint8), np.array([10.0, 350.0])),
         ranges=np.array([5.0, math.nan]),
@@ -58,7 +58,7 @@ def test_turning_a_view_turns_its_photos() -> None:
     assert turned.photos[0].sees(turned.bearings).all()
 
 
-def test_joined_views_come_apart_again() -> None:
+def test_joined_views_are_split_again() -> None:
     first = View.of(
         Signature(np.array([3], np.uint8), np.array([10.0])),
         photos=(Photo.looking(heading=0, fov=40, north_sigma=5.0),),
@@ -86,7 +86,7 @@ def test_joined_views_come_apart_again() -> None:
         ({"photos": ()}, "a view of no photo"),
     ],
 )
-def test_parts_that_do_not_fit_are_refused(more: dict[str, object], words: str) -> None:
+def test_arrays_that_do_not_fit_are_refused(more: dict[str, object], words: str) -> None:
     lamp = Signature(np.array([3], np.uint8), np.array([80.0]))
     with refused(InputError, words):
         View.of(lamp, **more)

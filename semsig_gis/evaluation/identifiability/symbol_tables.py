@@ -129,8 +129,8 @@ def symbol_columns(
     kinds, distances = table.row_of[database.codes], database.distance_units
     detected = table.detected[table.length_rows(database.lengths)[owners], kinds]
     chances, leaving = (
-        detected * table.seen[kinds, distances],
-        detected * table.left[kinds, distances],
+        detected * table.remaining[kinds, distances],
+        detected * table.leaving[kinds, distances],
     )
     spread_of, spread = _spreads(database, table)
     bins, units = np.divmod(database.bearing_units, BIN_UNITS)

@@ -185,7 +185,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
 ) -> tuple[float, ...]:
     """Return the outcome of one query, in the order of `Trials`."""
     loglik = rerank(
-        index, query, scores, count=RERANKED, aside=False, sample=RERANKED_SAMPLE
+        index, query, scores, count=RERANKED, off_centre=False, sample=RERANKED_SAMPLE
     ).loglik
     possible = loglik > loglik.max() - HOPELESS
     possible[cell] = True

@@ -213,12 +213,12 @@ def associate(
     spreads = np.minimum(spreads, HALF_TURN)
     inside, squares = seen.inside(owners, views.bearings, spreads)
     near = table.detected[rows[owners], kinds]
-    detection = near * table.seen[kinds, units]
+    detection = near * table.remaining[kinds, units]
     unseen = 1.0 - detection * inside
     used, row = np.unique(rows, return_inverse=True)
     named = table.named[used] @ seen.scores
     # As many objects come into range as leave it, in any direction.
-    leaving = near * table.left[kinds, units]
+    leaving = near * table.leaving[kinds, units]
     gone = np.zeros((len(views), len(table.codes)))
     np.add.at(gone, (owners, kinds), leaving)
     names = named[row[seen.givers], :, np.arange(len(seen.givers))]
@@ -355,7 +355,7 @@ def rerank(
     north_sigma: float = 0.0,
     log_prior: NDArray[np.float64] | None = None,
     count: int = RERANKED,
-    aside: bool = True,
+    off_centre: bool = True,
     sample: int = SAMPLE,
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
@@ -373,8 +373,8 @@ def rerank(
     if view.bearings is None:
         return scores
     loglik = scores.loglik.astype(np.float64)
-    if aside and len(index.stands[1]) > 1:
-        scorer = index.scorer_aside(view, north_sigma=north_sigma)
+    if off_centre and len(index.observer_offsets[1]) > 1:
+        scorer = index.off_centre_scorer(view, north_sigma=north_sigma)
         loglik, _, _ = _replaced(
             lambda some: (scorer(some), []),
             loglik,
@@ -384,12 +384,14 @@ def rerank(
             sample=SAMPLE_ASIDE,
         )
     loglik, cells, turns = _replaced(
-        partial(_aligned, index, view, scores=scores, north_sigma=north_sigma, aside=aside),
+        partial(
+            _aligned, index, view, scores=scores, north_sigma=north_sigma, off_centre=off_centre
+        ),
         loglik,
         log_prior,
         count=count,
         first=FIRST,
-        sample=sample // (len(index.stands[1]) if aside else 1),
+        sample=sample // (len(index.observer_offsets[1]) if off_centre else 1),
     )
     headings = []
     for before, turn in zip(scores.headings, turns, strict=True):
@@ -484,15 +486,15 @@ def _aligned(
     *,
     scores: CellScores,
     north_sigma: float,
-    aside: bool,
+    off_centre: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
-    from semsig_gis.localization.likelihood.off_centre import views_aside  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba loads slowly
 
-    models, places = index.stands if aside else (index.models, np.zeros((1, 2)))
+    models, places = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
     seen = (
-        views_aside(index.database, cells, places)
-        if aside
+        visible_objects_off_centre(index.database, cells, places)
+        if off_centre
         else visible_objects_in(index.database, cells)
     )
     total, likeliest = np.zeros((len(cells), len(places))), []

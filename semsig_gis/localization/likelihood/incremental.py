@@ -1,51 +1,70 @@
-"""Photos whose objects are given one by one: each answer continues from the last one."""
+"""Views that grow object by object: each answer continues from the last one."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semsig_gis.localization.likelihood.index import turn_scores
+from semsig_gis.localization.likelihood.index import photo_scorer
+from semsig_gis.localization.likelihood.turns import TurnScores
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.localization.likelihood.index import LikelihoodIndex, TurnScores
+    from semsig_gis.core import Signature
+    from semsig_gis.localization.likelihood.index import CellScores, LikelihoodIndex
     from semsig_gis.observation import Sector, View
 
-    _Setting = tuple[LikelihoodIndex, tuple[Sector, ...], float]
+    _Setting = tuple[tuple[Sector, ...], float]
 
 MOST_BYTES = 2**28
-"""Of what is kept of two photos: half a million cells."""
+"""Memory for the scores of two photos: half a million cells."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Photo:
-    """What is known of a photo: an index, sectors and north; its objects, and their scores."""
+class _ScoredPhoto:
+    """The sectors and the north of a photo, its objects, and their scores by turn."""
 
     setting: _Setting
     objects: Counter[bytes]
-    turned: TurnScores
+    scores: TurnScores
 
 
-class TurnMemo:
-    """What is kept of the last photos whose north is not known, for when more objects are added."""
+@dataclass(eq=False)
+class IncrementalIndex:
+    """An index that remembers the scores of the last photos of uncertain north.
 
-    def __init__(self) -> None:
-        self._photos: list[_Photo] = []
+    Of a photo that has gained objects since, only these are scored.
+    """
 
-    def scores(
-        self, index: LikelihoodIndex, photo: View, north_sigma: float
+    index: LikelihoodIndex
+    _photos: list[_ScoredPhoto] = field(default_factory=list, init=False)
+
+    def scores(self, query: Signature, *, north_sigma: float = 0.0) -> CellScores:
+        """Return the scores of all cells, as `LikelihoodIndex.scores`."""
+        return self.index.scores_by_photo(query, north_sigma, self._score_photo)
+
+    def _score_photo(
+        self, photo: View, north_sigma: float
     ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
         """Return the scores of a photo in every cell, and its likeliest turns there."""
-        setting = index, photo.photos[0].sectors, north_sigma
-        marks = [_object(photo, row) for row in range(len(photo))]
+        index = self.index
+        if north_sigma == 0.0:
+            return photo_scorer(photo, index.levels, 0.0)(index.objects)
+        setting = photo.photos[0].sectors, north_sigma
+        values = (photo.codes, photo.bearings, photo.ranges, photo.range_errors, photo.scores)
+        marks = [
+            b"|".join(b"" if value is None else value[row].tobytes() for value in values)
+            for row in range(len(photo))
+        ]
         objects = Counter(marks)
-        less = [one for one in self._photos if one.setting == setting and one.objects <= objects]
-        before = max(less, key=lambda one: one.objects.total(), default=None)
+        # Continue from the largest part of this photo; the other photos make room for its scores.
+        same = [old for old in self._photos if old.setting == setting]
+        parts = [old for old in same if old.objects <= objects]
+        before = max(parts, key=lambda old: old.objects.total(), default=None)
         rest = Counter[bytes]() if before is None else before.objects.copy()
         rows = []
         for row, mark in enumerate(marks):
@@ -53,27 +72,19 @@ class TurnMemo:
                 rest[mark] -= 1
             else:
                 rows.append(row)
-        # What is not gone on from makes room.
-        self._photos, others = (
-            [one for one in self._photos if (one is before) == kept] for kept in (True, False)
-        )
-        after = turn_scores(0, north_sigma)
-        room = [one.turned for one in others if one.setting == setting]
-        size = len(index.database)
+        self._photos = [] if before is None else [before]
+        size, after = len(index.database), TurnScores.empty(0, north_sigma)
         if 2 * size * after.shares.shape[1] * after.shares.itemsize <= MOST_BYTES:
-            after = room[0] if room else turn_scores(size, north_sigma)
-        scores = index.turned(
+            room = [old.scores for old in same if old is not before]
+            after = room[0] if room else TurnScores.empty(size, north_sigma)
+        scorer = photo_scorer(
             photo.select(np.array(rows, np.int64)),
+            index.levels,
             north_sigma,
-            before=None if before is None else before.turned,
+            before=None if before is None else before.scores,
             after=after,
         )
+        scores = scorer(index.objects)
         if len(after.logs):
-            self._photos.append(_Photo(setting, objects, after))
+            self._photos.append(_ScoredPhoto(setting, objects, after))
         return scores
-
-
-def _object(photo: View, row: int) -> bytes:
-    """Return all that is known of an object of a photo."""
-    values = (photo.codes, photo.bearings, photo.ranges, photo.range_errors, photo.scores)
-    return b"|".join(b"" if one is None else one[row].tobytes() for one in values)

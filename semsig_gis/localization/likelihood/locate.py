@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.answer_rule import AnswerRule, Decision
     from semsig_gis.localization.likelihood.estimate import PlaceEstimate
     from semsig_gis.localization.likelihood.explain import Explanation
-    from semsig_gis.localization.likelihood.incremental import TurnMemo
+    from semsig_gis.localization.likelihood.incremental import IncrementalIndex
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
     from semsig_gis.localization.likelihood.posterior import Refinement
     from semsig_gis.observation import Leg, North
@@ -206,7 +206,8 @@ class LikelihoodLocator:
 
     A place is also refined if `refined` is None and there are a store and bearings. A `quick`
     answer looks at cells only from their centres, looks closely at fewer of them, and gives no
-    heading of the place. A `memo` is for a view that grows from query to query.
+    heading of the place. An `incremental` index, of `index`, is for a
+    view that grows from query to query.
     """
 
     index: LikelihoodIndex
@@ -220,7 +221,7 @@ class LikelihoodLocator:
     known: Mapping[str, Any] = field(default_factory=dict)
     north: North = GRID_NORTH
     quick: bool = False
-    memo: TurnMemo | None = None
+    incremental: IncrementalIndex | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
         check_top(self.top)
@@ -311,8 +312,8 @@ class LikelihoodLocator:
 
     def scan(self, query: Signature) -> CellScores:
         """Return the scores of all cells by the sum over detections, one by one."""
-        view = self._known(query)
-        return self.index.scores(view, north_sigma=self.north_sigma, memo=self.memo)
+        index = self.incremental or self.index
+        return index.scores(self._known(query), north_sigma=self.north_sigma)
 
     def scores(
         self,
@@ -328,7 +329,7 @@ class LikelihoodLocator:
             scanned or self.scan(query),
             north_sigma=self.north_sigma,
             log_prior=log_prior,
-            aside=not self.quick,
+            off_centre=not self.quick,
             sample=QUICK_SAMPLE if self.quick else SAMPLE,
         )
 

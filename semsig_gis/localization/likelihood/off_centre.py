@@ -1,9 +1,9 @@
-"""What is seen from places beside the centres of cells, computed only from the cells."""
+"""The objects seen from points off the centres of cells, computed only from the cells."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,54 +15,71 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
 
-CELLS_A_PART = 64  # that are worth a thread
-# The cells around a cell, at 3 * (columns + 1) + (rows + 1).
-AROUND = tuple((aside, up) for aside in (-1, 0, 1) for up in (-1, 0, 1))
+CELLS_A_THREAD = 64  # the fewest cells that are worth a thread
+# The cell itself and its neighbours, as steps east and north: number 3 * (east + 1) + (north + 1).
+AROUND = tuple((east, north) for east in (-1, 0, 1) for north in (-1, 0, 1))
 OWN = AROUND.index((0, 0))
-FIRST_ROOM = 4096  # entries
-TINY = 1e-300  # an object at exactly the place counts as north of it
+FIRST_ROOM = 4096  # objects
+TINY = 1e-300  # avoids a division by 0: an object at exactly the point counts as north of it
 
 
-def views_aside(
-    database: SignatureDatabase, cells: NDArray[np.int64], places: NDArray[np.float64]
-) -> VisibleObjects:
-    """Return what is seen from places beside the centres of some cells, using only the cells.
+class _CellObjects(NamedTuple):
+    """The objects of all cells in units of the database, and what these units are.
 
-    The places, shape (p, 2), are metres to the east and north of the centre and less than a cell
-    away; that of cell i and place j is view ``i * len(places) + j``. Objects that come into range
-    there are taken from the neighbouring cells on that side. If one of these cells is missing,
-    objects that have left the range are kept, at their distance.
+    `ranges` is by class code, `metres` by distance unit, `east` and `north` of a metre by bearing
+    unit. `step` is the side of a cell in metres.
     """
+
+    offsets: NDArray[np.int64]
+    codes: NDArray[np.uint8]
+    bearing_units: NDArray[np.uint16]
+    distance_units: NDArray[np.uint8]
+    ranges: NDArray[np.float64]
+    metres: NDArray[np.float64]
+    east: NDArray[np.float64]
+    north: NDArray[np.float64]
+    step: float
+
+
+def visible_objects_off_centre(
+    database: SignatureDatabase, cells: NDArray[np.int64], points: NDArray[np.float64]
+) -> VisibleObjects:
+    """Return the views from points off the centres of some cells, computed only from the cells.
+
+    The points, shape (p, 2), are metres to the east and north of the centre, less than a cell; that
+    of cell i and point j is view ``i * len(points) + j``. Objects that come into range there are
+    taken from the neighbouring cells on that side. If one of these cells is missing, objects that
+    are out of range there are kept, at their distance.
+    """
+    # The row of each neighbour, -1 where there is none; the cells of a column follow each other.
     columns, rows = database.columns[cells].astype(np.int64), database.rows[cells].astype(np.int64)
     ids, around = database.cell_ids, np.full((len(cells), len(AROUND)), -1)
-    for aside in np.unique(np.append(np.sign(places[:, 0]), 0)).astype(np.int64).tolist():
-        number = np.searchsorted(ids, cell_ids(columns + aside, rows - 1))
-        for up in (-1, 0, 1):  # the cells of a column follow each other
-            there = ids[np.minimum(number, len(ids) - 1)] == cell_ids(columns + aside, rows + up)
-            around[there, AROUND.index((aside, up))] = number[there]
+    for east in np.unique(np.append(np.sign(points[:, 0]), 0)).astype(np.int64).tolist():
+        number = np.searchsorted(ids, cell_ids(columns + east, rows - 1))
+        for north in (-1, 0, 1):
+            there = ids[np.minimum(number, len(ids) - 1)] == cell_ids(columns + east, rows + north)
+            around[there, AROUND.index((east, north))] = number[there]
             number += there
     angles = np.radians((np.arange(BEARING_UNITS) + 0.5) * (FULL_TURN / BEARING_UNITS))
-    metre = database.reach / DISTANCE_UNITS
+    objects = _CellObjects(
+        offsets=database.offsets,
+        codes=database.codes,
+        bearing_units=database.bearing_units,
+        distance_units=database.distance_units,
+        ranges=database.taxonomy.ranges(database.spec.radius),
+        # The nearest objects are not at exactly the point.
+        metres=np.maximum(np.arange(DISTANCE_UNITS + 1), 0.5) * (database.reach / DISTANCE_UNITS),
+        east=np.sin(angles),
+        north=np.cos(angles),
+        step=float(database.grid.step),
+    )
+    points = np.ascontiguousarray(points, dtype=np.float64)
     parts = {}
 
-    def look(part: NDArray[np.int64]) -> None:
-        parts[int(part[0])] = _look(
-            part,
-            around,
-            np.ascontiguousarray(places, dtype=np.float64),
-            float(database.grid.step),
-            database.offsets,
-            database.codes,
-            database.bearing_units,
-            database.distance_units,
-            database.taxonomy.ranges(database.spec.radius),
-            # The nearest objects are not at exactly the place.
-            np.maximum(np.arange(DISTANCE_UNITS + 1), 0.5) * metre,
-            np.sin(angles),
-            np.cos(angles),
-        )
+    def view_part(part: NDArray[np.int64]) -> None:
+        parts[int(part[0])] = _objects_from_points(part, around, points, objects)
 
-    share_rows(look, len(cells), least=CELLS_A_PART)
+    share_rows(view_part, len(cells), least=CELLS_A_THREAD)
     lengths, codes, bearings, distances = (
         np.concatenate(values)
         for values in zip(*(parts[first] for first in sorted(parts)), strict=True)
@@ -78,12 +95,16 @@ def views_aside(
 
 @compiled
 def _longer(
-    codes: NDArray[np.uint8], turns: NDArray[np.float64], distances: NDArray[np.float64], size: int
+    codes: NDArray[np.uint8],
+    bearings: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    size: int,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the arrays with room for so many."""
+    """Return copies of the arrays with room for `size` objects."""
     more = np.empty(size, np.uint8), np.empty(size), np.empty(size)
-    for one in range(len(codes)):
-        more[0][one], more[1][one], more[2][one] = codes[one], turns[one], distances[one]
+    for place in range(len(codes)):
+        more[0][place], more[1][place] = codes[place], bearings[place]
+        more[2][place] = distances[place]
     return more
 
 
@@ -91,13 +112,14 @@ def _longer(
 def _polar(east: NDArray[np.float64], north: NDArray[np.float64]) -> None:
     """Turn metres to the east and north into bearings in degrees and distances, in place.
 
-    The arc tangent is right to 2e-8 (Abramowitz and Stegun, 4.4.49), and many are taken at once.
+    The arc tangent has an error of 2e-8 (Abramowitz and Stegun, 4.4.49), and the loop vectorizes.
     """
-    for one in range(len(east)):
-        x, y = east[one], north[one]
+    for place in range(len(east)):
+        x, y = east[place], north[place]
         wide, high = abs(x), abs(y)
-        part = min(wide, high) / max(wide, high, TINY)
-        square = part * part
+        # The polynomial is for the first eighth of a turn; the others follow by symmetry.
+        ratio = min(wide, high) / max(wide, high, TINY)
+        square = ratio * ratio
         angle = 0.0028662257
         for factor in (
             -0.0161657367,
@@ -110,53 +132,51 @@ def _polar(east: NDArray[np.float64], north: NDArray[np.float64]) -> None:
             1.0,
         ):
             angle = angle * square + factor
-        angle *= part * (180.0 / math.pi)
+        angle *= ratio * (180.0 / math.pi)
         angle = 90.0 - angle if wide > high else angle
         angle = 180.0 - angle if y < 0.0 else angle
         angle = FULL_TURN - angle if x < 0.0 else angle
-        east[one] = angle if angle < FULL_TURN else 0.0
-        north[one] = math.sqrt(x * x + y * y)
+        east[place] = angle if angle < FULL_TURN else 0.0
+        north[place] = math.sqrt(x * x + y * y)
 
 
 @compiled
-def _look(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
+def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one function
     part: NDArray[np.int64],
     around: NDArray[np.int64],
-    places: NDArray[np.float64],
-    step: float,
-    offsets: NDArray[np.int64],
-    codes: NDArray[np.uint8],
-    bearing_units: NDArray[np.uint16],
-    distance_units: NDArray[np.uint8],
-    ranges: NDArray[np.float64],
-    metres: NDArray[np.float64],
-    east: NDArray[np.float64],
-    north: NDArray[np.float64],
+    points: NDArray[np.float64],
+    objects: _CellObjects,
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
-    """Look around at all places of the cells ``part[0]`` to ``part[1] - 1``.
+    """Return the views from all points of the cells ``part[0]`` to ``part[1] - 1``.
 
-    `around` has the rows of the cells around each, -1 where there is none. `metres` is by distance
-    unit, `east` and `north` of a metre by bearing unit, `ranges` by class code. Returns how much is
-    seen from each place, and the class code, bearing in degrees and distance of all that is.
+    `around` has the rows of the cells around each, -1 where there is none. Returns the number of
+    objects by point, and the class code, bearing in degrees and distance of each object.
     """
-    here = np.empty(len(AROUND) + 1, np.int64)  # where the entries of each cell around start
-    most = 0  # without functions of numpy, which load slowly
+    offsets, codes, step = objects.offsets, objects.codes, objects.step
+    bearing_units, distance_units = objects.bearing_units, objects.distance_units
+    ranges, metres, east, north = objects.ranges, objects.metres, objects.east, objects.north
+    # Working memory for the cell with the most objects around, without functions of numpy, which
+    # load slowly.
+    most = 0
     for cell in range(part[0], part[1]):
         total = 0
         for row in around[cell]:
             if row >= 0:
                 total += offsets[row + 1] - offsets[row]
         most = max(most, total)
+    starts = np.empty(len(AROUND) + 1, np.int64)  # where the objects of each cell around start
     x, y, reach = np.empty(most), np.empty(most), np.empty(most)
     kinds = np.empty(most, np.uint8)
     sources = np.empty(4, np.int64)
-    lengths = np.empty((part[1] - part[0]) * len(places), np.int64)
-    seen, turns, distances = np.empty(0, np.uint8), np.empty(0), np.empty(0)
+    lengths = np.empty((part[1] - part[0]) * len(points), np.int64)
+    view_codes, bearings, distances = np.empty(0, np.uint8), np.empty(0), np.empty(0)
     view = at = 0
     for cell in range(part[0], part[1]):
+        # The objects of the cell and its neighbours, in metres from its centre. Those of neighbours
+        # that the cell itself sees are in its own list.
         size = 0
         for source in range(len(AROUND)):
-            here[source] = size
+            starts[source] = size
             row = around[cell, source]
             if row < 0:
                 continue
@@ -166,50 +186,52 @@ def _look(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no keywords
                 x[size], y[size] = metre * east[angle] + right, metre * north[angle] + above
                 kinds[size] = codes[entry]
                 reach[size] = ranges[codes[entry]] ** 2
-                # What the cell itself sees as well is there already.
                 if source == OWN or x[size] ** 2 + y[size] ** 2 > reach[size]:
                     size += 1
-        here[len(AROUND)] = size
-        if at + size * len(places) > len(seen):
-            room = 2 * len(seen) + size * len(places) + FIRST_ROOM
-            seen, turns, distances = _longer(seen, turns, distances, room)
-        for place in range(len(places)):
-            dx, dy = places[place, 0], places[place, 1]
-            aside, up = int(np.sign(dx)), int(np.sign(dy))
+        starts[len(AROUND)] = size
+        if at + size * len(points) > len(view_codes):
+            room = 2 * len(view_codes) + size * len(points) + FIRST_ROOM
+            view_codes, bearings, distances = _longer(view_codes, bearings, distances, room)
+        for point in range(len(points)):
+            # The cells that are needed: its own, and the neighbours on the side of the point.
+            dx, dy = points[point, 0], points[point, 1]
+            side_x, side_y = int(np.sign(dx)), int(np.sign(dy))
             sources[0] = OWN
             used = 1
-            if aside != 0:
-                sources[used] = OWN + 3 * aside
+            if side_x != 0:
+                sources[used] = OWN + 3 * side_x
                 used += 1
-            if up != 0:
-                sources[used] = OWN + up
+            if side_y != 0:
+                sources[used] = OWN + side_y
                 used += 1
-            if aside != 0 and up != 0:
-                sources[used] = OWN + 3 * aside + up
+            if side_x != 0 and side_y != 0:
+                sources[used] = OWN + 3 * side_x + side_y
                 used += 1
             whole = used > 1
-            for one in range(used):
-                whole &= around[cell, sources[one]] >= 0
+            for number in range(used):
+                whole &= around[cell, sources[number]] >= 0
+            # The objects in range of the point; without all neighbours, all objects of the cell.
             first = at
-            for one in range(used):
-                kept = one == 0 and not whole
-                for entry in range(here[sources[one]], here[sources[one] + 1]):
+            for number in range(used):
+                any_distance = number == 0 and not whole
+                for entry in range(starts[sources[number]], starts[sources[number] + 1]):
                     away_x, away_y = x[entry] - dx, y[entry] - dy
                     away = away_x**2 + away_y**2
-                    if away > reach[entry] and not kept:
+                    if away > reach[entry] and not any_distance:
                         continue
+                    # An object that an earlier neighbour sees has been listed with that one.
                     twice = False
-                    for other in range(1, one):
+                    for other in range(1, number):
                         if around[cell, sources[other]] >= 0:
                             there_x = x[entry] - (sources[other] // 3 - 1) * step
                             there_y = y[entry] - (sources[other] % 3 - 1) * step
                             twice |= there_x**2 + there_y**2 <= reach[entry]
                     if twice:
                         continue
-                    # East and north for now.
-                    seen[at], turns[at], distances[at] = kinds[entry], away_x, away_y
+                    # East and north for now; `_polar` converts all at once.
+                    view_codes[at], bearings[at], distances[at] = kinds[entry], away_x, away_y
                     at += 1
             lengths[view] = at - first
             view += 1
-    _polar(turns[:at], distances[:at])
-    return lengths, seen[:at], turns[:at], distances[:at]
+    _polar(bearings[:at], distances[:at])
+    return lengths, view_codes[:at], bearings[:at], distances[:at]

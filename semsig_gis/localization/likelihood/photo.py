@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +32,12 @@ from semsig_gis.core import (
     distance_units_of,
     share_rows,
 )
+from semsig_gis.localization.likelihood.records import (
+    NoiseModels,
+    PhotoArrays,
+    PlaceObjects,
+    TurnGrid,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,9 +48,9 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.observation import View
 
-PLACES_A_PART = 32  # that are worth a thread
-FIRST = 128  # places of which the others must not stay too far behind
-LOST = 3e-3  # of a sum, that all terms together may be off which are not worked out
+PLACES_A_THREAD = 32  # the fewest places that are worth a thread
+FIRST = 128  # likely places whose best likelihood bounds those of the others
+LOST = 3e-3  # share of a sum that all terms together may lose
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,6 +109,20 @@ class PhotoTable:
         known = ~np.isnan(self.range_errors)
         return np.where(known, self.range_errors, table.range_sigma[:, None])
 
+    def arrays(self, tables: Sequence[NoiseTable]) -> PhotoArrays:
+        """Return the photo and its names by some tables, as the kernel takes them."""
+        return PhotoArrays(
+            bearings=self.bearings,
+            ranges=self.ranges,
+            range_sigma=np.stack([self.range_sigma(table) for table in tables]),
+            own=self.scores,
+            other=np.stack([table.others @ self.scores for table in tables]),
+            density=np.stack([self.density(table) for table in tables]),
+            disc=self.disc,
+            sectors=self.sectors,
+            width=self.width,
+        )
+
     def density(self, table: NoiseTable) -> NDArray[np.float64]:
         """Return the density of false detections like each, by the degree, shape (n,)."""
         return np.asarray(table.clutter @ self.scores * self.disc / FULL_TURN)
@@ -128,61 +147,57 @@ def photo_loglik(
     """Return the log-likelihood of a photo by place and turn, shape (v, r).
 
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
-    So many places after each other are a `group`, of which only the sum is needed, with a
-    `log_prior` of places and turns; or only the `whole` sum is, and likely places come first. What
-    is next to nothing in it (`LOST`) is not worked out: it gets a bound of its likelihood.
+    If only sums over each `group` of successive places are needed, with a `log_prior` of places and
+    turns, or only the sum over the `whole`, in which likely places come first, then terms that are
+    negligible in the sum (`LOST`) are not computed: they get an upper bound.
     """
-    from semsig_gis.localization.likelihood.association_kernels import align  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba takes 250 ms
 
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)
     kinds = first.row_of[views.codes]
-    # Half a unit is rounding.
-    beyond = views.distances > first.ranges[kinds] + first.reach / DISTANCE_UNITS / 2.0
-    logliks = np.empty((len(tables), *turns.shape))
-    summed = len(tables) * turns.shape[1] * (len(turns) if whole else group)
-    prior = np.zeros(turns.shape) if log_prior is None else np.ascontiguousarray(log_prior)
-
-    def stacked(name: str) -> NDArray[np.float64]:
-        return np.stack([getattr(table, name) for table in tables])
-
-    work = partial(
-        align,
-        group=group,
-        margin=math.log(summed / LOST),
-        log_weights=np.log(weights),
-        log_prior=prior,
+    objects = PlaceObjects(
         offsets=views.offsets,
         kinds=kinds,
         bearing_units=bearing_units.astype(np.uint16),
         distance_units=distance_units_of(views.distances, first.reach),
-        beyond=beyond,
-        unit=FULL_TURN / BEARING_UNITS,
-        bearings=photo.bearings,
-        ranges=photo.ranges,
-        range_sigma=np.stack([photo.range_sigma(table) for table in tables]),
-        own=photo.scores,
-        other=np.stack([table.others @ photo.scores for table in tables]),
-        density=np.stack([photo.density(table) for table in tables]),
-        disc=photo.disc,
-        sectors=photo.sectors,
-        width=photo.width,
-        turns=np.ascontiguousarray(turns, dtype=np.float64),
-        detected=stacked("detected"),
-        misnamed=stacked("misnamed"),
-        clutter=np.array([table.clutter.sum() for table in tables]),
-        seen=stacked("seen"),
-        left=stacked("left"),
-        sigma=stacked("sigmas"),
-        blur=np.array([table.position_sigma for table in tables]),
-        distances=first.distances,
-        totals=logliks,
+        # Half a unit is rounding.
+        beyond=views.distances > first.ranges[kinds] + first.reach / DISTANCE_UNITS / 2.0,
     )
-    groups, least = -(-len(turns) // group), max(PLACES_A_PART // group, 1)
+    prior = np.zeros(turns.shape) if log_prior is None else np.ascontiguousarray(log_prior)
+    grid = TurnGrid(np.ascontiguousarray(turns, dtype=np.float64), prior)
+    arrays, models = photo.arrays(tables), _noise_models(tables, weights)
+    logliks = np.empty((len(tables), *turns.shape))
+    summed = len(tables) * turns.shape[1] * (len(turns) if whole else group)
+    margin = math.log(summed / LOST)
+
+    def fill(part: NDArray[np.int64], reached: float) -> None:
+        sum_associations(part, group, reached, margin, objects, arrays, models, grid, logliks)
+
+    groups, least = -(-len(turns) // group), max(PLACES_A_THREAD // group, 1)
     ahead, reached = 0, -math.inf
     if whole:
         ahead = min(FIRST, groups)
-        share_rows(partial(work, reached=reached), ahead, least=least)
+        share_rows(lambda part: fill(part, -math.inf), ahead, least=least)
         reached = float((logliks[:, :ahead] + prior[:ahead]).max(initial=reached))
-    share_rows(lambda rest: work(rest + ahead, reached=reached), groups - ahead, least=least)
+    share_rows(lambda part: fill(part + ahead, reached), groups - ahead, least=least)
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))
+
+
+def _noise_models(tables: Sequence[NoiseTable], weights: NDArray[np.float64]) -> NoiseModels:
+    """Return the tables of a mixture as the kernel takes them."""
+
+    def stacked(name: str) -> NDArray[np.float64]:
+        return np.stack([getattr(table, name) for table in tables])
+
+    return NoiseModels(
+        log_weights=np.log(weights),
+        detected=stacked("detected"),
+        misnamed=stacked("misnamed"),
+        clutter=np.array([table.clutter.sum() for table in tables]),
+        remaining=stacked("remaining"),
+        leaving=stacked("leaving"),
+        sigma=stacked("sigmas"),
+        blur=stacked("position_sigma"),
+        distances=tables[0].distances,
+    )

@@ -77,12 +77,12 @@ class NoiseTable:
         return np.asarray(0.5 * np.vectorize(math.erfc, otypes=[np.float64])(beyond))[row_of]
 
     @cached_property
-    def seen(self) -> NDArray[np.float64]:
+    def remaining(self) -> NDArray[np.float64]:
         """What is left of the detection of an object by class and distance unit, shape (k, 256)."""
         return np.asarray(self.fading * self.inside)
 
     @cached_property
-    def left(self) -> NDArray[np.float64]:
+    def leaving(self) -> NDArray[np.float64]:
         """What the observer does not see as it is out of range, shape (k, 256)."""
         return np.asarray(self.fading * (1.0 - self.inside))
 

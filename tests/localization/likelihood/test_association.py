@@ -46,7 +46,7 @@ from semsig_gis.localization import (
     photo_loglik,
     query_bearings,
     rerank,
-    views_aside,
+    visible_objects_off_centre,
 )
 from semsig_gis.localization.likelihood.photo import LOST
 from semsig_gis.observation import FULL_VIEW, Photo, View
@@ -282,7 +282,7 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
     cells = rng.choice(longest[:80], 40, replace=False)
     along = (np.arange(side) - 1) * town.grid.step / side
     places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
-    seen = views_aside(town, cells, places)
+    seen = visible_objects_off_centre(town, cells, places)
     query = View.of(town.signature(int(cells[0])))
     sharp = [replace(spec, bearing_sigma=1.5) for spec in GENERIC.specs]
     noise = NoiseMixture(specs=tuple(sharp), weights=weights, name="sharp")

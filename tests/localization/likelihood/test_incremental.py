@@ -9,8 +9,8 @@ import pytest
 from small_city import small_city
 
 from semsig_gis import build_index, named_noise
-from semsig_gis.localization import TurnMemo
-from semsig_gis.localization.likelihood import incremental as memos
+from semsig_gis.localization import IncrementalIndex
+from semsig_gis.localization.likelihood import incremental
 from semsig_gis.observation import Photo, View
 
 
@@ -23,9 +23,10 @@ def test_what_is_gone_on_from_gives_the_same_scores(
     kept: bool,
 ) -> None:
     if not kept:
-        monkeypatch.setattr(memos, "MOST_BYTES", 0)
+        monkeypatch.setattr(incremental, "MOST_BYTES", 0)
     database, _ = small_city()
-    index, memo = build_index(database, named_noise("generic")), TurnMemo()
+    index = build_index(database, named_noise("generic"))
+    growing = IncrementalIndex(index)
     seen = View.of(
         database.signature(int(database.lengths.argmax())),
         photos=(Photo(sectors=sectors, north_sigma=math.inf),),
@@ -35,9 +36,9 @@ def test_what_is_gone_on_from_gives_the_same_scores(
     for rows in [*steps, *steps[::-1]]:
         for view in (seen, View.of(seen, ranges=near)):
             told = view.select(np.array(rows, np.int64))
-            one, other = index.scores(told), index.scores(told, memo=memo)
+            one, other = index.scores(told), growing.scores(told)
             assert other.loglik == pytest.approx(one.loglik, abs=1e-4)
             assert one.heading is not None
             assert other.heading is not None
             assert (one.heading == other.heading).mean() > 0.99
-    assert (len(memo._photos) == 2) == kept
+    assert (len(growing._photos) == 2) == kept

@@ -24,7 +24,7 @@ from semsig_gis.localization import (
     index_fingerprint,
     named_noise,
     promising_cells,
-    views_aside,
+    visible_objects_off_centre,
 )
 from semsig_gis.observation import Photo, View
 
@@ -136,7 +136,7 @@ def test_places_aside_are_summed_over(
     cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
     step = town.grid.step
     places = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
-    seen = views_aside(town, cells, places)
+    seen = visible_objects_off_centre(town, cells, places)
     (spec,) = cell_noise(noise, step / 2.0).specs
     (table,), _ = database_tables(town, spec)
     codes = town.present_codes.tolist()
@@ -157,7 +157,9 @@ def test_places_aside_are_summed_over(
         north = [[(0.0, 1.0)]]
         each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
     expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
-    found = build_index(town, cell_noise(noise, step)).scorer_aside(view, north_sigma=0.0)(cells)
+    found = build_index(town, cell_noise(noise, step)).off_centre_scorer(view, north_sigma=0.0)(
+        cells
+    )
     assert found == pytest.approx(expected, abs=0.5 * len(view))
     assert np.median(np.abs(found - expected)) < 0.1 * len(view)
 

@@ -1,4 +1,4 @@
-"""Cameras: a rendered scene, its boxes, and back to bearings and ranges."""
+"""Camera models: bearings and ranges from the boxes of rendered scenes, and sectors."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TILTS = st.floats(-15, 15)
     st.one_of(st.just((0.0, 0.0)), st.tuples(TILTS, TILTS)),
     st.integers(0, 2**32),
 )
-def test_boxes_of_a_rendered_scene_give_its_bearings_and_ranges(
+def test_bearings_and_ranges_from_boxes_of_rendered_scene(
     projection: Projection, tilt: tuple[float, float], seed: int
 ) -> None:
     camera = Camera(
@@ -47,37 +47,37 @@ def test_boxes_of_a_rendered_scene_give_its_bearings_and_ranges(
     boxes = scene.boxes(camera)
     whole = np.flatnonzero(np.isfinite(boxes).all(axis=1))
     scene = scene.select(whole)
-    found = camera.upright_objects(np.round(boxes[whole]))  # as detectors give them
-    assert (angular_distance(found.bearings, scene.bearings) < 0.1).all()
-    off = np.abs(scene.heights / found.rises / scene.distances - 1)
+    result = camera.upright_objects(np.round(boxes[whole]))  # as detectors give them
+    assert (angular_distance(result.bearings, scene.bearings) < 0.1).all()
+    off = np.abs(scene.heights / result.rises / scene.distances - 1)
     # Both ends are off by half a pixel, and in a tilted picture the sides, too.
-    assert (off <= 1.5 / (found.pixels - 1) + 0.002).all()
+    assert (off <= 1.5 / (result.pixels - 1) + 0.002).all()
 
 
 @pytest.mark.parametrize("projection", PROJECTIONS)
-def test_directions_undo_pixels(projection: Projection) -> None:
+def test_directions_are_inverse_of_pixels(projection: Projection) -> None:
     camera = Camera(width=400, height=300, fov=90, projection=projection, pitch=-20, roll=130)
     pixels = np.random.default_rng(0).uniform(0, 300, (50, 2))
     assert np.allclose(camera.pixels(camera.directions(pixels)), pixels)
 
 
-def test_a_box_as_a_detector_draws_it_need_not_be_of_any_upright_thing() -> None:
-    # Too narrow for something tall in a tilted picture, in a corner, or of no height at all.
+def test_boxes_that_fit_no_upright_object_have_bearings() -> None:
+    # Too narrow for a tall object in a tilted picture, in a corner, or without height.
     camera = Camera(width=4000, height=3000, fov=70, roll=20)
     boxes = [[2000, 500, 2010, 2500], [0, 0, 5, 5], [2000, 1500, 2100, 1500], [3990, 0, 4000, 3000]]
-    found = camera.upright_objects(boxes)
-    middles = [[(left + right) / 2, (top + bottom) / 2] for left, top, right, bottom in boxes]
+    result = camera.upright_objects(boxes)
+    middles = [[(west + east) / 2, (top + bottom) / 2] for west, top, east, bottom in boxes]
     rays = camera.directions(middles)
-    assert np.isfinite(found.bearings).all()
+    assert np.isfinite(result.bearings).all()
     expected = np.degrees(np.arctan2(rays[:, 0], rays[:, 2]))
-    assert (angular_distance(found.bearings, expected) < 12).all()
-    assert math.isnan(found.rises[2])
+    assert (angular_distance(result.bearings, expected) < 12).all()
+    assert math.isnan(result.rises[2])
     assert len(camera.upright_objects([]).bearings) == 0
 
 
 WIDE = math.degrees(2 * math.atan(0.75 * math.tan(math.radians(30))))
-# The horizon is below the middle, and crosses the sides nearer to where the camera looks; at 40
-# degrees it is out of the picture, and what is in the middle counts.
+# The horizon is below the middle and crosses the sides nearer to the camera's axis. At 40 degrees
+# it is outside the picture, and the sectors are at the height of the middle.
 LIFTED = math.degrees(math.atan(math.tan(math.radians(30)) * math.cos(math.radians(20))))
 OVER = 40.405
 
@@ -97,9 +97,9 @@ OVER = 40.405
     ],
     ids=str,
 )
-def test_what_a_picture_sees(camera: Camera, sectors: list[tuple[float, float]]) -> None:
-    found = np.reshape(camera.sectors(), (-1, 2))
-    assert np.allclose(found, np.reshape(sectors, (-1, 2)), atol=1e-3)
+def test_sectors_of_cameras(camera: Camera, sectors: list[tuple[float, float]]) -> None:
+    result = np.reshape(camera.sectors(), (-1, 2))
+    assert np.allclose(result, np.reshape(sectors, (-1, 2)), atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_what_a_picture_sees(camera: Camera, sectors: list[tuple[float, float]])
         ({"roll": math.nan}, "from -180 to 180 degrees"),
     ],
 )
-def test_numbers_that_no_camera_has_are_refused(wrong: dict[str, object], words: str) -> None:
+def test_values_out_of_range_are_refused(wrong: dict[str, object], words: str) -> None:
     values: dict[str, object] = {"width": 400, "height": 300, "fov": 70, **wrong}
     with refused(InputError, words):
         Camera(**values)  # type: ignore[arg-type]

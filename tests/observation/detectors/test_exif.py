@@ -28,7 +28,7 @@ def save(path: Path, **groups: Mapping[Any, Any]) -> Path:
     return path
 
 
-def test_a_phone_tells_how_it_was_held(tmp_path: Path) -> None:
+def test_exif_of_phone_has_camera_heading_and_position(tmp_path: Path) -> None:
     gps = {
         GPS.GPSLatitudeRef: "N",
         GPS.GPSLatitude: (43.0, 44.0, 6.0),
@@ -40,7 +40,7 @@ def test_a_phone_tells_how_it_was_held(tmp_path: Path) -> None:
     path = save(tmp_path / "a.jpg", exif={Base.FocalLengthIn35mmFilm: 26}, gps=gps)
     shot = read_exif(path)
     assert shot.size == (400, 300)
-    # 26 mm where the diagonal is 43.27 mm, which is 500 pixels.
+    # 26 mm with a diagonal of 43.27 mm, which is 500 pixels.
     assert shot.focal == pytest.approx(26 / math.hypot(36, 24) * 500 / 400)
     assert (shot.heading, shot.north, shot.heading_error) == (123.5, "magnetic", 10.0)
     assert shot.position == pytest.approx((43.735, -7.5))
@@ -55,33 +55,33 @@ LOCAL = {Base.DateTimeOriginal: "2026:05:31 12:05:09"}
     [
         (LOCAL, UTC, "2026-05-31T10:05:09+00:00"),
         (LOCAL | {Base.OffsetTimeOriginal: "+02:00"}, {}, "2026-05-31T12:05:09+02:00"),
-        (LOCAL, {}, None),  # nobody knows of which zone
+        (LOCAL, {}, None),  # unknown time zone
         ({}, UTC | {GPS.GPSDateStamp: "never"}, None),
     ],
 )
-def test_when_a_picture_was_taken(
+def test_time_of_picture(
     exif: Mapping[Any, Any], gps: Mapping[Any, Any], time: str | None, tmp_path: Path
 ) -> None:
     assert read_exif(save(tmp_path / "a.jpg", exif=exif, gps=gps)).time == time
 
 
 @pytest.mark.parametrize(
-    ("unit", "resolution", "taken"), [(3, 2000.0, 4000), (2, 5080.0, 4000), (3, 200.0, 400)]
+    ("unit", "resolution", "width"), [(3, 2000.0, 4000), (2, 5080.0, 4000), (3, 200.0, 400)]
 )
-def test_the_pixels_of_the_sensor_give_the_focal_length(
-    unit: int, resolution: float, taken: int, tmp_path: Path
+def test_focal_length_from_pixels_of_sensor(
+    unit: int, resolution: float, width: int, tmp_path: Path
 ) -> None:
     exif = {
         Base.FocalLength: 20.0,
         Base.FocalPlaneXResolution: resolution,
         Base.FocalPlaneResolutionUnit: unit,
-        Base.ExifImageWidth: taken,
+        Base.ExifImageWidth: width,
     }
-    # 20 mm of 200 pixels a millimetre, of 4,000 across, and the same of a smaller copy.
+    # 20 mm with 200 pixels per millimetre and a width of 4,000 pixels; then a smaller copy.
     assert read_exif(save(tmp_path / "a.jpg", exif=exif)).focal == pytest.approx(1.0)
 
 
-def test_a_picture_that_stands_on_its_side_is_shown_upright(tmp_path: Path) -> None:
+def test_size_is_that_of_the_upright_picture(tmp_path: Path) -> None:
     path = save(tmp_path / "a.jpg", image={Base.Orientation: 6})
     assert read_exif(path).size == (300, 400)
 
@@ -96,14 +96,14 @@ def test_a_picture_that_stands_on_its_side_is_shown_upright(tmp_path: Path) -> N
         {"gps": {GPS.GPSLatitude: 43.0, GPS.GPSLongitude: 7.0}},
     ],
 )
-def test_what_is_not_told_or_makes_no_sense_is_not_known(
+def test_missing_or_invalid_tags_are_unknown(
     groups: dict[str, dict[Any, Any]], tmp_path: Path
 ) -> None:
     shot = read_exif(save(tmp_path / "a.jpg", **groups))
     assert (shot.focal, shot.heading, shot.position) == (None, None, None)
 
 
-def test_a_file_that_is_no_picture_is_refused(tmp_path: Path) -> None:
+def test_other_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_text("no")
     for name in ("a.jpg", "absent.jpg"):
         with refused(InputError, name, "give a picture"):

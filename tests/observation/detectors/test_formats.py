@@ -1,4 +1,4 @@
-"""Files of detectors: every format says the same of one picture."""
+"""Files of detections: the same picture in every format, and invalid files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.observation import AnnotatedPicture
 
-# Of a picture of 800 x 400 pixels: a bench, and a sign of which the detector is less sure.
+# In a picture of 800 x 400 pixels: a bench, and a sign with a lower score.
 CORNERS = [(80, 100, 240, 200), (400, 40, 440, 80)]
 LABELS = ["bench", "stop sign"]
 SCORES = [1.0, 0.75]
@@ -40,7 +40,7 @@ def coco(folder: Path) -> list[Path]:
 
 def coco_results(folder: Path) -> list[Path]:
     truth = {**COCO, "annotations": [{**COCO["annotations"][0], "bbox": [0, 0, 1, 1]}]}
-    results = [{**one, "score": one.get("score", 1.0)} for one in COCO["annotations"]]
+    results = [{**item, "score": item.get("score", 1.0)} for item in COCO["annotations"]]
     (folder / "results.json").write_text(json.dumps(results))
     (folder / "truth.json").write_text(json.dumps(truth))
     return [folder / "results.json", folder / "truth.json"]
@@ -57,7 +57,7 @@ def yolo(folder: Path) -> list[Path]:
 
 
 def yolo_polygons(folder: Path) -> list[Path]:
-    # As its models of segments write them, and with a list of names of its own.
+    # As segmentation models write them, with another file of names.
     text = "0 0.1 0.25 0.3 0.3 0.2 0.5\n1 0.5 0.1 0.55 0.2 0.52 0.15 0.75\n"
     (folder / "street.txt").write_text(text)
     (folder / "my.names").write_text("bench\nstop sign\n")
@@ -157,9 +157,6 @@ def tile(*points: tuple[int, int]) -> str:
     return base64.b64encode(field(3, layer)).decode()
 
 
-SHARES = [
-    [left / 800, top / 400, right / 800, bottom / 400] for left, top, right, bottom in CORNERS
-]
 IMAGE: dict[str, Any] = {
     "id": "street",
     "width": 800,
@@ -190,29 +187,27 @@ def mapillary(folder: Path) -> list[Path]:
 def pixels(picture: AnnotatedPicture) -> list[list[float]]:
     scale = (800, 400, 800, 400) if picture.shares else (1, 1, 1, 1)
     corners = [box.corners for box in picture.boxes]
-    return [[side * one for side, one in zip(box, scale, strict=True)] for box in corners]
+    return [[side * size for side, size in zip(box, scale, strict=True)] for box in corners]
 
 
 FORMATS = [coco, coco_results, yolo, yolo_polygons, label_studio, cvat, mapillary]
 
 
 @pytest.mark.parametrize("write", FORMATS)
-def test_every_format_gives_the_boxes_of_a_picture(
-    write: Callable[[Path], list[Path]], tmp_path: Path
-) -> None:
+def test_every_format_gives_same_boxes(write: Callable[[Path], list[Path]], tmp_path: Path) -> None:
     (picture,) = read_pictures(write(tmp_path))
     assert picture.name.removesuffix(".jpg") == "street"
     assert [box.label for box in picture.boxes] == LABELS
-    for found, corners in zip(pixels(picture), CORNERS, strict=True):
-        assert found == pytest.approx(corners, abs=0.15)  # of a tile: a 4096th
-    scores = [1.0, 1.0] if write is mapillary else SCORES  # it tells none
+    for box_pixels, corners in zip(pixels(picture), CORNERS, strict=True):
+        assert box_pixels == pytest.approx(corners, abs=0.15)  # 1 / 4096 of a tile
+    scores = [1.0, 1.0] if write is mapillary else SCORES  # it has no scores
     assert [box.score for box in picture.boxes] == scores
     assert [box.whole for box in picture.boxes] == [True, write is not cvat]
     assert picture.others == (write in {label_studio, cvat})
     assert picture.shot.size == (None if write in {yolo, yolo_polygons} else (800, 400))
 
 
-def test_mapillary_tells_the_camera(tmp_path: Path) -> None:
+def test_mapillary_image_has_camera_and_position(tmp_path: Path) -> None:
     (picture,) = read_pictures(mapillary(tmp_path))
     shot = Shot(
         camera="pinhole",
@@ -226,17 +221,17 @@ def test_mapillary_tells_the_camera(tmp_path: Path) -> None:
     assert picture.shot == shot
 
 
-def test_detections_of_mapillary_are_of_their_images(tmp_path: Path) -> None:
+def test_mapillary_detections_are_grouped_by_image(tmp_path: Path) -> None:
     first, second = IMAGE["detections"]["data"][:1] * 2
-    whose = [{**first, "image": {"id": "a"}}, {**second, "image": {"id": "b"}}]
-    (tmp_path / "detections.json").write_text(json.dumps({"data": whose}))
-    assert [one.name for one in read_pictures([tmp_path])] == ["a", "b"]
+    items = [{**first, "image": {"id": "a"}}, {**second, "image": {"id": "b"}}]
+    (tmp_path / "detections.json").write_text(json.dumps({"data": items}))
+    assert [picture.name for picture in read_pictures([tmp_path])] == ["a", "b"]
 
 
 @pytest.mark.parametrize(
     ("write", "corners"),
     [
-        # Turned by a quarter: about its upper left corner, and about its middle.
+        # Rotated by 90 degrees about its upper left corner, and about its middle.
         (
             lambda folder: (folder / "a.json").write_text(
                 json.dumps(
@@ -273,7 +268,7 @@ def test_detections_of_mapillary_are_of_their_images(tmp_path: Path) -> None:
     ],
     ids=["label_studio", "cvat"],
 )  # fmt: skip
-def test_a_turned_box_becomes_the_box_around_it(
+def test_rotated_box_becomes_bounding_box(
     write: Callable[[Path], object], corners: tuple[float, ...], tmp_path: Path
 ) -> None:
     write(tmp_path)
@@ -344,7 +339,9 @@ def test_what_is_no_such_file_is_refused(name: str, text: str, words: str, tmp_p
         ("names: [", "has no list of class names"),
     ],
 )
-def test_classes_of_yolo_need_names(names: str | None, words: str, tmp_path: Path) -> None:
+def test_yolo_without_valid_class_names_is_refused(
+    names: str | None, words: str, tmp_path: Path
+) -> None:
     (tmp_path / "a.txt").write_text(YOLO)
     if names is not None:
         (tmp_path / "data.yaml").write_text(names)
@@ -352,7 +349,7 @@ def test_classes_of_yolo_need_names(names: str | None, words: str, tmp_path: Pat
         read_pictures([tmp_path])
 
 
-def test_a_folder_without_detections_is_refused(tmp_path: Path) -> None:
+def test_folder_without_detections_is_refused(tmp_path: Path) -> None:
     with refused(InputError, "contains no file of detections"):
         read_pictures([tmp_path])
     with refused(InputError, "absent.json cannot be read"):

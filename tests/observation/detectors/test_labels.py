@@ -1,4 +1,4 @@
-"""Label maps: what comes with the package, and files of one's own."""
+"""Label maps: built-in maps and own files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 ALL = LabelMap.open([], built_in_taxonomy())
 
 
-def test_what_comes_with_the_package() -> None:
+def test_built_in_maps() -> None:
     assert label_maps() == ("cityscapes", "coco", "mapillary_vistas")
 
 
@@ -42,19 +42,19 @@ def test_what_comes_with_the_package() -> None:
         ("litter bins", ["waste_basket"]),  # by a word for it
     ],
 )
-def test_labels_stand_for_classes(label: str, classes: list[str]) -> None:
+def test_classes_of_labels(label: str, classes: list[str]) -> None:
     meaning = ALL.find(label)
     assert meaning is not None
     assert [name for name, _ in meaning.classes] == classes
 
 
-def test_an_unknown_label_stands_for_nothing() -> None:
+def test_unknown_labels_have_no_meaning() -> None:
     assert ALL.find("lion") is None
     assert ALL.find("unknown") is None
     assert LabelMap.open(["cityscapes"], paper_taxonomy()).find("object--bench") is None
 
 
-def test_a_map_of_ones_own_goes_before_the_next(tmp_path: Path) -> None:
+def test_earlier_map_has_priority(tmp_path: Path) -> None:
     mine = tmp_path / "mine.toml"
     mine.write_text(
         'left_out = ["bench*"]\n[labels]\nlamp = "street_light"\n'
@@ -66,7 +66,7 @@ def test_a_map_of_ones_own_goes_before_the_next(tmp_path: Path) -> None:
     assert labels.find("mast2") == Meaning((("street_light", 0.5), ("indicator", 0.25)), part=True)
     assert labels.find("bin") == Meaning((("bollard", 1.0),), height=(1.1, 0.1))
     assert labels.find("benches") == Meaning(())
-    assert labels.find("bench") == Meaning((("bench", 1.0),))  # COCO writes it out
+    assert labels.find("bench") == Meaning((("bench", 1.0),))  # exact in COCO
     assert labels.find("fire hydrant") is not None
 
 
@@ -96,7 +96,7 @@ def test_a_map_of_ones_own_goes_before_the_next(tmp_path: Path) -> None:
         (None, InputError, "cannot be read"),
     ],
 )
-def test_a_map_that_is_wrong_is_refused(
+def test_invalid_map_is_refused(
     text: str | None, error: type[Exception], words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -106,6 +106,6 @@ def test_a_map_that_is_wrong_is_refused(
         LabelMap.open([path], paper_taxonomy())
 
 
-def test_a_name_of_no_map_is_refused() -> None:
+def test_unknown_map_is_refused() -> None:
     with refused(UnknownNameError, "'cocoa'", "the nearest is 'coco'"):
         LabelMap.open(["cocoa"], paper_taxonomy())

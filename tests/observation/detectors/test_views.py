@@ -1,4 +1,4 @@
-"""From boxes and what is known of the camera to views."""
+"""Convert boxes and camera data to views."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 TAXONOMY = built_in_taxonomy()
-DETECTOR = ViewBuilder(
+BUILDER = ViewBuilder(
     labels=LabelMap.open([], TAXONOMY), taxonomy=TAXONOMY, shot=Shot(fov=90.0, heading=350.0)
 )
 BENCH = TAXONOMY.by_name("bench")
 SIZE = Shot(size=(1000, 800))  # with 90 degrees, 500 pixels to the focal length
 
 
-def picture(*boxes: Box, name: str = "a.jpg", **known: Any) -> AnnotatedPicture:  # noqa: ANN401
-    return AnnotatedPicture(name=name, boxes=boxes, shot=replace(SIZE, **known))
+def picture(*boxes: Box, name: str = "a.jpg", **shot: Any) -> AnnotatedPicture:  # noqa: ANN401
+    return AnnotatedPicture(name=name, boxes=boxes, shot=replace(SIZE, **shot))
 
 
-def box(label: str = "bench", left: float = 490, top: float = 400, **more: Any) -> Box:  # noqa: ANN401
-    return Box(label=label, corners=(left, top, left + 20, top + 50), **more)
+def box(label: str = "bench", x: float = 490, top: float = 400, **more: Any) -> Box:  # noqa: ANN401
+    return Box(label=label, corners=(x, top, x + 20, top + 50), **more)
 
 
-def one(detector: ViewBuilder, *pictures: AnnotatedPicture, **more: Any) -> View:  # noqa: ANN401
-    ((_, view),), _ = detector.views(pictures, **more)
+def single_view(builder: ViewBuilder, *pictures: AnnotatedPicture, **more: Any) -> View:  # noqa: ANN401
+    ((_, view),), _ = builder.views(pictures, **more)
     return view
 
 
-def test_a_box_gives_bearing_and_range() -> None:
-    view = one(DETECTOR, picture(box(), box("street_light", left=990)))
+def test_box_gives_bearing_and_range() -> None:
+    view = single_view(BUILDER, picture(box(), box("street_light", x=990)))
     assert view.codes is not None
     assert view.bearings is not None
     assert view.ranges is not None
@@ -73,8 +73,8 @@ def test_a_box_gives_bearing_and_range() -> None:
     [
         box(top=0),
         box(top=750),
-        box(left=0),
-        box(left=979.5),
+        box(x=0),
+        box(x=979.5),
         box(whole=False),
         box("taxi_station"),
         box("pole"),
@@ -82,18 +82,18 @@ def test_a_box_gives_bearing_and_range() -> None:
     ],
     ids=str,
 )
-def test_what_is_cut_hidden_or_of_no_known_height_has_no_range(boxes: Box) -> None:
-    assert one(DETECTOR, picture(boxes)).ranges is None
+def test_cut_or_hidden_boxes_or_unknown_heights_have_no_range(boxes: Box) -> None:
+    assert single_view(BUILDER, picture(boxes)).ranges is None
 
 
-def test_the_height_of_a_label_goes_before_that_of_its_class() -> None:
-    view = one(DETECTOR, picture(box("stop sign")))
+def test_height_of_label_has_priority_over_class() -> None:
+    view = single_view(BUILDER, picture(box("stop sign")))
     assert view.ranges is not None
     assert view.ranges[0] == pytest.approx(0.8 * 500 / 50)
 
 
-def test_a_score_is_the_chance_of_the_class_and_the_rest_any() -> None:
-    view = one(DETECTOR, picture(box(score=0.8), box("pole", score=0.5, left=600)))
+def test_score_is_probability_of_class_and_rest_of_any_class() -> None:
+    view = single_view(BUILDER, picture(box(score=0.8), box("pole", score=0.5, x=600)))
     assert view.scores is not None
     assert view.to_dict(TAXONOMY)["scores"] == [
         {"unknown": 0.6, "street_light": 0.2, "indicator": 0.15, "traffic_light": 0.05},
@@ -102,9 +102,9 @@ def test_a_score_is_the_chance_of_the_class_and_the_rest_any() -> None:
     assert view.to_dict(TAXONOMY)["types"] == "DL"
 
 
-def test_what_is_left_out_is_counted() -> None:
+def test_ignored_boxes_are_counted() -> None:
     boxes = [box(score=0.2), box("person"), box("lion"), box("lion"), box("fire hydrant"), box()]
-    city = replace(DETECTOR, taxonomy=paper_taxonomy())
+    city = replace(BUILDER, taxonomy=paper_taxonomy())
     ((_, view),), tally = city.views([replace(picture(*boxes), others=2)])
     assert len(view) == 1
     assert tally.to_dict() == {
@@ -123,28 +123,28 @@ def test_what_is_left_out_is_counted() -> None:
     }
 
 
-def test_a_heading_that_nobody_knows_is_unknown() -> None:
-    view = one(replace(DETECTOR, shot=Shot(fov=90.0)), picture(box()))
+def test_missing_heading_has_infinite_error() -> None:
+    view = single_view(replace(BUILDER, shot=Shot(fov=90.0)), picture(box()))
     assert view.photos[0].north_sigma == math.inf
     assert view.bearings is not None
     assert view.bearings.tolist() == [0.0]
 
 
-def test_what_is_said_of_a_picture_goes_before_what_is_said_of_all_and_its_file() -> None:
-    detector = replace(
-        DETECTOR,
+def test_data_of_picture_has_priority_over_data_of_all_and_of_file() -> None:
+    builder = replace(
+        BUILDER,
         shot=Shot(heading_error=2.0),
         shots={"a.jpg": Shot(heading=10.0, fov=60.0), "b": Shot(heading_error=5.0)},
     )
     file: dict[str, Any] = {"heading": 77.0, "heading_error": 3.0, "north": "true", "focal": 0.5}
-    views, tally = detector.views([picture(**file), picture(**file, name="x/b.jpg")])
+    views, tally = builder.views([picture(**file), picture(**file, name="x/b.jpg")])
     (first,), (second,) = (view.photos for _, view in views)
     assert (first.sectors, first.north_sigma) == (((340.0, 400.0),), 2.0)
     assert (second.sectors, second.north_sigma) == (((32.0, 122.0),), 5.0)
     assert tally.north == {"true": 1}
 
 
-def test_pictures_of_one_place_are_one_view() -> None:
+def test_pictures_of_same_place_are_one_view() -> None:
     here, near, far = (43.0, 7.0), (43.00003, 7.0), (43.001, 7.0)
     pictures = [
         picture(
@@ -156,9 +156,9 @@ def test_pictures_of_one_place_are_one_view() -> None:
         )
         for number, position in enumerate((here, near, far, None))
     ]
-    detector = replace(DETECTOR, shot=Shot(fov=60.0))
+    builder = replace(BUILDER, shot=Shot(fov=60.0))
     for places, counts in (("each", [1, 1, 1, 1]), ("gps", [2, 1, 1]), ("all", [4])):
-        views, tally = detector.views(pictures, places=places)  # type: ignore[arg-type]
+        views, tally = builder.views(pictures, places=places)  # type: ignore[arg-type]
         assert [len(view.photos) for _, view in views] == counts
     view = views[0][1]
     assert tally.times == {"0.jpg": "2026-05-31T10:00:00Z"}
@@ -166,16 +166,16 @@ def test_pictures_of_one_place_are_one_view() -> None:
     assert view.bearings is not None
     assert view.bearings.tolist() == [0.0, 90.0, 180.0, 270.0]
     table = {"1": Shot(place="corner"), "3.jpg": Shot(place="corner")}
-    views, _ = replace(detector, shots=table).views(pictures)
+    views, _ = replace(builder, shots=table).views(pictures)
     assert [name for name, _ in views] == ["0.jpg", "corner", "2.jpg"]
 
 
-def test_what_is_written_is_read_as_it_was() -> None:
+def test_view_is_written_and_parsed_again() -> None:
     pictures = [
-        picture(box(score=0.8), box("taxi_station", left=700), name="1.jpg"),
-        picture(box(left=100), name="2.jpg", heading=90.0, heading_error=3.0),
+        picture(box(score=0.8), box("taxi_station", x=700), name="1.jpg"),
+        picture(box(x=100), name="2.jpg", heading=90.0, heading_error=3.0),
     ]
-    view = one(replace(DETECTOR, shot=Shot(fov=60.0)), *pictures, places="all")
+    view = single_view(replace(BUILDER, shot=Shot(fov=60.0)), *pictures, places="all")
     (line,) = parse_queries([json.dumps(view.to_dict(TAXONOMY))], "-", taxonomy=TAXONOMY)
     assert isinstance(line.query, View)
     assert line.query.to_dict(TAXONOMY) == view.to_dict(TAXONOMY)
@@ -183,44 +183,46 @@ def test_what_is_written_is_read_as_it_was() -> None:
     assert [photo.north_sigma for photo in view.photos] == [math.inf, 3.0]
 
 
-def test_the_file_of_a_picture_tells_its_size(tmp_path: Path) -> None:
+def test_size_is_read_from_picture_file(tmp_path: Path) -> None:
     Image.new("L", (1000, 800)).save(tmp_path / "a.jpg")
     bare = AnnotatedPicture(
         name="a", boxes=(Box(label="bench", corners=(0.49, 0.5, 0.51, 0.6)),), shares=True
     )
     with refused(InputError, "the size of the picture a is not known"):
-        DETECTOR.views([bare])
-    view = one(replace(DETECTOR, folders=[tmp_path / "no", tmp_path]), bare)
+        BUILDER.views([bare])
+    view = single_view(replace(BUILDER, folders=[tmp_path / "no", tmp_path]), bare)
     assert view.ranges is not None
     assert view.ranges[0] == pytest.approx(0.85 * 500 / 80, abs=0.01)
 
 
-def test_a_size_that_is_said_is_for_pictures_of_unknown_size(tmp_path: Path) -> None:
+def test_size_of_all_is_used_only_for_unknown_sizes(tmp_path: Path) -> None:
     Image.new("L", (1000, 800)).save(tmp_path / "a.jpg")
-    detector = replace(DETECTOR, shot=Shot(fov=90.0, size=(100, 80)))
-    known, bare = picture(box()), AnnotatedPicture(name="a", boxes=(box(),))
-    for taken, folders in ((known, []), (bare, [tmp_path])):
-        view = one(replace(detector, folders=folders), taken)
+    builder = replace(BUILDER, shot=Shot(fov=90.0, size=(100, 80)))
+    sized, bare = picture(box()), AnnotatedPicture(name="a", boxes=(box(),))
+    for item, folders in ((sized, []), (bare, [tmp_path])):
+        view = single_view(replace(builder, folders=folders), item)
         assert view.bearings is not None
         assert view.bearings.tolist() == [0.0]
-    assert one(detector, replace(bare, boxes=())).photos[0].width == 90
+    assert single_view(builder, replace(bare, boxes=())).photos[0].width == 90
 
 
-def test_a_table_of_other_pictures_is_refused() -> None:
+def test_table_of_other_pictures_is_refused() -> None:
     with refused(InputError, "--photos names b.jpg, but none", "name them as a.jpg"):
-        replace(DETECTOR, shots={"b.jpg": Shot()}).views([picture()])
+        replace(BUILDER, shots={"b.jpg": Shot()}).views([picture()])
 
 
-def test_a_photograph_of_unknown_field_of_view_is_refused() -> None:
+def test_unknown_field_of_view_is_refused() -> None:
     with refused(InputError, "the field of view of the picture a.jpg is not known; give --fov"):
-        replace(DETECTOR, shot=Shot()).views([picture()])
+        replace(BUILDER, shot=Shot()).views([picture()])
     assert (
-        one(replace(DETECTOR, shot=Shot(camera="equirectangular")), picture()).photos[0].width
+        single_view(replace(BUILDER, shot=Shot(camera="equirectangular")), picture())
+        .photos[0]
+        .width
         == 360
     )
 
 
-def test_pictures_in_a_table(tmp_path: Path) -> None:
+def test_table_of_pictures_is_read(tmp_path: Path) -> None:
     path = tmp_path / "photos.csv"
     path.write_text(
         "image,camera,fov,heading,heading_error,pitch,roll,place\n"
@@ -244,14 +246,14 @@ def test_pictures_in_a_table(tmp_path: Path) -> None:
         ("image,heading_error\na,much", "'much'; give degrees or 'unknown'"),
     ],
 )
-def test_a_table_that_is_wrong_is_refused(row: str, words: str, tmp_path: Path) -> None:
+def test_invalid_table_is_refused(row: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "photos.csv"
     path.write_text(row + "\n")
     with refused(InputError, "photos.csv", words):
         read_shots(path)
 
 
-def test_nothing_seen_is_a_view_too() -> None:
-    view = one(DETECTOR, picture())
+def test_picture_without_boxes_is_a_view() -> None:
+    view = single_view(BUILDER, picture())
     assert len(view) == 0
     assert np.isfinite(view.photos[0].width)

@@ -1,0 +1,119 @@
+"""Records of arrays that the kernels take: numba reads named tuples without a conversion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+LANES = 8
+"""Detections that `kernels.scan` adds up together."""
+
+
+class BinnedObjects(NamedTuple):
+    """What is seen from n places (cells or points in them), for `kernels.scan`.
+
+    Place i sees the objects ``offsets[i]:offsets[i + 1]``: their class rows are `kinds`, their
+    `bins` are ``level of the distance * bins of a turn + bin of the bearing``.
+    """
+
+    offsets: NDArray[np.int64]
+    kinds: NDArray[np.uint8]
+    bins: NDArray[np.uint16]
+
+
+class LevelModel(NamedTuple):
+    """The mean noise model at some distance levels, for `kernels.scan`.
+
+    `group_of` is the group of a class row; classes of a group have the same errors. `detected`,
+    shape (lengths, k), is the chance of detection of a near object, `remaining` and `leaving`,
+    shape (k, levels), are the shares of it that remain at a distance and that are out of range.
+    """
+
+    group_of: NDArray[np.int64]
+    detected: NDArray[np.float32]
+    remaining: NDArray[np.float32]
+    leaving: NDArray[np.float32]
+
+
+class PhotoRows(NamedTuple):
+    """A photo of n detections against all that an object may be, for `kernels.scan`.
+
+    `rows` are the densities of `kernels.profile_rows`, `masses` those of
+    `association_kernels.mass_rows`, empty if the photo is a full turn. `named`, shape
+    (lengths, k, n), is the chance of a name over the density of such false detections, `disc` (n,)
+    the factor of their range, per degree. `width` is the share of the turn that the photo shows,
+    `base` the score of a place without objects. `kernels.scan` takes n in whole blocks of `LANES`.
+    """
+
+    rows: NDArray[np.float32]
+    masses: NDArray[np.float32]
+    named: NDArray[np.float32]
+    disc: NDArray[np.float32]
+    width: float
+    base: float
+
+
+class PlaceObjects(NamedTuple):
+    """What is seen from n places, for `association_kernels.sum_associations`.
+
+    Place i sees the objects ``offsets[i]:offsets[i + 1]``, with class rows `kinds`, in units of the
+    database. Some are `beyond` the range: seen only by an observer elsewhere in the cell.
+    """
+
+    offsets: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    bearing_units: NDArray[np.uint16]
+    distance_units: NDArray[np.uint8]
+    beyond: NDArray[np.bool_]
+
+
+class PhotoArrays(NamedTuple):
+    """A photo of n detections, for `association_kernels.sum_associations`.
+
+    `ranges` are NaN where unknown, `range_sigma`, shape (models, k, n), their relative errors. The
+    score of a name is `own`, shape (k, n), if the class is right, and `other`, shape (models, k,
+    n), if the object is misnamed; `density`, shape (models, n), is that of false detections, in
+    which `disc` (n,) is the factor of the range. `sectors`, shape (s, 2), are empty if the photo is
+    a full turn, of which `width` is the share that it shows.
+    """
+
+    bearings: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    range_sigma: NDArray[np.float64]
+    own: NDArray[np.float64]
+    other: NDArray[np.float64]
+    density: NDArray[np.float64]
+    disc: NDArray[np.float64]
+    sectors: NDArray[np.float64]
+    width: float
+
+
+class NoiseModels(NamedTuple):
+    """The models of a noise mixture, for `association_kernels.sum_associations`.
+
+    By model, `log_weights` are the logarithms of their chances, `clutter` the expected number of
+    false detections and `blur` the metres that the observer may be off. By model, length and class,
+    `detected` and `misnamed` are chances. By model, class and distance unit, `remaining` and
+    `leaving` are the shares of the detections of an object that is in range of the observer and
+    that is not, and `sigma` is the deviation of its bearing. `distances` are by distance unit.
+    """
+
+    log_weights: NDArray[np.float64]
+    detected: NDArray[np.float64]
+    misnamed: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    remaining: NDArray[np.float64]
+    leaving: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    blur: NDArray[np.float64]
+    distances: NDArray[np.float64]
+
+
+class TurnGrid(NamedTuple):
+    """Turns of a photo at n places in degrees, shape (n, turns), and the log of their priors."""
+
+    degrees: NDArray[np.float64]
+    log_prior: NDArray[np.float64]

@@ -1,0 +1,50 @@
+"""Turns of a photo of uncertain north: their chances, and the likelihood by turn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from semsig_gis.core import FULL_TURN
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+TURNS = 64
+"""Turns of a photo whose north is uncertain: steps of 5.625 degrees."""
+TURN_BLOCK = 16
+"""Turns that `kernels.scan_turned` adds up together."""
+_LEAST_TURN_CHANCE = 1e-7  # of a turn, relative to the likeliest; others are left out
+
+
+class TurnPrior(NamedTuple):
+    """The chances of the turns from a `first` one on, in whole blocks of `TURN_BLOCK`."""
+
+    first: int
+    chances: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, north_sigma: float) -> TurnPrior:
+        """Return the chances of turns, for a deviation of north in degrees, perhaps infinite.
+
+        The turns that fill the last block have chance 0.
+        """
+        turns = np.arange(-TURNS // 2, TURNS // 2)
+        chances = np.exp(-0.5 * (turns * (FULL_TURN / TURNS) / north_sigma) ** 2)
+        likely = np.flatnonzero(chances > _LEAST_TURN_CHANCE)
+        chances = chances[likely] / chances[likely].sum()
+        return cls(int(turns[likely[0]]), np.pad(chances, (0, -len(chances) % TURN_BLOCK)))
+
+
+class TurnScores(NamedTuple):
+    """The likelihood of a photo in n cells by turn: e to the power of `logs`, times `shares`."""
+
+    logs: NDArray[np.float32]
+    shares: NDArray[np.float32]
+
+    @classmethod
+    def empty(cls, cells: int, north_sigma: float) -> TurnScores:
+        """Return room for the likelihood of a photo by turn."""
+        turns = len(TurnPrior.of(north_sigma).chances)
+        return cls(np.empty(cells, np.float32), np.empty((cells, turns), np.float32))
