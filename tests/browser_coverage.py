@@ -66,9 +66,10 @@ class BrowserCoverage:
         for file, text in sorted(SCRIPTS.items()):
             code = [start for start, _ in _code(text)]
             ran = len(self.lines[file])
-            left = [text.count("\n", 0, at) + 1 for at in code if at not in self.lines[file]]
-            missing = f"  not {', '.join(map(str, left))}" if 0 < len(left) <= MOST_LISTED else ""
-            line = f"{file:20}{ran:4} of {len(code):4} lines{ran / len(code):5.0%}{missing}"
+            missing = [text.count("\n", 0, at) + 1 for at in code if at not in self.lines[file]]
+            listed = ", ".join(map(str, missing)) if len(missing) <= MOST_LISTED else ""
+            note = f"  not {listed}" if listed else ""
+            line = f"{file:20}{ran:4} of {len(code):4} lines{ran / len(code):5.0%}{note}"
             terminalreporter.write_line(line)
 
 
@@ -79,7 +80,7 @@ def _code(text: str) -> list[tuple[int, int]]:
 
 
 def _lines_run(text: str, functions: list[dict[str, Any]]) -> set[int]:
-    """Return where the lines begin of which something ran."""
+    """Return the offsets of lines that ran at least in part."""
     ran = bytearray(len(text))
     for function in functions:
         for part in function["ranges"]:  # from the outermost to the innermost

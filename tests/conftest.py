@@ -1,4 +1,4 @@
-"""What the tests share: the optional parts of a machine, and no network."""
+"""Shared fixtures: optional parts of a machine, no network, the command line, a browser."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
     Run = Callable[..., tuple[int, str, str]]
-    Done = Callable[..., str]
+    RunOk = Callable[..., str]
 
 # QGIS runs these with its own Python.
 collect_ignore = ["qgis_draw.py", "qgis_plugin/qgis_session.py"]
@@ -55,15 +55,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest tests, lest one of them runs alone at the end."""
+    """Begin with the longest tests, so that none is still running when all others are finished."""
     items.sort(key=lambda item: LONGEST.isdisjoint({item.path.parent.name, item.path.name}))
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Keep what is imported out of the search for garbage, which would take a third of the time.
+    """Exclude imported objects from garbage collection, which would take a third of the time.
 
-    What tests make is searched less often than is usual, too.
+    Objects of the tests are collected less often than usual, too.
     """
     gc.disable()
     try:
@@ -75,7 +75,7 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def is_local(address: object) -> bool:
-    """Tell whether a socket address stays on this machine."""
+    """Whether a socket address is on this machine."""
     if not isinstance(address, tuple):
         return True  # a Unix socket
     host = str(address[0] or "localhost")
@@ -108,7 +108,7 @@ def _no_network() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def geodata() -> Path:
-    """Return the folder of real open data that SEMSIG_GEODATA names."""
+    """Return the folder of real open data, SEMSIG_GEODATA."""
     folder = os.environ.get("SEMSIG_GEODATA", "")
     if not folder or not Path(folder).is_dir():
         unavailable("geodata", f"SEMSIG_GEODATA is {folder!r}, not the folder of real data")
@@ -159,7 +159,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.fixture
-def done(run: Run) -> Done:
+def run_ok(run: Run) -> RunOk:
     """Run the command in this process, which must succeed, and return its standard output."""
 
     def call(*arguments: object) -> str:
@@ -172,7 +172,7 @@ def done(run: Run) -> Done:
 
 @pytest.fixture
 def snapshot(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
-    """Return a check of a text against a stored one; SEMSIG_SNAPSHOTS=1 stores it anew."""
+    """Return a function that compares a text with a stored one; SEMSIG_SNAPSHOTS=1 replaces it."""
     folder = request.path.with_name("snapshots")
 
     def check(name: str, text: str) -> None:
@@ -185,8 +185,8 @@ def snapshot(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
 
 
 @pytest.fixture
-def carried() -> None:
-    """Need the map files that a package built with npm carries."""
+def map_files() -> None:
+    """Require the map files of a package that was built with npm."""
     from semsig_gis.maps import page
 
     if not page.available():
@@ -234,15 +234,15 @@ def _chromium(
 
 @pytest.fixture
 def browser(_chromium: Chrome) -> Chrome:
-    """Return a headless Chromium that reaches no network and remembers nothing, with empty logs.
+    """Return a headless Chromium without network and stored data, with empty logs.
 
     ``browser.get_log("browser")`` gives the console messages since then and
     ``browser.get_log("performance")`` what was requested.
     """
     _chromium.get("about:blank")
-    # All pages from files share what they keep, such as the choice of light or dark.
-    kept = {"origin": "file://", "storageTypes": "local_storage"}
-    _chromium.execute_cdp_cmd("Storage.clearDataForOrigin", kept)
+    # All pages from files share their storage, for example the choice of light or dark.
+    storage = {"origin": "file://", "storageTypes": "local_storage"}
+    _chromium.execute_cdp_cmd("Storage.clearDataForOrigin", storage)
     for log in ("browser", "performance"):
         _chromium.get_log(log)
     return _chromium
@@ -274,9 +274,9 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder in which the experiments of the paper were run on a small town.
+    """Return a folder with the results of the paper's experiments on a small town.
 
-    One worker of the tests runs them; the others copy what it made.
+    One test worker runs them; the others copy the results.
     """
     from worlds import QUERIES, save_town
 

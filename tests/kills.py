@@ -30,8 +30,8 @@ def killed_at(
 ) -> Ending:
     """Run a command that is killed just before its change to files of that number, from 1 on.
 
-    With 0, or where there are not so many, it runs to its end. `command` is what stands behind
-    ``semsig``; `env` is put into the environment.
+    With 0, or if there are fewer changes, it runs to its end. `command` are the arguments of
+    ``semsig``; `env` is added to the environment.
     """
     from benchmarks._soak_runs import Ending
 

@@ -1,4 +1,4 @@
-"""What a machine may lack: programs and data, room on its disk, and time."""
+"""Optional programs and data of a machine, and limits of its disk and time."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PATIENCE_S = 300.0
-"""What takes longer hangs, on the busiest machine, too; programs that do much have six times it."""
+"""Timeout on the busiest machine; long programs have six times as much."""
 
 Part = Literal["browser", "geodata", "qgis"]
-"""A test that needs one of them skips where it is missing, unless SEMSIG_REQUIRE names it."""
+"""A test that needs one of them is skipped if it is missing, unless SEMSIG_REQUIRE names it."""
 
 
 def required() -> frozenset[str]:
-    """Return the names that SEMSIG_REQUIRE lists, separated by commas."""
+    """Return the names in SEMSIG_REQUIRE, separated by commas."""
     listed = os.environ.get("SEMSIG_REQUIRE", "").split(",")
     return frozenset(name.strip() for name in listed) - {""}
 
 
 def unavailable(name: Part, reason: str) -> NoReturn:
-    """Skip the test, or fail it where SEMSIG_REQUIRE names the missing thing."""
+    """Skip the test, or fail it if SEMSIG_REQUIRE names the missing part."""
     if name in required():
         pytest.fail(f"{reason} (SEMSIG_REQUIRE names {name})", pytrace=False)
     pytest.skip(reason)
@@ -35,7 +35,7 @@ def unavailable(name: Part, reason: str) -> NoReturn:
 
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
-    """Let this process write no file beyond a size, as on a full disk."""
+    """Limit the size of files that this process writes, to simulate a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -45,7 +45,7 @@ def largest_file(size: int) -> Iterator[None]:
 
 
 def qgis_variables(home: Path) -> dict[str, str]:
-    """Return a clean environment for QGIS, without a screen and with a profile of its own.
+    """Return a clean environment for QGIS, without a screen and with a separate profile.
 
     Nothing is inherited: our PYTHONPATH, GDAL_DATA or PROJ_LIB would crash QGIS's own Python.
     """

@@ -1,4 +1,4 @@
-"""Cities whose schemas were written down: rows of that shape, as files and as services."""
+"""Open data of cities: rows with the schema of each city, as files and as services."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from servers import Seen, Server
+    from servers import Request, Server
 
     from semsig_gis.sources import LayerSpec
 
-# Of each city, a place in it, and of each layer, the name of its file and the fields of rows: those
-# that count, and those that do not. A file of CSV has its positions in fields, too.
+# For each city a place in it, and for each layer the name of its file, the rows that the catalogue
+# keeps, and the rows that it filters out. A CSV file has its positions in fields, too.
 CITIES: dict[str, tuple[tuple[float, float], dict[str, tuple[str, list[Any], list[Any]]]]] = {
     "vienna": (
         (16.37, 48.21),
@@ -125,8 +125,8 @@ def features_of(name: str) -> dict[str, list[Feature]]:
     }
 
 
-def collection(features: Iterable[Feature], **beside: object) -> dict[str, Any]:
-    return {"type": "FeatureCollection", "features": list(features), **beside}
+def collection(features: Iterable[Feature], **members: object) -> dict[str, Any]:
+    return {"type": "FeatureCollection", "features": list(features), **members}
 
 
 def as_csv(features: Iterable[Feature], axes: tuple[str, str]) -> str:
@@ -196,8 +196,8 @@ def _arcgis(server: Server, datasets: Datasets, _: tuple[str, str]) -> str:
             "fields": fields,
         }
 
-        def query(seen: Seen, features: list[Feature] = features) -> Answer:
-            if "returnCountOnly" in seen.query:
+        def query(request: Request, features: list[Feature] = features) -> Answer:
+            if "returnCountOnly" in request.query:
                 return sent({"count": len(features)})
             return sent(collection(features), type="application/geo+json")
 
@@ -214,15 +214,15 @@ def _wfs(server: Server, datasets: Datasets, _: tuple[str, str]) -> str:
         f"<FeatureTypeList>{names}</FeatureTypeList></WFS_Capabilities>"
     )
 
-    def answer(seen: Seen) -> Answer:
-        asked = seen.query
-        if asked["request"] == "GetCapabilities":
+    def answer(request: Request) -> Answer:
+        query = request.query
+        if query["request"] == "GetCapabilities":
             return Answer(capabilities.encode(), type="text/xml")
-        features = datasets[asked.get("typeNames") or asked["typeName"]]
-        if asked.get("resultType") == "hits":
+        features = datasets[query.get("typeNames") or query["typeName"]]
+        if query.get("resultType") == "hits":
             text = f'<FeatureCollection numberMatched="{len(features)}" numberReturned="0"/>'
             return Answer(text.encode(), type="text/xml")
-        if asked["request"] == "GetFeature":
+        if query["request"] == "GetFeature":
             return sent(collection(features, numberMatched=len(features)))
         fields = "".join(f'<element name="{n}" type="xsd:string"/>' for n in _fields(features))
         place = '<element name="SHAPE" type="gml:PointPropertyType"/>'
@@ -249,9 +249,9 @@ def _socrata(server: Server, datasets: Datasets, axes: tuple[str, str]) -> str:
         rows = list(csv.DictReader(io.StringIO(as_csv(features, axes))))
 
         def table(
-            seen: Seen, rows: list[dict[str, str]] = rows, features: list[Feature] = features
+            request: Request, rows: list[dict[str, str]] = rows, features: list[Feature] = features
         ) -> Answer:
-            if seen.query.get("$select") == "count(*)":
+            if request.query.get("$select") == "count(*)":
                 return sent([{"count": str(len(features))}])
             return sent(rows)
 
@@ -268,8 +268,8 @@ def _ckan(server: Server, datasets: Datasets, axes: tuple[str, str]) -> str:
         "fonts": "2025_fonts_beure.csv",
     }
 
-    def package(seen: Seen) -> Answer:
-        file = files[seen.query["id"]]
+    def package(request: Request) -> Answer:
+        file = files[request.query["id"]]
         resource = {"id": file, "format": "CSV", "url": f"{server.url}/files/{file}"}
         return sent({"success": True, "result": {"resources": [resource]}})
 

@@ -48,7 +48,7 @@ def _tags(tags: Mapping[str, str] | None) -> str:
 
 
 def street_town() -> list[str]:
-    """Return a street with what stands along it, as points, lines, areas and with a hole."""
+    """Return a street with objects along it: points, lines, areas and an area with a hole."""
     lon, lat = 2.35, 48.85
     things: list[Mapping[str, str]] = [
         {"natural": "tree", "leaf_type": "broadleaved"},
@@ -65,8 +65,8 @@ def street_town() -> list[str]:
     parts = [node(n, lon + n * 1e-4, lat + n % 3 * 1e-5, tags) for n, tags in enumerate(things, 1)]
     corners = [(0, 0), (3, 0), (3, 1), (0, 1), (1, 0.2), (2, 0.2), (2, 0.8), (1, 0.8)]
     for number, (east, north) in enumerate([*corners, *corners], 101):
-        aside = 4e-4 if number > 100 + len(corners) else 0.0
-        parts.append(node(number, lon + east * 1e-4 + aside, lat + 3e-4 + north * 1e-4))
+        shift = 4e-4 if number > 100 + len(corners) else 0.0
+        parts.append(node(number, lon + east * 1e-4 + shift, lat + 3e-4 + north * 1e-4))
     outer, inner = [101, 102, 103, 104, 101], [105, 106, 107, 108, 105]
     parts += [
         way(201, outer),

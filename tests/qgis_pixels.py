@@ -1,4 +1,4 @@
-"""The colours in which QGIS draws rasters when they are opened; run by QGIS's own Python.
+"""Print the colours in which QGIS draws rasters; run by QGIS's own Python.
 
 Usage: ``python3 qgis_pixels.py RASTER...``. Prints a JSON list: of each the labels of its legend,
 their colours, and the colour of each pixel, from the north-west, null where it is clear.
@@ -25,7 +25,7 @@ def drawn(path: str) -> dict[str, object]:
     return {
         "labels": [item.label for item in items],
         "colours": [item.color.name() for item in items],
-        "pixels": [[one.name() if one.alpha() else None for one in line] for line in pixels],
+        "pixels": [[pixel.name() if pixel.alpha() else None for pixel in line] for line in pixels],
     }
 
 
@@ -35,7 +35,7 @@ def main(*paths: str) -> None:
     application = QgsApplication([], False)  # noqa: FBT003
     application.initQgis()
     print(json.dumps([drawn(path) for path in paths]))
-    # QGIS and Python do not agree on who takes the layers down.
+    # QGIS and Python would both delete the layers.
     sys.stdout.flush()
     os._exit(0)
 

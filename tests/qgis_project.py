@@ -1,8 +1,8 @@
-"""What QGIS makes of the project in a GeoPackage; run by QGIS's own Python.
+"""Print how QGIS reads the project in a GeoPackage; run by QGIS's own Python.
 
 Usage: ``python3 qgis_project.py FILE...``. Prints a line of JSON for each: the layers of the
-project by their names, with what a person is told of the first feature of each, and at which of
-`SCALES` they are drawn. Draws the page beside the file, as ``.png``.
+project by name, with the tip of the first feature, and the `SCALES` at which they are drawn.
+Draws the page next to the file, as ``.png``.
 """
 
 # ruff: noqa: T201 - a program, which imports what only QGIS has
@@ -21,9 +21,9 @@ def main(*paths: str) -> None:
     application.initQgis()
     project = QgsProject.instance()
     for path in paths:
-        found = project.read(f"geopackage:{path}?projectName=semsig")
-        print(json.dumps({"found": found, **contents(project, f"{path}.png")}))
-    # QGIS and Python do not agree on who takes the layers down.
+        is_read = project.read(f"geopackage:{path}?projectName=semsig")
+        print(json.dumps({"found": is_read, **contents(project, f"{path}.png")}))
+    # QGIS and Python would both delete the layers.
     sys.stdout.flush()
     os._exit(0)
 
@@ -32,7 +32,9 @@ def contents(project: Any, picture: str) -> dict[str, Any]:  # noqa: ANN401
     from qgis.core import QgsLayoutExporter
 
     tree = project.layerTreeRoot()
-    groups = {group.name(): [one.name() for one in group.children()] for group in tree.children()}
+    groups = {
+        group.name(): [layer.name() for layer in group.children()] for group in tree.children()
+    }
     relations = project.relationManager().relations().values()
     layout = project.layoutManager().printLayouts()[0]
     settings = QgsLayoutExporter.ImageExportSettings()
@@ -41,10 +43,10 @@ def contents(project: Any, picture: str) -> dict[str, Any]:  # noqa: ANN401
         "title": project.title(),
         "crs": project.crs().authid() or project.crs().toWkt(),
         "groups": groups,
-        "off": [one.name() for one in tree.findLayers() if not one.isVisible()],
+        "off": [layer.name() for layer in tree.findLayers() if not layer.isVisible()],
         "layers": {layer.name(): about(layer) for layer in project.mapLayers().values()},
-        "relations": [(one.name(), one.isValid()) for one in relations],
-        "texts": [one.currentText() for one in layout.items() if hasattr(one, "currentText")],
+        "relations": [(relation.name(), relation.isValid()) for relation in relations],
+        "texts": [item.currentText() for item in layout.items() if hasattr(item, "currentText")],
         "scale": round(layout.itemById("map").scale()),
         "drawn": QgsLayoutExporter(layout).exportToImage(picture, settings) == 0,
     }
@@ -57,7 +59,7 @@ def about(layer: Any) -> dict[str, Any]:  # noqa: ANN401
     for scope in QgsExpressionContextUtils.globalProjectLayerScopes(layer):
         context.appendScope(scope)
     context.setFeature(next(layer.getFeatures()))
-    named = QgsExpression(layer.displayExpression())
+    display_name = QgsExpression(layer.displayExpression())
     tabs = layer.editFormConfig().tabs()
     label = layer.labeling().settings().fieldName if layer.labelsEnabled() else "NULL"
     labels = QgsExpression(label)
@@ -66,11 +68,11 @@ def about(layer: Any) -> dict[str, Any]:  # noqa: ANN401
         "aliases": {
             field.name(): layer.attributeAlias(n) for n, field in enumerate(layer.fields())
         },
-        "form": {tab.name(): [one.name() for one in tab.children()] for tab in tabs},
+        "form": {tab.name(): [field.name() for field in tab.children()] for tab in tabs},
         "styles": layer.styleManager().styles(),
-        "name": named.evaluate(context),
+        "name": display_name.evaluate(context),
         "label": labels.evaluate(context),
-        "errors": named.evalErrorString() + labels.evalErrorString(),
+        "errors": display_name.evalErrorString() + labels.evalErrorString(),
         "tip": QgsExpression.replaceExpressionText(layer.mapTipTemplate(), context),
         "seen": [scale for scale in SCALES if layer.isInScaleRange(scale)],
     }

@@ -1,4 +1,4 @@
-"""Layers as readers return them, made of geometries."""
+"""Raw layers, as readers return them, from geometries."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def raw_layer(
     notes: tuple[str, ...] = (),
     unique_id: bool = False,
 ) -> RawLayer:
-    """Return a layer as a reader would."""
+    """Return a raw layer."""
     size = len(geometries)
     names = [classes] * size if isinstance(classes, str) else list(classes)
     texts = {"class_name": names, "source_id": ids or [str(row) for row in range(size)]}

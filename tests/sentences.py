@@ -1,4 +1,4 @@
-"""What every message to a user keeps to."""
+"""Checks that messages to the user are one plain sentence."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def assert_sentence(error: BaseException, *words: str) -> None:
-    """Check that a message is one plain sentence and names the things it should."""
+    """Check that a message is one plain sentence with some words."""
     message = str(error)
     assert message.endswith("."), message
     assert "\n" not in message, message
@@ -27,14 +27,14 @@ def assert_sentence(error: BaseException, *words: str) -> None:
 def refused(
     kind: type[BaseException] | tuple[type[BaseException], ...], *words: str
 ) -> Iterator[None]:
-    """Expect an error whose message is one plain sentence and names the things it should."""
+    """Expect an error with a message that is one plain sentence with some words."""
     with pytest.raises(kind) as caught:
         yield
     assert_sentence(caught.value, *words)
 
 
 def sentence(outcome: tuple[int, str, str], *words: str) -> None:
-    """Check that an input was refused with one plain sentence that holds some words."""
+    """Check that a command refused its input with one plain sentence with some words."""
     code, out, err = outcome
     assert code == 2, err
     assert out == ""

@@ -1,13 +1,13 @@
-"""A real HTTP server on the loopback, which plays the services that the readers talk to.
+"""An HTTP server on the loopback interface that simulates the services of the readers.
 
-Each path has a script: answers that are given one after the other, the last of them for ever. An
-answer is an `Answer`, or a function from what was `Seen` to one. What was asked is kept, in order::
+Each path has a script: answers that are sent in order; the last one is repeated. An answer is an
+`Answer`, or a function from a `Request` to one. All requests are recorded in order::
 
     with Server() as server:
         server.on("/busy", Answer(status=429, headers={"Retry-After": "2"}), Answer(b"[]"))
         server.on("/trees", published(content, etag='"1"', cuts=[1000]))  # cut once, then resumable
         fetch(server.url + "/busy", ...)  # http://127.0.0.1:PORT/busy
-    assert [seen.path for seen in server.seen] == ["/busy", "/busy"]
+    assert [request.path for request in server.requests] == ["/busy", "/busy"]
 
 A path without a script is answered with 404.
 """
@@ -33,21 +33,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the server says."""
+    """An answer of the server."""
 
     body: bytes = b""
     status: int = 200
-    type: str = "application/json"  # none is sent where it is empty
+    type: str = "application/json"  # not sent if it is empty
     headers: Mapping[str, str] = field(default_factory=dict)  # further ones
-    chunked: bool = False  # the length is left unsaid and the body sent in chunks
-    cut: int | None = None  # bytes after which the connection is closed, as if it had failed
+    chunked: bool = False  # sent in chunks, without a length
+    cut: int | None = None  # bytes after which the connection is closed, to simulate a failure
     drip: tuple[int, float] | None = None  # bytes to send at a time, seconds to wait after each
-    slow_head: bool = False  # the headers drip, too
+    slow_head: bool = False  # send the headers slowly, too
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """What the server was asked; the names of the headers are in lower case."""
+class Request:
+    """A request to the server; the names of the headers are in lower case."""
 
     method: str
     path: str
@@ -61,12 +61,12 @@ class Seen:
         return dict(parse_qsl(self.body.decode("utf-8")))
 
 
-Script = Answer | Callable[[Seen], Answer]
+Script = Answer | Callable[[Request], Answer]
 
 
-def zipped(body: bytes, **what: str) -> Answer:
-    """Return an answer whose body is compressed by gzip; `what` are further headers."""
-    return Answer(gzip.compress(body, mtime=0), headers={"Content-Encoding": "gzip", **what})
+def zipped(body: bytes, **headers: str) -> Answer:
+    """Return an answer with a body compressed by gzip; `headers` are further headers."""
+    return Answer(gzip.compress(body, mtime=0), headers={"Content-Encoding": "gzip", **headers})
 
 
 def published(
@@ -76,25 +76,25 @@ def published(
     modified: str = "",
     ranges: bool = True,
     cuts: Sequence[int | None] = (),
-) -> Callable[[Seen], Answer]:
-    """Play a file as a good web server does: with conditional requests, and parts of it on request.
+) -> Callable[[Request], Answer]:
+    """Return a script for a file, as on a good web server: with conditional and range requests.
 
-    `etag` is quoted; `modified` is the date of the last change. `cuts` are, of the first answers
-    that have a body, the bytes after which each is cut.
+    `etag` is quoted; `modified` is the date of the last change. `cuts` are the bytes after which
+    each of the first answers with a body is cut.
     """
-    left = list(cuts)
+    remaining_cuts = list(cuts)
 
-    def answer(seen: Seen) -> Answer:
+    def answer(request: Request) -> Answer:
         headers = {"Accept-Ranges": "bytes" if ranges else "none"}
         headers |= {"ETag": etag} if etag else {}
         headers |= {"Last-Modified": modified} if modified else {}
-        same_tag = etag and seen.headers.get("if-none-match") == etag
-        same_date = modified and seen.headers.get("if-modified-since") == modified
+        same_tag = etag and request.headers.get("if-none-match") == etag
+        same_date = modified and request.headers.get("if-modified-since") == modified
         if same_tag or same_date:
             return Answer(status=304, type="", headers=headers)
-        part = seen.headers.get("range", "") if ranges else ""
-        condition = seen.headers.get("if-range")
-        cut = left.pop(0) if left else None
+        part = request.headers.get("range", "") if ranges else ""
+        condition = request.headers.get("if-range")
+        cut = remaining_cuts.pop(0) if remaining_cuts else None
         if not part or condition not in {None, etag, modified}:
             return Answer(body, headers=headers, cut=cut)
         first, _, last = part.removeprefix("bytes=").partition("-")
@@ -112,7 +112,7 @@ class Server(contextlib.ExitStack):
 
     def __init__(self) -> None:
         super().__init__()
-        self.seen: list[Seen] = []
+        self.requests: list[Request] = []
         self.port = 0
         self._scripts: dict[str, list[Script]] = {}
         self._lock = threading.Lock()
@@ -120,41 +120,41 @@ class Server(contextlib.ExitStack):
 
     @property
     def url(self) -> str:
-        """Return the address to which a path is added."""
+        """Return the base address."""
         return f"http://127.0.0.1:{self.port}"
 
     @property
     def other_host(self) -> str:
-        """Return an address of the same server by another name, for redirects that leave a host."""
+        """Return the base address with another host name, for redirects to another host."""
         return f"http://localhost:{self.port}"
 
     def on(self, path: str, *answers: Script) -> None:
-        """Set what is answered to requests for a path, whatever their query."""
+        """Set the answers to requests for a path, with any query."""
         with self._lock:
             self._scripts[path] = list(answers)
 
     def paths(self) -> list[str]:
-        """Return the paths that were asked for."""
-        return [seen.path for seen in self.seen]
+        """Return the paths of all requests."""
+        return [request.path for request in self.requests]
 
-    def answer(self, seen: Seen) -> Answer:
+    def answer(self, request: Request) -> Answer:
         """Return the next answer to a request."""
         with self._lock:
-            self.seen.append(seen)
-            script = self._scripts.get(seen.path)
+            self.requests.append(request)
+            script = self._scripts.get(request.path)
             if not script:
                 return Answer(b'{"message": "there is no such thing"}', status=404)
             step = script[0] if len(script) == 1 else script.pop(0)
-            return step(seen) if callable(step) else step
+            return step(request) if callable(step) else step
 
     def wait(self, seconds: float) -> bool:
-        """Wait, but not beyond the server's end; tell whether it is closing."""
+        """Wait until the server is closing, at most some seconds; return whether it is closing."""
         return self._closing.wait(seconds)
 
     def __enter__(self) -> Self:
         handler = type("Handler", (_Handler,), {"playing": self})
         web = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-        web.daemon_threads = False  # so that closing waits for the answers under way
+        web.daemon_threads = False  # so that closing waits for pending answers
         self.port = web.server_address[1]
         patch = self.enter_context(pytest.MonkeyPatch.context())
         for name in ("NO_PROXY", "no_proxy"):
@@ -168,11 +168,11 @@ class Server(contextlib.ExitStack):
 
 class _Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
-    timeout = PATIENCE_S  # for a client that connects and says nothing
+    timeout = PATIENCE_S  # for a client that connects and sends nothing
     playing: Server
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - the base class's name
-        """Say nothing: the tests look at what was seen."""
+        """Log nothing: the tests check the recorded requests."""
 
     def do_GET(self) -> None:
         self.close_connection = True
@@ -180,8 +180,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
         query = dict(parse_qsl(parts.query, keep_blank_values=True))
         headers = {name.lower(): value for name, value in self.headers.items()}
-        answer = self.playing.answer(Seen(self.command, parts.path, query, headers, body))
-        # A client that has had enough closes the connection, which is no fault.
+        answer = self.playing.answer(Request(self.command, parts.path, query, headers, body))
+        # A client may close the connection early.
         with contextlib.suppress(OSError):
             self._send(answer)
 
@@ -223,7 +223,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             yield b"0\r\n\r\n"
 
     def _write(self, pieces: Iterable[bytes], drip: tuple[int, float]) -> None:
-        """Send pieces so many bytes at a time; OSError where the server ends meanwhile."""
+        """Send `drip[0]` bytes at a time; OSError if the server ends meanwhile."""
         size, pause = drip
         for piece in pieces:
             for start in range(0, len(piece), size):

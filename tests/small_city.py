@@ -1,4 +1,4 @@
-"""A city of a few hundred cells, an evaluation of it, answers in it and chances of its cells."""
+"""A city of a few hundred cells with an evaluation, answers and identifiability."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 def small_city() -> tuple[SignatureDatabase, StreetObjects]:
     layers = synthetic_city(CitySpec(size=300.0))
     objects, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs="EPSG:32631")
-    named = dataclasses.replace(objects, licenses=(Licence("Town (CC0)", ("trees", "lamps")),))
-    return build_database(named), named
+    licensed = dataclasses.replace(objects, licenses=(Licence("Town (CC0)", ("trees", "lamps")),))
+    return build_database(licensed), licensed
 
 
 @functools.cache
 def small_evaluation(distortion: str = "strong") -> Evaluation:
-    """Return an evaluation in which some queries are found, some missed and, if strong, empty."""
+    """Return an evaluation with successful, failed and, if strong, empty queries."""
     return evaluate(small_city()[0], queries=60, method=Method(), distortion=distortion)
 
 
@@ -48,7 +48,7 @@ def small_localization() -> Localization:
 
 
 def chances_of(database: SignatureDatabase, *, seed: int = 0) -> Identifiability:
-    """Return an identifiability out of nowhere for the cells of a database."""
+    """Return a random identifiability of the cells of a database."""
     rng = np.random.default_rng(seed)
     places = 3
     cells, codes = len(database), database.present_codes.tolist()

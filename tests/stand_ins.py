@@ -1,4 +1,4 @@
-"""Services that run on this machine: each answers as its protocol says, and errs where told to."""
+"""Simulated services on this machine: each follows its protocol, with configurable errors."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from servers import Answer
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from servers import Seen, Server
+    from servers import Request, Server
 
 Row = dict[str, Any]
 FIELDS = ("OBJECTID", "KIND", "NOTE")
-# Five rows, of which three are lamps; nobody has ever written a note.
+# Five rows, three of them lamps; all notes are empty.
 ROWS: list[Row] = [
     {"OBJECTID": number, "KIND": kind, "NOTE": None, "xy": xy}
     for number, kind, xy in [
@@ -54,21 +54,21 @@ def features(rows: Sequence[Row], fields: Sequence[str] = FIELDS) -> list[dict[s
 
 
 class StandIn:
-    """A service with one layer, whose pages have two rows.
+    """A service with one layer and two rows per page.
 
-    It tells of `surplus` more rows than it has, sends its first page for ever where it `circles`,
-    `page` in the place of a page, if that is an answer, and fails after `whole` pages.
+    It reports `surplus` more rows than it has, always sends its first page if it `circles`, sends
+    `page` instead of a page if that is set, and fails after `whole` pages.
     """
 
     reader = ""
     dataset = ""
     wrong = ""
-    # What a wrong `dataset` is answered with.
+    # The names in the answer to a wrong `dataset`.
     others: tuple[str, ...] = ()
     limit = 2
-    # Whether it can cut out an area.
+    # Whether it can clip to an area.
     cuts = True
-    # The begin of a page.
+    # The beginning of a page.
     half = b'{"features": [{"type"'
 
     def __init__(self, server: Server) -> None:
@@ -88,8 +88,8 @@ class StandIn:
         raise NotImplementedError
 
     def failure(self) -> Answer | None:
-        """Return what is sent in the place of the page that is asked for, if anything."""
-        if self.whole is not None and len(self.pages_asked()) > self.whole:
+        """Return the answer instead of the requested page, if any."""
+        if self.whole is not None and len(self.page_requests()) > self.whole:
             return Answer(status=503)
         return self.page
 
@@ -104,11 +104,11 @@ class StandIn:
             if west <= row["xy"][0] <= east and south <= row["xy"][1] <= north
         ]
 
-    def pages_asked(self) -> list[Seen]:
+    def page_requests(self) -> list[Request]:
         """Return the requests for pages, in order."""
-        return [seen for seen in self.server.seen if self.is_page(seen)]
+        return [request for request in self.server.requests if self.is_page(request)]
 
-    def is_page(self, seen: Seen) -> bool:
+    def is_page(self, request: Request) -> bool:
         raise NotImplementedError
 
 
@@ -124,15 +124,15 @@ class ArcGIS(StandIn):
         path = "/arcgis/rest/services/Street/FeatureServer"
         layers = [{"id": 0, "name": "Lamps"}, {"id": 3, "name": "Kerbs"}]
         self.server.on(path, sent({"layers": layers, "tables": []}, type="text/plain"))
-        self.server.on(f"{path}/0", self.described)
+        self.server.on(f"{path}/0", self.description)
         self.server.on(f"{path}/0/query", self.query)
 
     @property
     def endpoint(self) -> str:
         return f"{self.server.url}/arcgis/rest/services/"
 
-    def described(self, seen: Seen) -> Answer:
-        assert seen.query == {"f": "json"}
+    def description(self, request: Request) -> Answer:
+        assert request.query == {"f": "json"}
         return sent(
             {
                 "id": 0,
@@ -148,39 +148,43 @@ class ArcGIS(StandIn):
             }
         )
 
-    def is_page(self, seen: Seen) -> bool:
-        return seen.path.endswith("/query") and "returnCountOnly" not in seen.query
+    def is_page(self, request: Request) -> bool:
+        return request.path.endswith("/query") and "returnCountOnly" not in request.query
 
-    def query(self, seen: Seen) -> Answer:
-        asked = seen.query
-        assert asked["outSR"] == "4326"
+    def query(self, request: Request) -> Answer:
+        query = request.query
+        assert query["outSR"] == "4326"
         rows: Sequence[Row] = self.rows
-        if "geometry" in asked:
-            assert asked["geometryType"] == "esriGeometryEnvelope"
-            assert (asked["inSR"], asked["spatialRel"]) == ("4326", "esriSpatialRelIntersects")
-            west, south, east, north = map(float, asked["geometry"].split(","))
+        if "geometry" in query:
+            assert query["geometryType"] == "esriGeometryEnvelope"
+            assert (query["inSR"], query["spatialRel"]) == ("4326", "esriSpatialRelIntersects")
+            west, south, east, north = map(float, query["geometry"].split(","))
             rows = self.inside(west, south, east, north)
-        if asked["where"] == "KIND='lamp'":
+        if query["where"] == "KIND='lamp'":
             rows = [row for row in rows if row["KIND"] == "lamp"]
-        elif asked["where"] != "1=1":
+        elif query["where"] != "1=1":
             details = ["'where' clause is invalid"]
             message = "Cannot perform query. Invalid query parameters."
             return sent({"error": {"code": 400, "message": message, "details": details}})
-        if asked.get("returnCountOnly") == "true":
+        if query.get("returnCountOnly") == "true":
             return sent({"count": len(rows) + self.surplus})
         if (failure := self.failure()) is not None:
             return failure
         if self.paging:
-            assert asked["orderByFields"] == "OBJECTID"
-        start, count = asked.get("resultOffset", 0), asked.get("resultRecordCount", self.limit)
+            assert query["orderByFields"] == "OBJECTID"
+        start, count = query.get("resultOffset", 0), query.get("resultRecordCount", self.limit)
         some = self.part(rows, start, count)
         more = self.circles or int(start) + len(some) < len(rows)
-        names = FIELDS if asked["outFields"] == "*" else asked["outFields"].split(",")
-        if asked["f"] == "geojson":
-            beside = {"properties": {"exceededTransferLimit": True}} if more else {}
-            found = {"type": "FeatureCollection", "features": features(some, names), **beside}
-            return sent(found, type="application/geo+json")
-        found = {
+        names = FIELDS if query["outFields"] == "*" else query["outFields"].split(",")
+        if query["f"] == "geojson":
+            more_rows = {"properties": {"exceededTransferLimit": True}} if more else {}
+            content = {
+                "type": "FeatureCollection",
+                "features": features(some, names),
+                **more_rows,
+            }
+            return sent(content, type="application/geo+json")
+        content = {
             "geometryType": "esriGeometryPoint",
             "spatialReference": {"wkid": 4326, "latestWkid": 4326},
             "features": [
@@ -191,7 +195,7 @@ class ArcGIS(StandIn):
                 for row in some
             ],
         }
-        return sent(found | ({"exceededTransferLimit": True} if more else {}))
+        return sent(content | ({"exceededTransferLimit": True} if more else {}))
 
 
 WFS_NAMES = (
@@ -223,53 +227,53 @@ class Wfs(StandIn):
     def endpoint(self) -> str:
         return f"{self.server.url}/wfs"
 
-    def is_page(self, seen: Seen) -> bool:
-        query = seen.query
+    def is_page(self, request: Request) -> bool:
+        query = request.query
         return query.get("request") == "GetFeature" and query.get("resultType") != "hits"
 
-    def answer(self, seen: Seen) -> Answer:
-        asked = seen.query
-        assert (asked["service"], asked["version"]) == ("WFS", "2.0.0")
-        if asked["request"] == "GetCapabilities":
+    def answer(self, request: Request) -> Answer:
+        query = request.query
+        assert (query["service"], query["version"]) == ("WFS", "2.0.0")
+        if query["request"] == "GetCapabilities":
             return self.capabilities()
-        described = asked["request"] == "DescribeFeatureType"
-        assert asked["typeName" if described else "typeNames"] == "city:lamps"
-        if described:
+        description = query["request"] == "DescribeFeatureType"
+        assert query["typeName" if description else "typeNames"] == "city:lamps"
+        if description:
             return self.schema()
-        rows = self.found(asked)
-        return rows if isinstance(rows, Answer) else self.get_features(asked, rows)
+        rows = self.matching_rows(query)
+        return rows if isinstance(rows, Answer) else self.get_features(query, rows)
 
-    def get_features(self, asked: Mapping[str, str], rows: Sequence[Row]) -> Answer:
-        told = str(len(rows) + self.surplus)
-        if asked.get("resultType") == "hits":
-            return self.collection((), told)
+    def get_features(self, query: Mapping[str, str], rows: Sequence[Row]) -> Answer:
+        total = str(len(rows) + self.surplus)
+        if query.get("resultType") == "hits":
+            return self.collection((), total)
         if (failure := self.failure()) is not None:
             return failure
-        names = asked.get("propertyName", f"geom,{','.join(FIELDS)}").split(",")
+        names = query.get("propertyName", f"geom,{','.join(FIELDS)}").split(",")
         assert "geom" in names
-        if self.constraints and "startIndex" in asked and asked.get("sortBy") != "OBJECTID":
+        if self.constraints and "startIndex" in query and query.get("sortBy") != "OBJECTID":
             return self.refusal("NoApplicableCode", "Cannot do natural order. Add a key.")
-        some = self.part(rows, asked.get("startIndex", 0), asked.get("count", len(rows)))
-        if asked.get("outputFormat") == "application/json; subtype=geojson":
-            assert asked["srsName"] == "EPSG:4326"
+        some = self.part(rows, query.get("startIndex", 0), query.get("count", len(rows)))
+        if query.get("outputFormat") == "application/json; subtype=geojson":
+            assert query["srsName"] == "EPSG:4326"
             crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::4326"}}
             listed = features(some, [name for name in names if name != "geom"])
             for item in listed if self.turned else ():
                 item["geometry"]["coordinates"].reverse()
             return sent({"type": "FeatureCollection", "features": listed, "crs": crs})
-        return self.collection(some, told)
+        return self.collection(some, total)
 
-    def found(self, asked: Mapping[str, str]) -> Sequence[Row] | Answer:
-        if "filter" in asked:
-            corners = re.findall(r"Corner>([^\s<]+) ([^\s<]+)</", asked["filter"])
+    def matching_rows(self, query: Mapping[str, str]) -> Sequence[Row] | Answer:
+        if "filter" in query:
+            corners = re.findall(r"Corner>([^\s<]+) ([^\s<]+)</", query["filter"])
             (south, west), (north, east) = corners or [("-90", "-180"), ("90", "180")]
-            if "<fes:Literal>lamp</fes:Literal>" not in asked["filter"]:
+            if "<fes:Literal>lamp</fes:Literal>" not in query["filter"]:
                 return self.refusal("OperationParsingFailed", "No such property.")
             rows = self.inside(*map(float, (west, south, east, north)))
             return [row for row in rows if row["KIND"] == "lamp"]
-        if "bbox" not in asked:
+        if "bbox" not in query:
             return self.rows
-        south, west, north, east, crs = asked["bbox"].split(",")
+        south, west, north, east, crs = query["bbox"].split(",")
         assert crs == "urn:ogc:def:crs:EPSG::4326"
         return self.inside(*map(float, (west, south, east, north)))
 
@@ -307,7 +311,7 @@ class Wfs(StandIn):
             <xsd:element name="lamps" type="city:lampsType"/></xsd:schema>"""
         return Answer(text.encode(), type="text/xml")
 
-    def collection(self, rows: Sequence[Row], told: str) -> Answer:
+    def collection(self, rows: Sequence[Row], count: str) -> Answer:
         members = "".join(
             f"""<wfs:member><city:lamps gml:id="lamps.{row["OBJECTID"]}">
             <city:geom><gml:Point srsName="urn:ogc:def:crs:EPSG::4326">
@@ -317,12 +321,13 @@ class Wfs(StandIn):
             for row in rows
         )
         text = f"""<?xml version="1.0" encoding="UTF-8"?><wfs:FeatureCollection {WFS_NAMES}
-            numberMatched="{told}" numberReturned="{len(rows)}">{members}</wfs:FeatureCollection>"""
+            numberMatched="{count}"
+            numberReturned="{len(rows)}">{members}</wfs:FeatureCollection>"""
         return Answer(text.encode(), type="application/gml+xml; version=3.2")
 
 
 class WfsOfGml(Wfs):
-    """It has no GeoJSON."""
+    """A WFS without GeoJSON."""
 
     half = b"<FeatureCollection><member>"
 
@@ -362,38 +367,38 @@ class OgcFeatures(StandIn):
     def endpoint(self) -> str:
         return f"{self.server.url}/ogc"
 
-    def is_page(self, seen: Seen) -> bool:
-        return seen.path.endswith("/items")
+    def is_page(self, request: Request) -> bool:
+        return request.path.endswith("/items")
 
-    def conformance(self, _: Seen) -> Answer:
+    def conformance(self, _: Request) -> Answer:
         base = "http://www.opengis.net/spec/ogcapi-features-1/1.0/conf"
         return sent({"conformsTo": [*(f"{base}/{name}" for name in self.conforms), self.filters]})
 
-    def items(self, seen: Seen) -> Answer:
-        asked = seen.query
-        assert seen.headers["accept"].startswith("application/geo+json, ")
+    def items(self, request: Request) -> Answer:
+        query = request.query
+        assert request.headers["accept"].startswith("application/geo+json, ")
         rows: Sequence[Row] = self.rows
-        if "bbox" in asked:
-            rows = self.inside(*map(float, asked["bbox"].split(",")))
-        if "filter" in asked:
-            assert (asked["filter"], asked["filter-lang"]) == ("KIND = 'lamp'", "cql2-text")
+        if "bbox" in query:
+            rows = self.inside(*map(float, query["bbox"].split(",")))
+        if "filter" in query:
+            assert (query["filter"], query["filter-lang"]) == ("KIND = 'lamp'", "cql2-text")
             rows = [row for row in rows if row["KIND"] == "lamp"]
         if (failure := self.failure()) is not None:
             return failure
-        start = int(asked.get("offset", 0))
-        some = self.part(rows, start, asked["limit"])
+        start = int(query.get("offset", 0))
+        some = self.part(rows, start, query["limit"])
         listed = features(some)
         for item in listed:
             item["properties"] = {k: v for k, v in item["properties"].items() if v is not None}
-        links = [{"rel": "self", "href": seen.path}]
+        links = [{"rel": "self", "href": request.path}]
         if self.circles or start + len(some) < len(rows):
-            query = urlencode({**asked, "offset": start + len(some)})
+            query = urlencode({**query, "offset": start + len(some)})
             links.append({"rel": "next", "href": f"{self.next_host}?{query}"})
         content = {
             "type": "FeatureCollection",
             "features": listed,
             "links": links,
-            "timeStamp": f"2024-01-01T00:00:{len(self.server.seen):02}Z",
+            "timeStamp": f"2024-01-01T00:00:{len(self.server.requests):02}Z",
             "numberMatched": len(rows) + self.surplus,
             "numberReturned": len(some),
         }
@@ -401,7 +406,7 @@ class OgcFeatures(StandIn):
 
 
 class Ckan(StandIn):
-    """Its datastore has coordinates in two fields; it cannot cut out an area."""
+    """Its datastore has coordinates in two fields; it cannot clip to an area."""
 
     reader = "ckan"
     dataset = "lamps"
@@ -420,12 +425,12 @@ class Ckan(StandIn):
         on("/api/3/action/package_list", sent({"success": True, "result": ["kerbs", "lamps"]}))
         on("/api/3/action/datastore_search", self.datastore_search)
 
-    def is_page(self, seen: Seen) -> bool:
-        return seen.path.endswith("/datastore_search") and seen.query["limit"] != "0"
+    def is_page(self, request: Request) -> bool:
+        return request.path.endswith("/datastore_search") and request.query["limit"] != "0"
 
-    def package_show(self, seen: Seen) -> Answer:
-        if seen.query["id"] != "lamps":
-            error = {"__type": "Not Found Error", "message": "Not found"}
+    def package_show(self, request: Request) -> Answer:
+        if request.query["id"] != "lamps":
+            error = {"__type": "Not Found Error", "message": "Not records_answer"}
             return sent({"success": False, "error": error}, status=404)
         result = {
             "name": "lamps",
@@ -435,22 +440,22 @@ class Ckan(StandIn):
         }
         return sent({"success": True, "result": result})
 
-    def datastore_search(self, seen: Seen) -> Answer:
-        asked = seen.query
-        assert asked["resource_id"] == "r-2"
-        if asked["limit"] == "0":
-            return self.found((), len(self.rows))
+    def datastore_search(self, request: Request) -> Answer:
+        query = request.query
+        assert query["resource_id"] == "r-2"
+        if query["limit"] == "0":
+            return self.records_answer((), len(self.rows))
         if (failure := self.failure()) is not None:
             return failure
-        assert asked["sort"] == "_id"
-        wanted = json.loads(asked.get("filters", "{}")).items()
-        rows = [row for row in self.rows if all(row[name] == value for name, value in wanted)]
-        names = asked.get("fields", f"{','.join(FIELDS)},Longitude,Latitude").split(",")
+        assert query["sort"] == "_id"
+        filters = json.loads(query.get("filters", "{}")).items()
+        rows = [row for row in self.rows if all(row[name] == value for name, value in filters)]
+        names = query.get("fields", f"{','.join(FIELDS)},Longitude,Latitude").split(",")
         records = [
             {k: v for k, v in self.record(row).items() if k in names}
-            for row in self.part(rows, asked["offset"], asked["limit"])
+            for row in self.part(rows, query["offset"], query["limit"])
         ]
-        return self.found(records, len(rows) + self.surplus)
+        return self.records_answer(records, len(rows) + self.surplus)
 
     @staticmethod
     def record(row: Row) -> Row:
@@ -458,14 +463,14 @@ class Ckan(StandIn):
         return properties(row) | {"Longitude": x, "Latitude": y}
 
     @staticmethod
-    def found(records: Sequence[Row], total: int) -> Answer:
+    def records_answer(records: Sequence[Row], total: int) -> Answer:
         fields = [{"id": name} for name in (*FIELDS, "Longitude", "Latitude")]
         result = {"fields": fields, "records": records, "total": total}
         return sent({"success": True, "result": result})
 
 
 class Socrata(StandIn):
-    """Its rows are GeoJSON, or plain where the place is a `location` or two columns."""
+    """Its rows are GeoJSON, or plain if the position is a `location` or two columns."""
 
     reader = "socrata"
     dataset = "abcd-1234"
@@ -478,30 +483,30 @@ class Socrata(StandIn):
         for kind in ("json", "geojson"):
             self.server.on(f"/resource/abcd-1234.{kind}", self.resource)
 
-    def is_page(self, seen: Seen) -> bool:
-        return seen.path.startswith("/resource/") and seen.query.get("$select") != "count(*)"
+    def is_page(self, request: Request) -> bool:
+        return request.path.startswith("/resource/") and request.query.get("$select") != "count(*)"
 
-    def views(self, _: Seen) -> Answer:
+    def views(self, _: Request) -> Answer:
         kinds = dict.fromkeys(FIELDS, "text") | {":@computed_region_x": "number"}
         kinds |= {"the_place": self.place} if self.place else {"lon": "text", "lat": "text"}
         columns = [{"fieldName": name, "dataTypeName": kind} for name, kind in kinds.items()]
         terms = {"license": {"name": "PDDL"}, "attribution": "City of Somewhere"}
         return sent({"id": "abcd-1234", "columns": columns, **terms})
 
-    def resource(self, seen: Seen) -> Answer:
-        asked = seen.query
+    def resource(self, request: Request) -> Answer:
+        query = request.query
         rows: Sequence[Row] = self.rows
-        for condition in re.findall(r"\((.+?\)?)\)(?: AND |$)", asked.get("$where", "")):
+        for condition in re.findall(r"\((.+?\)?)\)(?: AND |$)", query.get("$where", "")):
             rows = [row for row in rows if self.holds(condition, row)]
-        if asked.get("$select") == "count(*)":
+        if query.get("$select") == "count(*)":
             return sent([{"count": str(len(rows) + self.surplus)}])
         if (failure := self.failure()) is not None:
             return failure
-        assert asked["$order"] == ":id"
-        names = asked.get("$select", ",".join(FIELDS)).split(",")
+        assert query["$order"] == ":id"
+        names = query.get("$select", ",".join(FIELDS)).split(",")
         names = [name for name in names if name in FIELDS]
-        some = self.part(rows, asked["$offset"], asked["$limit"])
-        if seen.path.endswith(".geojson"):
+        some = self.part(rows, query["$offset"], query["$limit"])
+        if request.path.endswith(".geojson"):
             assert self.place not in {"", "location"}
             content = {"type": "FeatureCollection", "features": features(some, names)}
             return sent(content, type="application/vnd.geo+json")

@@ -1,4 +1,4 @@
-"""An object store on the loopback that speaks as much of S3 as readers of public buckets need."""
+"""An object store on the loopback interface, with the part of S3 that public buckets need."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from servers import Answer
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from servers import Seen, Server
+    from servers import Request, Server
 
 XML = "application/xml"
 
 
 def keep_in_bucket(server: Server, bucket: str, folder: Path) -> str:
-    """Publish the files of a folder in a bucket; return its address, as a catalogue writes it."""
+    """Publish the files of a folder in a bucket; return its address for a catalogue."""
     files = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()}
 
-    def listing(seen: Seen) -> Answer:
-        prefix, end = seen.query.get("prefix", ""), seen.query.get("delimiter", "")
+    def listing(request: Request) -> Answer:
+        prefix, end = request.query.get("prefix", ""), request.query.get("delimiter", "")
         keys = sorted(key for key in files if key.startswith(prefix))
         rest = {key: key.removeprefix(prefix) for key in keys}
         folders = sorted({r.partition(end)[0] + end for r in rest.values() if end and end in r})
@@ -36,12 +36,12 @@ def keep_in_bucket(server: Server, bucket: str, folder: Path) -> str:
         body = f'<?xml version="1.0"?><ListBucketResult>{count}{"".join(parts)}</ListBucketResult>'
         return Answer(body.encode(), type=XML)
 
-    def file(seen: Seen) -> Answer:
-        body = files[unquote(seen.path).removeprefix(f"/{bucket}/")].read_bytes()
-        asked = seen.headers.get("range", "").removeprefix("bytes=")
-        if not asked:
+    def file(request: Request) -> Answer:
+        body = files[unquote(request.path).removeprefix(f"/{bucket}/")].read_bytes()
+        byte_range = request.headers.get("range", "").removeprefix("bytes=")
+        if not byte_range:
             return Answer(body)
-        start, last = (int(number) for number in asked.split("-"))
+        start, last = (int(number) for number in byte_range.split("-"))
         span = f"bytes {start}-{min(last, len(body) - 1)}/{len(body)}"
         return Answer(body[start : last + 1], status=206, headers={"Content-Range": span})
 

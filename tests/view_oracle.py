@@ -1,7 +1,7 @@
-"""The likelihood of a view in a cell, slowly and plainly: what every engine is held to.
+"""The likelihood of a view in a cell by a slow and simple implementation, to test every engine.
 
-Of object i the class is tau, the bearing theta_i, the distance d_i, the chance of detection p_i and
-w_i how much of its wrapped normal lies in the sectors S of a photo; detection j has the bearing
+Object i has the class tau, the bearing theta_i, the distance d_i, the chance of detection p_i and
+the share w_i of its wrapped normal in the sectors S of a photo; detection j has the bearing
 a_j, the range r_j (or none) and the weights of classes c_j(t). In a photo,
 
     hit_ij   = p_i * sum_t c_j(t) C(tau_i, t) * N(a_j - theta_i; sigma_i) * LN(r_j; d_i, s_ij)
@@ -11,9 +11,9 @@ a_j, the range r_j (or none) and the weights of classes c_j(t). In a photo,
                       of pairs and of lambda_j of the detections that are in none;
                set:   prod_j (lambda_j + sum_i hit_ij / (1 - p_i w_i))
 
-LN is a density of the logarithm of the range. Photos are independent given the place. Who stands
-elsewhere in a cell than in its middle (position_sigma) has some objects at the edge of range beyond
-it, which p_i leaves out, and sees as many others instead: l_i, anywhere.
+LN is a density of the logarithm of the range. Photos are independent given the place. For an
+observer who is not at the centre of the cell (position_sigma), some objects near the limit of the
+range are beyond it, which reduces p_i, and as many others are visible anywhere instead: l_i.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ LAPS = range(-4, 5)
 class Thing:
     """An object in sight; `names` is the chance of each name if it is detected, by class row.
 
-    Detections more than `tails` deviations away are none of it: engines leave such pairs out.
+    Detections more than `tails` deviations away are not of it: engines skip such pairs.
     """
 
     chance: float
@@ -68,7 +68,7 @@ class Scene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seen:
+class Glimpse:
     """A detection, with the weight of each class row."""
 
     bearing: float
@@ -98,71 +98,73 @@ def mass_inside(bearing: float, sigma: float, photo: Photo) -> float:
     )
 
 
-def range_density(seen: Seen, thing: Thing) -> float:
+def range_density(glimpse: Glimpse, thing: Thing) -> float:
     """Return the density of the logarithm of a range, 1 without a range."""
-    if math.isnan(seen.range):
+    if math.isnan(glimpse.range):
         return 1.0
-    error = thing.range_sigma if math.isnan(seen.range_error) else seen.range_error
+    error = thing.range_sigma if math.isnan(glimpse.range_error) else glimpse.range_error
     sigma = math.hypot(error, thing.distance_sigma / thing.distance)
-    away = math.log(seen.range / thing.distance) / sigma
+    away = math.log(glimpse.range / thing.distance) / sigma
     return math.exp(-0.5 * away**2) / (sigma * math.sqrt(2.0 * math.pi))
 
 
-def false_density(seen: Seen, scene: Scene) -> float:
+def false_density(glimpse: Glimpse, scene: Scene) -> float:
     """Return the density of a false detection: lambda_j."""
-    disc = 1.0 if math.isnan(seen.range) else 2.0 * (seen.range / scene.reach) ** 2
-    come = sum(one.leaving * float(np.dot(seen.weights, one.names)) for one in scene.things)
-    return disc * (float(np.dot(seen.weights, scene.clutter)) + come) / 360.0
+    disc = 1.0 if math.isnan(glimpse.range) else 2.0 * (glimpse.range / scene.reach) ** 2
+    entering = sum(
+        thing.leaving * float(np.dot(glimpse.weights, thing.names)) for thing in scene.things
+    )
+    return disc * (float(np.dot(glimpse.weights, scene.clutter)) + entering) / 360.0
 
 
-def hit_density(seen: Seen, thing: Thing) -> float:
+def hit_density(glimpse: Glimpse, thing: Thing) -> float:
     """Return the density of an object being detected so: hit_ij."""
-    away = abs((seen.bearing - thing.bearing + 180.0) % 360.0 - 180.0)
+    away = abs((glimpse.bearing - thing.bearing + 180.0) % 360.0 - 180.0)
     if away > min(thing.tails * thing.bearing_sigma, 180.0):
         return 0.0
     return (
         thing.chance
-        * float(np.dot(seen.weights, thing.names))
-        * bearing_density(seen.bearing - thing.bearing, thing.bearing_sigma)
-        * range_density(seen, thing)
+        * float(np.dot(glimpse.weights, thing.names))
+        * bearing_density(glimpse.bearing - thing.bearing, thing.bearing_sigma)
+        * range_density(glimpse, thing)
     )
 
 
 def _empty(scene: Scene, photo: Photo) -> tuple[float, list[float]]:
     """Return the log-likelihood that a photo shows nothing, and the chance of missing each."""
     missed = [
-        1.0 - one.chance * mass_inside(one.bearing, one.bearing_sigma, photo)
-        for one in scene.things
+        1.0 - thing.chance * mass_inside(thing.bearing, thing.bearing_sigma, photo)
+        for thing in scene.things
     ]
-    false = sum(scene.clutter) + sum(one.leaving for one in scene.things)
+    false = sum(scene.clutter) + sum(thing.leaving for thing in scene.things)
     return sum(map(math.log, missed)) - photo.width / 360.0 * false, missed
 
 
-def set_loglik(scene: Scene, seen: Sequence[Seen], photo: Photo) -> float:
+def set_loglik(scene: Scene, glimpses: Sequence[Glimpse], photo: Photo) -> float:
     """Return the log-likelihood of one photo as a product over its detections."""
     total, missed = _empty(scene, photo)
-    for one in seen:
+    for glimpse in glimpses:
         hits = [
-            hit_density(one, thing) / chance
+            hit_density(glimpse, thing) / chance
             for thing, chance in zip(scene.things, missed, strict=True)
         ]
-        total += math.log(false_density(one, scene) + sum(hits))
+        total += math.log(false_density(glimpse, scene) + sum(hits))
     return total
 
 
-def exact_loglik(scene: Scene, seen: Sequence[Seen], photo: Photo) -> float:
+def exact_loglik(scene: Scene, glimpses: Sequence[Glimpse], photo: Photo) -> float:
     """Return the log-likelihood of one photo, summed over all one-to-one associations."""
     nothing, missed = _empty(scene, photo)
     total = 0.0
-    for choice in itertools.product(range(-1, len(scene.things)), repeat=len(seen)):
-        taken = [row for row in choice if row >= 0]
-        if len(set(taken)) < len(taken):
+    for choice in itertools.product(range(-1, len(scene.things)), repeat=len(glimpses)):
+        rows = [row for row in choice if row >= 0]
+        if len(set(rows)) < len(rows):
             continue
         total += math.prod(
-            false_density(one, scene)
+            false_density(glimpse, scene)
             if row < 0
-            else hit_density(one, scene.things[row]) / missed[row]
-            for one, row in zip(seen, choice, strict=True)
+            else hit_density(glimpse, scene.things[row]) / missed[row]
+            for glimpse, row in zip(glimpses, choice, strict=True)
         )
     return nothing + math.log(total)
 
@@ -174,12 +176,12 @@ def class_weights(view: View, codes: Sequence[int]) -> np.ndarray:
     """
     scores = view.class_scores()
     weights = np.ones((len(view), len(codes)))
-    known = scores[:, 0] < 1.0
-    weights[known] = scores[known][:, list(codes)] + scores[known, :1] / len(codes)
+    scored = scores[:, 0] < 1.0
+    weights[scored] = scores[scored][:, list(codes)] + scores[scored, :1] / len(codes)
     return weights
 
 
-def glimpses(view: View, codes: Sequence[int]) -> list[Seen]:
+def glimpses_of(view: View, codes: Sequence[int]) -> list[Glimpse]:
     """Return the detections of a view one by one."""
     assert view.bearings is not None
     blank = np.full(len(view), math.nan)
@@ -188,13 +190,13 @@ def glimpses(view: View, codes: Sequence[int]) -> list[Seen]:
     weights = class_weights(view, codes).tolist()
     rows = zip(view.bearings.tolist(), weights, ranges.tolist(), errors.tolist(), strict=True)
     return [
-        Seen(bearing=bearing, weights=chances, range=metres, range_error=error)
+        Glimpse(bearing=bearing, weights=chances, range=metres, range_error=error)
         for bearing, chances, metres, error in rows
     ]
 
 
 def fading(spec: NoiseSpec, name: str, distance: float) -> float:
-    """Return which share of the chance of detection is left at a distance."""
+    """Return the relative chance of detection at a distance."""
     points = spec.fading.get(name, spec.fading.get("all"))
     if points is None:
         return 1.0
@@ -203,7 +205,7 @@ def fading(spec: NoiseSpec, name: str, distance: float) -> float:
 
 
 def in_range(distance: float, limit: float, sigma: float) -> float:
-    """Return the chance that an object is in range of an observer who may stand elsewhere."""
+    """Return the chance that an object is in range of an observer with a position error."""
     return 0.5 * math.erfc((distance - limit) / (sigma * math.sqrt(2.0))) if sigma else 1.0
 
 
@@ -226,18 +228,18 @@ def scene_of(
         kind, name = int(table.row_of[code]), database.taxonomy.by_code(code).name
         metres = max(distance, 0.5 * database.reach / 255.0)  # the middle of the first unit
         turned = math.degrees(spec.position_sigma / metres)
-        seen = (1.0 - float(table.missed[row, kind])) * fading(spec, name, metres)
+        detected = (1.0 - float(table.missed[row, kind])) * fading(spec, name, metres)
         inside = in_range(metres, float(limits[code]), spec.position_sigma)
         things.append(
             Thing(
-                chance=seen * inside,
+                chance=detected * inside,
                 names=table.named[row, kind].tolist(),
                 bearing=bearing,
                 bearing_sigma=min(math.hypot(float(table.sigma[kind]), turned), 180.0),
                 distance=metres,
                 range_sigma=spec.range_sigma_by_class.get(name, spec.range_sigma),
                 distance_sigma=spec.position_sigma,
-                leaving=seen * (1.0 - inside),
+                leaving=detected * (1.0 - inside),
                 tails=tails,
             )
         )
@@ -249,7 +251,7 @@ def turned_loglik(
     view: View,
     codes: Sequence[int],
     headings: Iterable[Sequence[tuple[float, float]]],
-    form: Callable[[Scene, Sequence[Seen], Photo], float] = exact_loglik,
+    form: Callable[[Scene, Sequence[Glimpse], Photo], float] = exact_loglik,
 ) -> float:
     """Return the log-likelihood of all photos, given turns and their chances for each of them."""
     total = 0.0
@@ -257,8 +259,8 @@ def turned_loglik(
         each = []
         for turn, chance in turns:
             turned = part.turned(turn)
-            seen = glimpses(turned, codes)
-            each.append(math.log(chance) + form(scene, seen, turned.photos[0]))
+            glimpses = glimpses_of(turned, codes)
+            each.append(math.log(chance) + form(scene, glimpses, turned.photos[0]))
         total += float(np.logaddexp.reduce(each))
     return total
 
@@ -270,7 +272,7 @@ def cell_loglik(
     cell: int,
     *,
     headings: Iterable[Sequence[tuple[float, float]]] | None = None,
-    form: Callable[[Scene, Sequence[Seen], Photo], float] = exact_loglik,
+    form: Callable[[Scene, Sequence[Glimpse], Photo], float] = exact_loglik,
     tails: float = math.inf,
 ) -> float:
     """Return the log-likelihood of a view in a cell; `form` is `exact_loglik` or `set_loglik`.

@@ -1,4 +1,4 @@
-"""Small worlds of street objects, what a plain loop sees in them, and the files of runs on one."""
+"""Small worlds of street objects, their signatures by a simple loop, and files of a town."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def objects_of(
     crs: str = "EPSG:2154",
     **columns: Sequence[object],
 ) -> StreetObjects:
-    """Return street objects with some columns beside those of a thing."""
+    """Return street objects; `columns` are further columns or replace those of `things`."""
     x, y, codes, sources, ids = zip(*things, strict=True) if things else ((),) * 5
     plain = {"class_code": codes, "source": sources, "source_id": ids, "count": [1] * len(things)}
-    named = (plain | columns).items()
+    values_of = (plain | columns).items()
     table = gpd.GeoDataFrame(
-        {name: np.array(values, KINDS.get(name, object)) for name, values in named},
+        {name: np.array(values, KINDS.get(name, object)) for name, values in values_of},
         geometry=shapely.points(np.array(x, float), np.array(y, float)),
         crs=crs,
     )
@@ -63,7 +63,7 @@ def objects_of(
 
 @dataclass(frozen=True)
 class World:
-    """Objects as (x, y, class code), and how to look at them."""
+    """Objects as (x, y, class code), with the parameters of their signatures."""
 
     objects: tuple[tuple[float, float, int], ...]
     step: float = 10.0
@@ -71,7 +71,7 @@ class World:
     radius: float = 30.0
     levels: int = 16
     ranges: Mapping[int, float] = field(default_factory=dict)
-    """From how far some classes are seen, by code; the others from the radius."""
+    """Visibility ranges of some classes by code; the others have the radius."""
 
     @property
     def taxonomy(self) -> Taxonomy:
@@ -84,7 +84,7 @@ class World:
 
     @property
     def street_objects(self) -> StreetObjects:
-        things = [(*one, "world", str(row)) for row, one in enumerate(self.objects)]
+        things = [(*item, "world", str(row)) for row, item in enumerate(self.objects)]
         licenses = (Licence("World (CC0)", ("world",)),)
         return objects_of(*things, licenses=licenses, taxonomy=self.taxonomy)
 
@@ -98,7 +98,7 @@ class World:
 
 
 def brute_force(world: World) -> dict[tuple[int, int], list[tuple[float, float, int]]]:
-    """Return (bearing, distance, class code) of what every cell sees, one pair at a time."""
+    """Return (bearing, distance, class code) of the visible objects of every cell, by a loop."""
     cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
     reach = int(world.reach / world.step) + 2
     for x, y, code in world.objects:
@@ -124,8 +124,8 @@ def check_against_brute_force(world: World) -> None:
     database = world.database
     cells = list(zip(database.columns.tolist(), database.rows.tolist(), strict=True))
     assert cells == list(expected)
-    assert database.lengths.tolist() == [len(seen) for seen in expected.values()]
-    entries = [entry for seen in expected.values() for entry in seen]
+    assert database.lengths.tolist() == [len(visible) for visible in expected.values()]
+    entries = [entry for visible in expected.values() for entry in visible]
     assert database.codes.tolist() == [code for _, _, code in entries]
     units = [math.floor(bearing * 20) for bearing, _, _ in entries]
     assert database.bearing_units.tolist() == units
@@ -133,27 +133,27 @@ def check_against_brute_force(world: World) -> None:
     assert database.distance_units.tolist() == [round(d * scale) for _, d, _ in entries]
     if BEARING_UNITS % world.levels == 0:
         levels = [math.floor(bearing / (360 / world.levels)) for bearing, _, _ in entries]
-    else:  # an edge may lie between two units, of which the lower is stored
+    else:  # an edge may be between two units; the lower is stored
         levels = [unit * world.levels // BEARING_UNITS for unit in units]
     assert database.levels.tolist() == levels
     ends = database.offsets.tolist()
-    for seen, kind, sizes in (
+    for values, sequences, sizes in (
         (database.codes, database.type_sequences, database.type_group_sizes),
         (database.levels, database.angle_sequences, database.angle_group_sizes),
     ):
-        rows = [tuple(seen[a:b].tolist()) for a, b in pairwise(ends)]
+        rows = [tuple(values[a:b].tolist()) for a, b in pairwise(ends)]
         groups = Counter(rows)
         assert sizes.tolist() == [groups[row] for row in rows]
-        assert len(kind) == len(groups)
-        assert [tuple(kind[i].tolist()) for i in kind.inverse] == rows
+        assert len(sequences) == len(groups)
+        assert [tuple(sequences[i].tolist()) for i in sequences.inverse] == rows
 
 
-def assert_same(one: SignatureDatabase, other: SignatureDatabase) -> None:
+def assert_same(first: SignatureDatabase, second: SignatureDatabase) -> None:
     for name in ARRAYS:
-        assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
-        assert getattr(one, name).dtype == getattr(other, name).dtype, name
+        assert getattr(first, name).tolist() == getattr(second, name).tolist(), name
+        assert getattr(first, name).dtype == getattr(second, name).dtype, name
     for name in SPECS:
-        assert getattr(one, name) == getattr(other, name), name
+        assert getattr(first, name) == getattr(second, name), name
 
 
 def assert_index_fits(store: ObjectStore) -> None:
@@ -195,7 +195,7 @@ def worlds(draw: st.DrawFn) -> World:
 def random_town(
     seed: int = 7, *, count: int = 60, side: float = 200.0, codes: Sequence[int] = CODES
 ) -> World:
-    """Return so many objects in a square."""
+    """Return `count` objects in a square."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(0, side, (count, 2)) + CORNER
     return World(tuple((x, y, int(rng.choice(codes))) for x, y in places.tolist()))
@@ -206,7 +206,7 @@ def lamps() -> StreetObjects:
 
 
 def surroundings(*shapes: shapely.Geometry, **columns: list[Any]) -> gpd.GeoDataFrame:
-    # In degrees, so that they have to be moved.
+    # In degrees, so that they must be reprojected.
     return gpd.GeoDataFrame(columns, geometry=list(shapes), crs="EPSG:2154").to_crs("EPSG:4326")
 
 
@@ -221,7 +221,7 @@ def save_town(folder: Path, town: World = TOWN, name: str = "city.parquet") -> P
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return all files in a folder, but for those that tell times."""
+    """Return the contents of all files in a folder, except files with times."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import os
 import shutil
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,12 +40,7 @@ class Companion:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {
-            "path": str(self.path),
-            "what": self.what,
-            "bytes": self.bytes,
-            "needed": self.needed,
-        }
+        return {**asdict(self), "path": str(self.path)}
 
 
 def companions(database: str | Path) -> tuple[Companion, ...]:

@@ -212,13 +212,15 @@ def _text(column: pa.ChunkedArray) -> tuple[NDArray[np.uint8], NDArray[np.int64]
     array = _as_array(column, pa.string())
     _, ends, flat = array.buffers()
     offsets = np.frombuffer(ends, np.int32)[array.offset : array.offset + len(array) + 1]
-    return np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]], _rebased(offsets)
+    symbols = np.frombuffer(flat, np.uint8)[offsets[0] : offsets[-1]]
+    return symbols, offsets.astype(np.int64) - offsets[0]
 
 
 def _numbers(column: pa.ChunkedArray, kind: pa.DataType) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return the flat array and offsets of an Arrow column of lists of numbers."""
     array = _as_array(column, pa.list_(kind))
-    return whole_numbers(array.flatten()), _rebased(whole_numbers(array.offsets))
+    offsets = whole_numbers(array.offsets).astype(np.int64)
+    return whole_numbers(array.flatten()), offsets - offsets[0]
 
 
 def _as_array(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
@@ -228,10 +230,6 @@ def _as_array(column: pa.ChunkedArray, kind: pa.DataType) -> pa.Array:
             f"a column contains {len(column)} values of {column.type}, {column.null_count} missing"
         )
     return column.combine_chunks()
-
-
-def _rebased(offsets: NDArray[Any]) -> NDArray[np.int64]:
-    return offsets.astype(np.int64) - np.int64(offsets[0])
 
 
 def digest(*paths: Path) -> str:

@@ -130,7 +130,10 @@ def merge_databases(
         "version": __version__,
     }
     # Cells outside of this box depend on only one of the databases.
-    widest = _widest(store, template) if needs_streets else 0.0
+    widest = 0.0
+    if store.streets is not None and needs_streets:
+        widths = store.streets.get(HALF_WIDTH, np.empty(0))
+        widest = float(np.nanmax(np.append(widths, template.viewpoints.width)))
     boxes = [_bounds(part) for part in stores]
     around = max(template.reach, widest) + MARGIN_M
     low = np.maximum(*(box[:2] for box in boxes)) - around
@@ -180,13 +183,6 @@ def _union(
     union = gpd.GeoDataFrame(pd.concat([first, others], ignore_index=True), crs=first.crs)
     union.attrs[LICENSES] = list(licenses_of(first, second))
     return union
-
-
-def _widest(store: ObjectStore, database: SignatureDatabase) -> float:
-    """Return the largest half-width of any street in metres."""
-    streets = store.streets
-    widths = np.empty(0) if streets is None else streets.get(HALF_WIDTH, np.empty(0))
-    return float(np.nanmax(np.append(widths, database.viewpoints.width)))
 
 
 def _bounds(store: ObjectStore) -> NDArray[np.float64]:

@@ -353,13 +353,13 @@ def _read_inputs(folder: Path) -> ObjectStore:
     from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 1 s to load
 
     files = stored_inputs(folder)
-    objects = open_objects(files["objects"])
-
-    def read(role: Literal["buildings", "streets"]) -> gpd.GeoDataFrame | None:
-        path = files.get(role)
-        return None if path is None else read_surroundings(path, role=role, crs=objects.crs)
-
-    return ObjectStore.of(objects, footprints=read("buildings"), streets=read("streets"))
+    objects = open_objects(files.pop("objects"))
+    roles: tuple[Literal["buildings", "streets"], ...] = ("buildings", "streets")
+    houses, lines = (
+        read_surroundings(files[role], role=role, crs=objects.crs) if role in files else None
+        for role in roles
+    )
+    return ObjectStore.of(objects, footprints=houses, streets=lines)
 
 
 def _read_shapes(path: Path) -> gpd.GeoDataFrame:

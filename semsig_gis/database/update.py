@@ -258,7 +258,7 @@ def update_database(
             f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
             "build the database again."
         )
-    merged, kept_layers, notes = replace_layers(store.objects, objects)
+    merged, kept, notes = replace_layers(store.objects, objects)
     streets = store.streets if database.viewpoints.mode == "streets" else None
     new = replace(
         database,
@@ -273,7 +273,7 @@ def update_database(
             f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
             f"database ({database.reach:g} m), which affects every cell; build the database again."
         )
-    change = _find_change(new, store.objects, merged)
+    change = _find_change(new, store.objects, merged, kept=kept, notes=notes)
     after = replace(store, objects=merged)
     stale = np.isin(database.cell_ids, change.cell_ids)
     recomputed = _recompute(new, after, change, progress=progress)
@@ -283,11 +283,7 @@ def update_database(
             f"no cell would see any of the {len(merged):,} objects; check the new objects."
         )
     report = change.report(
-        kept_layers,
-        notes,
-        cells_before=len(database),
-        cells=len(updated),
-        drift=_count_drift(database.select(stale), recomputed),
+        len(database), len(updated), _count_drift(database.select(stale), recomputed)
     )
     return updated, after, report
 
@@ -352,8 +348,8 @@ def update_tiles(
     before = open_database(next(iter(files.values()))).select(slice(0))
     inputs = stored_inputs(folder)
     old, new = open_objects(inputs.pop("objects")), open_objects(objects)
-    merged, kept_layers, notes = replace_layers(old, new)
-    result = merged if kept_layers else new
+    merged, kept, notes = replace_layers(old, new)
+    result = merged if kept else new
     facts: dict[str, Any] = {
         "taxonomy": result.taxonomy,
         "licenses": (*map(str, result.licenses), *before.licenses[len(old.licenses) :]),
@@ -366,14 +362,15 @@ def update_tiles(
             f"the longest visibility range of {objects} is {after.reach:g} m and that of {path} "
             f"{before.reach:g} m, which affects every cell; build the database again."
         )
-    change = _find_change(replace(after, taxonomy=merged.taxonomy), old, merged)
+    ranged = replace(after, taxonomy=merged.taxonomy)
+    change = _find_change(ranged, old, merged, kept=kept, notes=notes)
     side = int(manifest.recipe["tile"]["cells"])
     tiles = np.unique(np.stack(split_ids(change.cell_ids), axis=1) // side, axis=0)
     stale: set[Tile] = {(column, row) for column, row in tiles.tolist()}
     target = Path(path if out is None else out)
     with working_folder(target) as work:
         source = Path(objects)
-        if kept_layers:
+        if kept:
             source = work / "objects.parquet"
             save_objects(merged, source)
         plan = plan_tiles(
@@ -409,59 +406,55 @@ def update_tiles(
         drift = _total_drift(plan, old_tiles, stale)
         old_tiles.stale.unlink()
         publish_tiles(plan.folder, parts)
-    return change.report(
-        kept_layers,
-        notes,
-        cells_before=manifest.cells,
-        cells=sum(part.cells for part in parts),
-        drift=drift,
-    )
+    return change.report(manifest.cells, sum(part.cells for part in parts), drift)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Change:
     """The difference between the objects of a database and the new objects.
 
     `places`, shape (c, 2) in metres, are the positions of removed and added objects; `cell_ids`,
-    ascending, are the cells in range of one. `layers` are the layers of the old and new objects.
+    ascending, are the cells in range of one. The other fields are as in `UpdateReport`.
     """
 
-    classes: tuple[ClassChange, ...]
-    layers: set[str]
     places: NDArray[np.float64]
     cell_ids: NDArray[np.int64]
+    classes: tuple[ClassChange, ...]
+    replaced: tuple[str, ...]
+    kept: tuple[str, ...]
+    notes: tuple[str, ...]
 
-    def report(
-        self,
-        kept_layers: tuple[str, ...],
-        notes: tuple[str, ...],
-        *,
-        cells_before: int,
-        cells: int,
-        drift: Mapping[str, int],
-    ) -> UpdateReport:
-        """Return the report of an update, from the kept layers and the counts of cells."""
+    def report(self, cells_before: int, cells: int, drift: Mapping[str, int]) -> UpdateReport:
+        """Return the report of an update, from the counts of cells."""
         return UpdateReport(
             classes=self.classes,
-            replaced=tuple(sorted(self.layers - set(kept_layers))),
-            kept=kept_layers,
+            replaced=self.replaced,
+            kept=self.kept,
             cells_before=cells_before,
             cells=cells,
             recomputed=len(self.cell_ids),
             changed=drift["changed"],
             appeared=drift["appeared"],
             vanished=drift["vanished"],
-            notes=notes,
+            notes=self.notes,
         )
 
 
-def _find_change(database: SignatureDatabase, old: StreetObjects, new: StreetObjects) -> _Change:
+def _find_change(
+    database: SignatureDatabase,
+    old: StreetObjects,
+    new: StreetObjects,
+    *,
+    kept: tuple[str, ...],
+    notes: tuple[str, ...],
+) -> _Change:
     """Compare objects, and find the cells in range of a change; ranges are of the `database`."""
     changes = compare_objects(old, new)
-    places = np.concatenate([old.xy[changes.obsolete_rows], new.xy[changes.new_rows]])
+    old_rows, new_rows = changes.obsolete_rows, changes.new_rows
+    places = np.concatenate([old.xy[old_rows], new.xy[new_rows]])
     ids = np.empty(0, np.int64)
     if len(places):
-        codes = np.concatenate([old.codes[changes.obsolete_rows], new.codes[changes.new_rows]])
+        codes = np.concatenate([old.codes[old_rows], new.codes[new_rows]])
         ranges = database.taxonomy.ranges(database.spec.radius)[codes]
         reach = float(ranges.max())
         columns, rows = cells_near(places, grid=database.grid, radius=reach)
@@ -470,7 +463,14 @@ def _find_change(database: SignatureDatabase, old: StreetObjects, new: StreetObj
         near = np.unique(measure_sightings(*pairs, viewpoints, places, ranges=ranges).viewpoint)
         ids = cell_ids(columns[near], rows[near])
     layers = {*old.table[SOURCE].unique(), *new.table[SOURCE].unique()}
-    return _Change(changes.classes, layers, places, ids)
+    return _Change(
+        places=places,
+        cell_ids=ids,
+        classes=changes.classes,
+        replaced=tuple(sorted(layers - {*kept})),
+        kept=kept,
+        notes=notes,
+    )
 
 
 def _recompute(

@@ -150,7 +150,17 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     """Return notes on a query; `present` are the class codes that occur in the database."""
     if not len(query):
         return ("nothing was seen, which says little about the place.",)
-    notes = _sector_notes(query, taxonomy) if isinstance(query, View) else ()
+    notes: tuple[str, ...] = ()
+    if isinstance(query, View) and query.bearings is not None and len(outside := query.outside()):
+        symbols = "?" * len(query) if query.codes is None else taxonomy.decode(query.codes)
+        listed = ", ".join(
+            f"{symbols[row]} at {query.bearings[row]:.1f}°" for row in outside.tolist()
+        )
+        note = (
+            f"{listed} {'is' if len(outside) == 1 else 'are'} outside the sectors that were looked "
+            "at; the heading, the field of view or the bearing may be wrong."
+        )
+        notes = (note,)
     codes = [] if query.codes is None else query.codes[~query.among(present)].tolist()
     if not codes:
         return notes
@@ -158,18 +168,3 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     legend = ", ".join(f"{item.symbol} ({item.title.lower()})" for item in lacking)
     note = f"no cell of the database sees {legend}, so it counts as a false detection."
     return (note, *notes)
-
-
-def _sector_notes(view: View, taxonomy: Taxonomy) -> tuple[str, ...]:
-    """Return a note on objects outside the sectors of their photo."""
-    outside = view.outside().tolist()
-    if not outside or view.bearings is None:
-        return ()
-    symbols = "?" * len(view) if view.codes is None else taxonomy.decode(view.codes)
-    listed = ", ".join(f"{symbols[row]} at {view.bearings[row]:.1f}°" for row in outside)
-    verb = "is" if len(outside) == 1 else "are"
-    note = (
-        f"{listed} {verb} outside the sectors that were looked at; the heading, the field of view "
-        "or the bearing may be wrong."
-    )
-    return (note,)

@@ -108,15 +108,6 @@ def make_locator(
 @overload
 def make_locator(
     database: Cells,
-    method: Method,
-    *,
-    requirement: Requirement | None = None,
-    index: LikelihoodIndex | None = None,
-    **options: Unpack[LocateOptions],
-) -> DistanceLocator: ...
-@overload
-def make_locator(
-    database: Cells,
     method: AnyMethod,
     *,
     requirement: Requirement | None = None,

@@ -46,7 +46,19 @@ class Requirement:
         """
         limits: dict[int, tuple[int, float]] = {}
         for part in map(str.strip, text.split(",")):
-            symbol, least, most = _parse_part(part, text)
+            least, most = 0, math.inf
+            if match := _COMPARISON.fullmatch(part):
+                symbol, sign, digits = match.groups()
+                least = 0 if sign == "<=" else int(digits)
+                most = math.inf if sign == ">=" else int(digits)
+            elif match := _AMOUNT.fullmatch(part):
+                digits, symbol = match.groups()
+                least = int(digits or 1)
+            else:
+                raise InputError(
+                    f"{part!r} in requirement {text!r} cannot be read; give parts such as 'M', "
+                    "'2B', 'B>=2', 'B<=5' or 'B=3' with commas between them, '?' for all objects."
+                )
             code = WILDCARD if symbol == "?" else taxonomy.by_symbol(symbol).code
             low, high = limits.get(code, (0, math.inf))
             limits[code] = low, high = max(low, least), min(high, most)
@@ -69,18 +81,3 @@ class Requirement:
                 numbers = counts[:, code].astype(np.int64)
             mask &= (numbers >= least) & (numbers <= most)
         return np.asarray(mask[sequences.inverse])
-
-
-def _parse_part(part: str, text: str) -> tuple[str, int, float]:
-    """Return the symbol, the minimum and the maximum of one part of a requirement."""
-    if match := _COMPARISON.fullmatch(part):
-        symbol, sign, digits = match.groups()
-        number = int(digits)
-        return symbol, 0 if sign == "<=" else number, math.inf if sign == ">=" else number
-    if match := _AMOUNT.fullmatch(part):
-        digits, symbol = match.groups()
-        return symbol, int(digits or 1), math.inf
-    raise InputError(
-        f"{part!r} in requirement {text!r} cannot be read; give parts such as 'M', '2B', 'B>=2', "
-        "'B<=5' or 'B=3' with commas between them, '?' for all objects."
-    )

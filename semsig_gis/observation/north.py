@@ -88,7 +88,14 @@ class North:
         if name == "grid":
             return cls()
         if bounds is None:
-            crs, bounds = _from_database(crs)
+            warnings.warn(
+                "North.of(name, database) is North.of(name, database.crs, database.bounds) now; "
+                "version 0.3.0 removes the old form.",
+                DeprecationWarning,
+                stacklevel=2,
+            )
+            database: Any = crs
+            crs, bounds = database.crs, database.bounds
         # The middle of the city, then its corners.
         west, south, east, north = np.asarray(bounds, dtype=np.float64)
         middle = (west + east) / 2.0, (south + north) / 2.0
@@ -153,14 +160,3 @@ def declination(
     day = dt.datetime.combine(date, dt.time())
     east, north, _ = ppigrf.igrf(lon, lat, 0.0, day)
     return np.asarray(np.degrees(np.arctan2(east, north))).reshape(-1)
-
-
-def _from_database(database: Any) -> tuple[CRS, ArrayLike]:  # noqa: ANN401 - of a package above
-    """Return the CRS and the bounds of a database, which `North.of` took up to version 0.1."""
-    warnings.warn(
-        "North.of(name, database) is North.of(name, database.crs, database.bounds) now; "
-        "version 0.3.0 removes the old form.",
-        DeprecationWarning,
-        stacklevel=3,
-    )
-    return database.crs, database.bounds

@@ -1,4 +1,4 @@
-"""The real city of Montpellier, against figures of an independent program and plain loops."""
+"""Open data of Montpellier, compared with an independent program and plain loops."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 RADIUS = 30.0
 
-# File, class and rows of every layer as published, and what the catalogue's filters and the
-# collapsing of duplicates leave of it.
+# File, class and rows of every layer as published, and the rows after the filters of the catalogue
+# and the collapsing of duplicates.
 LAYERS = {
     "trees": ("ArbresAlign", "alignment_tree", 23_972, 23_972),
     "fountains": ("FontainesPublic", "water_fountain", 89, 64),
@@ -61,8 +61,8 @@ def everything(geodata: Path) -> tuple[StreetObjects, LoadReport]:
 
 
 @pytest.fixture(scope="module")
-def chosen(geodata: Path) -> tuple[StreetObjects, LoadReport]:
-    """Return the objects as the catalogue means them: filters and collapsing on."""
+def filtered(geodata: Path) -> tuple[StreetObjects, LoadReport]:
+    """Return the objects with filters and collapsing."""
     return load(geodata, filters=True, collapse=True)
 
 
@@ -80,14 +80,14 @@ def published(geodata: Path) -> pd.DataFrame:
     parts = []
     for name, (file, kind, _, _) in LAYERS.items():
         frame = pyogrio.read_dataframe(geodata / "montpellier" / f"VilleMTP_MTP_{file}.zip")
-        moved = frame.to_crs("EPSG:2154")
+        metric = frame.to_crs("EPSG:2154")
         parts.append(
             pd.DataFrame(
                 {
                     "layer": name,
                     "kind": kind,
-                    "x": moved.geometry.x,
-                    "y": moved.geometry.y,
+                    "x": metric.geometry.x,
+                    "y": metric.geometry.y,
                     "state": frame.get("ETAT"),
                     "lantern": frame.get("type_lante"),
                     "bay": frame.get("F01_TYPE_D"),
@@ -99,7 +99,7 @@ def published(geodata: Path) -> pd.DataFrame:
 
 
 def check_cells(database: SignatureDatabase, objects: StreetObjects) -> None:
-    """Compare all cells with what a look at every object from every cell around it gives."""
+    """Compare all cells with the sightings of every object from every cell around it."""
     x, y = objects.xy.T
     east, north = database.grid.origin
     column, row = np.floor((objects.xy - (east, north)) / 10.0).astype(np.int64).T
@@ -108,10 +108,10 @@ def check_cells(database: SignatureDatabase, objects: StreetObjects) -> None:
         dx = x - (east + 10.0 * (column + i) + 5.0)
         dy = y - (north + 10.0 * (row + j) + 5.0)
         bearing = np.round(np.degrees(np.arctan2(dx, dy)) % 360.0, 9) % 360.0
-        seen = np.stack([column + i, row + j, bearing, np.hypot(dx, dy), objects.codes])
-        parts.append(seen[:, dx * dx + dy * dy <= RADIUS * RADIUS])
-    seen = np.concatenate(parts, axis=1)
-    column, row, bearing, distance, codes = seen[:, np.lexsort(seen[::-1])]
+        sightings = np.stack([column + i, row + j, bearing, np.hypot(dx, dy), objects.codes])
+        parts.append(sightings[:, dx * dx + dy * dy <= RADIUS * RADIUS])
+    sightings = np.concatenate(parts, axis=1)
+    column, row, bearing, distance, codes = sightings[:, np.lexsort(sightings[::-1])]
     numbers, lengths = np.unique(column * 1e8 + row, return_counts=True)
     for ours, expected in (
         (database.cell_ids, numbers),
@@ -140,13 +140,13 @@ def test_every_object_is_loaded(everything: tuple[StreetObjects, LoadReport]) ->
         assert item.notes == ()
 
 
-def test_positions_are_those_of_another_reader(
+def test_positions_equal_another_reader(
     everything: tuple[StreetObjects, LoadReport], published: pd.DataFrame
 ) -> None:
     objects, _ = everything
     frame = published
     assert objects.table["source"].tolist() == frame["layer"].tolist()
-    # The files with a WKT of their own are moved by some micrometres at most.
+    # Files with their own WKT differ by some micrometres at most.
     assert objects.xy == pytest.approx(frame[["x", "y"]].to_numpy(), abs=1e-3)
     names = [objects.taxonomy.by_code(code).name for code in objects.codes.tolist()]
     taxi = frame["bay"].eq("Taxi").to_numpy(bool)
@@ -156,7 +156,7 @@ def test_positions_are_those_of_another_reader(
     assert (taxi.sum(), disabled.sum()) == (6, 150)
 
 
-def test_the_signatures_are_as_many_and_as_long_as_another_program_found(
+def test_number_and_length_of_signatures_equal_another_program(
     city: SignatureDatabase, everything: tuple[StreetObjects, LoadReport]
 ) -> None:
     assert abs(len(city) - 265_099) <= 20
@@ -167,7 +167,7 @@ def test_the_signatures_are_as_many_and_as_long_as_another_program_found(
     check_cells(city, everything[0])
 
 
-def test_the_grid_may_begin_elsewhere(everything: tuple[StreetObjects, LoadReport]) -> None:
+def test_the_grid_may_have_another_origin(everything: tuple[StreetObjects, LoadReport]) -> None:
     shifted = build_database(everything[0], grid=GridSpec(origin=(5.0, 5.0)))
     assert set(np.unique(shifted.xy % 10.0)) == {0.0}
     assert len(shifted) == 265_191
@@ -178,7 +178,7 @@ def test_the_database_survives_its_file(city: SignatureDatabase, tmp_path: Path)
     path = tmp_path / "montpellier.parquet"
     save_database(city, path)
     assert_same(open_database(path), city)
-    # 1,681,844 objects seen, of one, two and two bytes before compression.
+    # 1,681,844 sightings, five bytes each before compression.
     assert path.stat().st_size < 8_000_000
     frame = gpd.read_parquet(path, columns=["cell_id", "length", "geometry"])
     assert frame["length"].tolist() == city.lengths.tolist()
@@ -188,38 +188,40 @@ def test_the_database_survives_its_file(city: SignatureDatabase, tmp_path: Path)
 # --- Filters and collapsing on ----------------------------------------------------------------
 
 
-def test_the_catalogue_leaves_what_it_should(
-    chosen: tuple[StreetObjects, LoadReport], published: pd.DataFrame
+def test_filters_of_the_catalogue_equal_a_plain_selection(
+    filtered: tuple[StreetObjects, LoadReport], published: pd.DataFrame
 ) -> None:
-    objects, report = chosen
+    objects, report = filtered
     assert {item.name: item.counts.kept for item in report.layers} == {
-        name: kept for name, (_, _, _, kept) in LAYERS.items()
+        name: rows for name, (_, _, _, rows) in LAYERS.items()
     }
     assert len(objects) == 55_652
     frame = published
     lamp = ["LANTERNE", "Lanterne", "LUMINAIRE AMBIANCE", "Luminaire en applique"]
-    wanted = (
+    selection = (
         (frame["layer"].ne("fountains") | frame["state"].eq("en fonction"))
         & (frame["layer"].ne("street_lights") | frame["lantern"].isin(lamp))
         & (frame["layer"].ne("reserved_bays") | frame["bay"].ne("GIG/GIC"))
         & (frame["layer"].ne("car_parks") | frame["parking"].isin(["Surface", "Superstructure"]))
     )
-    kept = frame[wanted]
-    assert int(objects.table["count"].sum()) == len(kept)
-    places = kept.assign(x=kept["x"].round(2), y=kept["y"].round(2), bay=kept["bay"].fillna(""))
+    expected = frame[selection]
+    assert int(objects.table["count"].sum()) == len(expected)
+    places = expected.assign(
+        x=expected["x"].round(2), y=expected["y"].round(2), bay=expected["bay"].fillna("")
+    )
     distinct = places.drop_duplicates(["kind", "bay", "x", "y"])
     assert len(objects) == len(distinct)
     assert objects.table["source"].tolist() == distinct["layer"].tolist()
 
 
-def test_the_quality_of_the_load(chosen: tuple[StreetObjects, LoadReport]) -> None:
-    objects, load = chosen
+def test_quality_report_of_montpellier(filtered: tuple[StreetObjects, LoadReport]) -> None:
+    objects, load = filtered
     report = quality_report(objects, load)
     by_name = {item.class_name: item for item in report.classes}
     assert by_name["alignment_tree"].nearest_m == pytest.approx(6.5, abs=0.1)
     meters = by_name["parking_meter"]
     assert (meters.rows, meters.objects, report.objects) == (823, 701, len(objects))
-    # The commune has 57 km2; the hull of its objects is of that size, what is lit is less.
+    # The commune has 57 km2, about the hull of its objects; the occupied squares are fewer.
     assert 40 < report.hull_km2 < 80
     squares = {(int(x // 100), int(y // 100)) for x, y in objects.xy.tolist()}
     assert report.occupied_km2 == pytest.approx(len(squares) / 100)
@@ -227,16 +229,16 @@ def test_the_quality_of_the_load(chosen: tuple[StreetObjects, LoadReport]) -> No
     assert np.allclose(report.extent_degrees, (3.81, 43.57, 3.94, 43.65), atol=0.02)
 
 
-def test_the_figures_with_the_catalogue_as_it_is(
-    chosen: tuple[StreetObjects, LoadReport],
+def test_signatures_with_filters_and_collapsing(
+    filtered: tuple[StreetObjects, LoadReport],
 ) -> None:
-    database = build_database(chosen[0])
+    database = build_database(filtered[0])
     assert len(database) == 263_487
     assert database.lengths.mean() == pytest.approx(5.97264, abs=5e-6)
-    check_cells(database, chosen[0])
+    check_cells(database, filtered[0])
 
 
-def test_streets_are_as_wide_as_their_kind_is(geodata: Path) -> None:
+def test_street_widths_follow_the_kind_of_street(geodata: Path) -> None:
     (pair,), _ = find_files(
         [load_catalog("montpellier").layer("streets")], [geodata / "montpellier"]
     )

@@ -1,4 +1,4 @@
-"""The catalogue of OpenStreetMap: its tags, and the real extracts against plain loops."""
+"""The catalogue of OpenStreetMap: its tags, and real extracts compared with plain loops."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ EXTRACTS = {
 
 TABLE = tomllib.loads(Path(__file__).with_name("openstreetmap.toml").read_text(encoding="utf-8"))
 LAYERS = TABLE["paper"] | TABLE["further"]
-# The corners of what the ways and areas of the tests are drawn with.
+# Corners of the ways and areas in the tests.
 PLACES = [node(1, 0.0, 0.0), node(2, 0.001, 0.0), node(3, 0.001, 0.001)]
 
 
@@ -45,8 +45,10 @@ def tags_of(text: str) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Mapping[str, set[str]]]:
-    """Return, by tags, the layers that find something with them, and as which kinds of element."""
+def layers_by_tags(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Mapping[str, Mapping[str, set[str]]]:
+    """Return, by tags, the layers that select them, with the kinds of elements."""
     tagged = [*(text for _, _, texts in LAYERS.values() for text in texts), *TABLE["near_misses"]]
     elements = [*PLACES]
     for number, tags in enumerate(map(tags_of, tagged), 10):
@@ -65,8 +67,8 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Mapping[str,
 
 
 def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
-    named = {spec.class_name for spec in CATALOG.layers if spec.role == "objects"}
-    assert named == {item.name for item in CATALOG.taxonomy.classes}
+    class_names = {spec.class_name for spec in CATALOG.layers if spec.role == "objects"}
+    assert class_names == {item.name for item in CATALOG.taxonomy.classes}
     assert all(address.startswith("https://") for address in CATALOG.endpoints)
     assert {spec.name: (spec.class_name or spec.role) for spec in CATALOG.layers} == {
         name: meaning for name, (meaning, *_) in LAYERS.items()
@@ -90,21 +92,21 @@ def test_the_table_has_every_layer_and_tag_of_the_catalogue() -> None:
     ("name", "text"),
     [(name, text) for name, (_, _, texts) in LAYERS.items() for text in texts],
 )
-def test_every_tag_is_of_its_layer_alone(
-    found: Mapping[str, Mapping[str, set[str]]], name: str, text: str
+def test_every_tag_belongs_to_one_layer(
+    layers_by_tags: Mapping[str, Mapping[str, set[str]]], name: str, text: str
 ) -> None:
-    assert found[text] == {name: set(LAYERS[name][1].split(" "))}
+    assert layers_by_tags[text] == {name: set(LAYERS[name][1].split(" "))}
 
 
 @pytest.mark.parametrize("text", TABLE["near_misses"])
-def test_near_misses_are_of_no_layer(
-    found: Mapping[str, Mapping[str, set[str]]], text: str
+def test_near_misses_belong_to_no_layer(
+    layers_by_tags: Mapping[str, Mapping[str, set[str]]], text: str
 ) -> None:
-    assert found[text] == {}
+    assert layers_by_tags[text] == {}
 
 
-def test_a_stop_is_one_point(tmp_path: Path) -> None:
-    """One on a way is left out and told, and one that is a platform, too, is not a second."""
+def test_a_bus_stop_is_one_point(tmp_path: Path) -> None:
+    """A stop on a way is filtered and counted; a stop that is also a platform is read once."""
     tags = {"highway": "bus_stop", "public_transport": "platform", "bus": "yes"}
     path = write_osm(
         tmp_path / "city.osm",
@@ -120,7 +122,7 @@ def test_a_stop_is_one_point(tmp_path: Path) -> None:
 
 # --- Real extracts ----------------------------------------------------------------------------
 
-# A tag of each layer, of any value where none is given.
+# A tag of each layer; a key without a value matches any value.
 BARE_TAGS = {
     "trees": "natural=tree",
     "drinking_water": "amenity=drinking_water",
@@ -140,9 +142,9 @@ BARE_TAGS = {
 
 
 def bare_loop(path: Path) -> tuple[Counter[str], Counter[str]]:
-    """Count elements by layer and kind; also those of ways that lack nodes."""
+    """Count elements by layer and kind, and ways with missing nodes."""
     kinds = {"n": "node", "w": "way", "r": "relation"}
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     clipped: Counter[str] = Counter()
     for element in osmium.FileProcessor(str(path)).with_locations():
         assert isinstance(element, Node | Way | Relation)
@@ -150,10 +152,10 @@ def bare_loop(path: Path) -> tuple[Counter[str], Counter[str]]:
         for name, texts in BARE_TAGS.items():
             if not tags.isdisjoint(texts.split(" ")):
                 key = f"{name} {kinds[element.type_str()]}"
-                seen[key] += 1
+                counts[key] += 1
                 if isinstance(element, Way) and not all(n.location.valid() for n in element.nodes):
                     clipped[key] += 1
-    return seen, clipped
+    return counts, clipped
 
 
 @functools.cache
@@ -164,11 +166,11 @@ def read_extract(geodata: Path, city: str, *, filters: bool = True) -> Mapping[s
 
 
 def by_kind(layers: Mapping[str, RawLayer]) -> Counter[str]:
-    kept: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for name, layer in layers.items():
         assert layer.counts.kept == len(layer.table)
-        kept.update(name + " " + layer.table.source_id.str.split("/").str[0])
-    return kept
+        counts.update(name + " " + layer.table.source_id.str.split("/").str[0])
+    return counts
 
 
 @pytest.mark.parametrize("city", EXTRACTS)
@@ -184,32 +186,35 @@ def test_objects_of_the_classes_of_the_paper(geodata: Path, city: str) -> None:
 
 
 @pytest.mark.parametrize("city", EXTRACTS)
-def test_what_is_not_seen_from_the_street_is_left_out(geodata: Path, city: str) -> None:
+def test_objects_not_visible_from_the_street_are_excluded(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city)
-    told = {
+    excluded = {
         name: note.removeprefix("left out by the catalogue's not: ")
         for name, layer in layers.items()
         for note in layer.notes
         if note.startswith("left out by the catalogue's not: ")
     }
-    assert told == TABLE["cities"][city]["excluded"]
-    assert {name for name, layer in layers.items() if layer.counts.excluded} == set(told)
+    assert excluded == TABLE["cities"][city]["excluded"]
+    assert {name for name, layer in layers.items() if layer.counts.excluded} == set(excluded)
 
 
 @pytest.mark.parametrize("city", EXTRACTS)
-def test_a_bare_loop_counts_the_same(geodata: Path, city: str) -> None:
+def test_counts_equal_a_plain_loop(geodata: Path, city: str) -> None:
     layers = read_extract(geodata, city, filters=False)
-    kept = by_kind(layers)
-    seen, clipped = bare_loop(geodata / "osm" / EXTRACTS[city])
-    assert seen["buildings way"] == TABLE["cities"][city]["buildings"][0]
+    counts = by_kind(layers)
+    expected, clipped = bare_loop(geodata / "osm" / EXTRACTS[city])
+    assert expected["buildings way"] == TABLE["cities"][city]["buildings"][0]
     for name in BARE_TAGS:
         spec = layers[name].spec
         assert layers[name].counts.read == sum(
-            seen[f"{name} {kind}"] for kind in ("node", "way", "relation")
+            expected[f"{name} {kind}"] for kind in ("node", "way", "relation")
         )
         for kind in ("node", "way"):
-            wanted = seen[f"{name} {kind}"] - clipped[f"{name} {kind}"]
-            assert kept[f"{name} {kind}"] == (wanted if kind in spec.elements else 0), (name, kind)
+            complete = expected[f"{name} {kind}"] - clipped[f"{name} {kind}"]
+            assert counts[f"{name} {kind}"] == (complete if kind in spec.elements else 0), (
+                name,
+                kind,
+            )
 
 
 @pytest.mark.parametrize("city", EXTRACTS)
@@ -222,14 +227,14 @@ def test_buildings_and_streets(geodata: Path, city: str) -> None:
     assert buildings.table.geometry.is_valid.all()
     assert (streets.table.geometry.geom_type == "LineString").all()
     assert len(streets.table) > 30
-    # Houses are small, and nearly all of them on land of their own.
+    # Buildings are small, and nearly none of them overlap.
     metric = buildings.table.to_crs(buildings.table.estimate_utm_crs()).geometry
     assert 20 < metric.area.median() < 2000
     assert shapely.union_all(metric.array).area > 0.9 * metric.area.sum()
 
 
-def test_a_street_is_as_wide_as_its_class_is(geodata: Path) -> None:
-    """Widths are those of the catalogue by the tag, read by a plain loop."""
+def test_street_widths_follow_the_highway_tag(geodata: Path) -> None:
+    """Widths equal the widths in the catalogue for the tag, read by a plain loop."""
     path = geodata / "osm" / EXTRACTS["helsinki"]
     table = read_extract(geodata, "helsinki")["streets"].table
     highways = {
@@ -242,13 +247,13 @@ def test_a_street_is_as_wide_as_its_class_is(geodata: Path) -> None:
     half = {value: width / 2 for value, width in by.widths}
     assert table["half_width"].tolist() == [half[highways[name]] for name in table["source_id"]]
     assert half["primary"] > half["residential"] > half["living_street"]
-    # What `semsig build --streets FILE.osm.pbf` looks at.
+    # As read by `semsig build --streets FILE.osm.pbf`.
     streets = read_surroundings(path, role="streets", crs="EPSG:32635")
     assert streets["half_width"].tolist() == table["half_width"].tolist()
 
 
-def test_areas_are_those_of_pyosmium(geodata: Path) -> None:
-    """The areas of multipolygons are those that libosmium assembles."""
+def test_areas_equal_pyosmium(geodata: Path) -> None:
+    """The areas of multipolygons equal those assembled by libosmium."""
     path = geodata / "osm" / EXTRACTS["monaco"]
     factory = osmium.geom.WKBFactory()
     expected = {
@@ -312,5 +317,5 @@ def test_a_database_is_built_and_evaluated(
     assert (objects.xy.max(axis=0) - objects.xy.min(axis=0) < 1.3 * extent).all()
     database = build_database(objects)
     evaluation = evaluate(database, queries=20, distortion="none", method="edit+edit", seed=1)
-    # Nothing is distorted, so that the true cell is among the best.
+    # Without distortion, the true cell is among the best.
     assert (evaluation.queries.rank_low == 1).all()

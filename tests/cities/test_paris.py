@@ -1,4 +1,4 @@
-"""The published files of Paris, each as it is, against figures of an independent reader."""
+"""Published files of Paris, compared with figures of an independent reader."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from semsig_gis.sources import RawLayer
 
 STOPS = "positions-geographiques-des-stations-du-reseau-ratp.csv"
-# File, layer, rows as published, rows that the filter leaves out, rows that repeat an id, and
-# objects at different places.
+# File, layer, rows as published, filtered rows, rows with a repeated id, and objects at different
+# places.
 FILES = [
     ("fontaines-a-boire.json", "fountains", 1_323, 0, 0, 1_323),
     ("fontaines-a-boire__DashParis.csv", "fountains", 1_188, 0, 0, 1_188),
@@ -46,7 +46,7 @@ FILES = [
     (STOPS, "bus_stops", 25_338, 955, 0, 11_589),
 ]
 TREES = [name for name, layer, *_ in FILES if layer == "trees"]
-# Boundaries and land use, which hold no street objects.
+# Boundaries and land use, without street objects.
 OTHERS = {
     "arrondissements.geojson",
     "gpdtut_paris_districts.geojson",
@@ -74,7 +74,7 @@ def build(*layers: RawLayer) -> StreetObjects:
 
 
 def rows_of(path: Path) -> list[dict[str, Any]]:
-    """Read a CSV file with nothing but Python's own reader."""
+    """Read a CSV file with the csv module of Python."""
     with path.open(encoding="utf-8-sig", newline="") as stream:
         sample = stream.readline()
         stream.seek(0)
@@ -123,11 +123,11 @@ def test_published_files_load_as_they_are(
     assert len(layer.table) + layer.counts.duplicates == layer.counts.read
 
 
-# --- Trap by trap -------------------------------------------------------------------------------
+# --- Special cases of single files --------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("filters", "count"), [(False, 16_328), (True, 7_055)])
-def test_trees_of_all_files_are_one_list_of_ids(paris: Path, *, filters: bool, count: int) -> None:
+def test_tree_ids_of_all_files_are_distinct(paris: Path, *, filters: bool, count: int) -> None:
     layers = [read(paris / file, "trees", filters=filters) for file in TREES]
     ids: set[str] = set().union(*(layer.table["source_id"] for layer in layers))
     trees = [
@@ -139,7 +139,7 @@ def test_trees_of_all_files_are_one_list_of_ids(paris: Path, *, filters: bool, c
             else [item["properties"] for item in features_of(paris / file)]
         )
     ]
-    # Some ids were written as floats, and headers are in capitals or not.
+    # Some ids are written as floats, and some headers in capitals.
     assert len(ids) == count
     assert ids == {
         str(tree["idbase"]).removesuffix(".0")
@@ -177,14 +177,14 @@ def test_objects_in_several_files_are_taken_once(
         (STOPS, "bus_stops", "Coordinates", "ID"),
     ],
 )
-def test_positions_are_those_of_the_point_column(
+def test_positions_equal_the_point_column(
     paris: Path, file: str, name: str, field: str, identifier: str
 ) -> None:
     layer = read(paris / file, name, filters=False)
     rows = rows_of(paris / file)
     ids = [row[identifier].removesuffix(".0") for row in rows]
     assert layer.table["source_id"].tolist() == ids
-    # The shape has some decimals more than the point.
+    # The shape has more decimals than the point.
     assert xy_of(layer) == pytest.approx(np.array(lat_lon([row[field] for row in rows])), abs=1e-9)
 
 
@@ -197,7 +197,7 @@ def test_shapes_of_toilets_are_points_in_a_list(paris: Path) -> None:
     assert xy_of(layer) == pytest.approx(np.array(lat_lon(points)), abs=1e-9)
 
 
-def test_stations_of_autolib_stand_still(paris: Path) -> None:
+def test_autolib_stations_have_one_position(paris: Path) -> None:
     rows = rows_of(paris / "Autolib_dataset.csv")
     places = {row["ID"]: row["Geo point"] for row in rows}
     assert all(places[row["ID"]] == row["Geo point"] for row in rows)
@@ -216,7 +216,7 @@ def test_lamps_of_a_support_are_one_traffic_light(paris: Path) -> None:
         assert len(build(layer)) == len(places) == len(supports)
 
 
-def test_traffic_light_positions_are_the_distinct_ones(paris: Path) -> None:
+def test_traffic_light_positions_are_distinct(paris: Path) -> None:
     content = json.loads((paris / "coord-feurouge_west.json").read_text())
     places = {(item["lng"], item["lat"]) for item in content}
     layer = read(paris / "coord-feurouge_west.json", "traffic_light_positions")
@@ -224,13 +224,13 @@ def test_traffic_light_positions_are_the_distinct_ones(paris: Path) -> None:
     assert len(build(layer)) == len(places) == 4_539
 
 
-def test_stops_in_capitals_are_those_of_buses_and_trams(paris: Path) -> None:
+def test_stops_in_capitals_are_bus_and_tram_stops(paris: Path) -> None:
     file = paris / STOPS
     layer = read(file, "bus_stops")
     rows = rows_of(file)
     stops = [row for row in rows if row["Name"] == row["Name"].upper()]
     assert layer.table["source_id"].tolist() == [row["ID"] for row in stops]
-    # What supports the rule: every short number is a station's, whose names are all mixed.
+    # Short ids belong to stations, which have names in mixed case.
     assert len(rows) - len(stops) == 955
     assert all(len(row["ID"]) == 7 for row in stops)
 

@@ -26,7 +26,7 @@ from semsig_gis.database import open_database
 if TYPE_CHECKING:
     from stand_ins import StandIn
 
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 DATA = Path(__file__).with_name("data")
 X, Y = 770_000.0, 6_280_000.0
@@ -51,78 +51,78 @@ def text(name: str) -> str:
 
 
 @pytest.mark.usefixtures("city")
-def test_the_road_from_files_to_a_place(done: Done) -> None:
-    report = json.loads(done(LOAD, "--json"))
+def test_the_road_from_files_to_a_place(run_ok: RunOk) -> None:
+    report = json.loads(run_ok(LOAD, "--json"))
     lights, crossings = report["sources"]
     assert report["objects"] == 21
     assert (lights["read"], lights["collapsed"], lights["kept"]) == (21, 1, 20)
     assert (crossings["read"], crossings["filtered"], crossings["kept"]) == (2, 1, 1)
-    out = done(LOAD)
+    out = run_ok(LOAD)
     assert "per km² of hull" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out
-    assert "cells of mean length" in done("build o.parquet --out c.parquet")
-    assert "Nobody (CC0-1.0)" in str(json.loads(done("info c.parquet --json")))
-    out = done("info c.parquet")
+    assert "cells of mean length" in run_ok("build o.parquet --out c.parquet")
+    assert "Nobody (CC0-1.0)" in str(json.loads(run_ok("info c.parquet --json")))
+    out = run_ok("info c.parquet")
     assert "Street light (D)" in out
     assert "Nobody (CC0-1.0): lights, crossings" in out
 
     query = "localize c.parquet --types DX --bearings 200,20"
-    answer = json.loads(done(query, "--paper", "--top", 3, "--json"))
+    answer = json.loads(run_ok(query, "--paper", "--top", 3, "--json"))
     assert answer["method"] == "edit+edit:5%"
     assert answer["query"]["types"] == "XD"
     assert len(answer["candidates"]) == 3
     best = answer["candidates"][0]
     # The only crossing stands at x = 770010, y = 6280010.
     assert max(abs(best["x"] - 770010), abs(best["y"] - 6280010)) <= 30
-    assert "by likelihood (generic noise)" in done(query, "--map", "query.html")
+    assert "by likelihood (generic noise)" in run_ok(query, "--map", "query.html")
     assert "leaflet" in text("query.html").lower()
 
 
 @pytest.mark.usefixtures("city")
-def test_evaluate_map_and_export(done: Done) -> None:
+def test_evaluate_map_and_export(run_ok: RunOk) -> None:
     line = "evaluate city.parquet --queries 30 --distortion light --seed 5 --method edit+edit:20%"
-    summary = json.loads(done(line, "--out", "eval", "--json"))
+    summary = json.loads(run_ok(line, "--out", "eval", "--json"))
     assert summary["settings"]["queries"] == 30
     assert summary["settings"]["method"] == "edit+edit:20%"
     assert summary.pop("timing")["seconds_per_query"] > 0
     assert json.loads(text("eval/evaluation.json")) == summary
-    out = done(line, "--report", "eval.html")
+    out = run_ok(line, "--report", "eval.html")
     assert out.startswith(f"{summary['results']['p_error_within_m']['50']:.0%}".rstrip("%"))
     assert "report: eval.html" in out
     page = text("eval.html")
     assert f"semsig {line} --report eval.html" in page
     assert '<h1 dir="auto">City: how well queries are placed</h1>' in page
     assert "queries were placed within 50 m" in page
-    assert "map.html" in done("map city.parquet --evaluation eval --out map.html")
+    assert "map.html" in run_ok("map city.parquet --evaluation eval --out map.html")
     assert Path("map.html").stat().st_size > 1000
 
-    done("export city.parquet --objects objects.parquet --out city.gpkg")
+    run_ok("export city.parquet --objects objects.parquet --out city.gpkg")
     assert set(gpd.list_layers("city.gpkg")["name"]) >= {"cells", "objects"}
     assert set(gpd.read_file("city.gpkg", layer="cells").geom_type) == {"Polygon"}
-    done("export city.parquet --geometry point --out points.gpkg")
+    run_ok("export city.parquet --geometry point --out points.gpkg")
     assert set(gpd.read_file("points.gpkg", layer="cells").geom_type) == {"Point"}
 
 
 @pytest.mark.usefixtures("city")
-def test_switches_keep_what_filters_and_collapsing_take(done: Done) -> None:
+def test_switches_keep_what_filters_and_collapsing_take(run_ok: RunOk) -> None:
     line = f"{LOAD} --no-filter --no-collapse --json"
-    assert json.loads(done(line))["objects"] == 23
-    assert json.loads(done(line, "--layer", "crossings"))["objects"] == 2
+    assert json.loads(run_ok(line))["objects"] == 23
+    assert json.loads(run_ok(line, "--layer", "crossings"))["objects"] == 2
 
 
 @pytest.mark.usefixtures("city")
-def test_how_far_the_plane_is_from_the_ground_is_told_and_limited(run: Run, done: Done) -> None:
+def test_how_far_the_plane_is_from_the_ground_is_told_and_limited(run: Run, run_ok: RunOk) -> None:
     sentence(run(f"{LOAD} --max-distortion 1e-6"), "too wide", "EPSG:2154", "--max-distortion")
-    plane = json.loads(done("info city.parquet --json"))["distortion"]
+    plane = json.loads(run_ok("info city.parquet --json"))["distortion"]
     assert (plane["angle"], plane["stretch"]) == pytest.approx((0.63, 3e-4), abs=0.01)
-    told = json.loads(done(f"{LOAD} --json"))["distortion"]
+    told = json.loads(run_ok(f"{LOAD} --json"))["distortion"]
     assert told["angle"] == pytest.approx(plane["angle"], abs=0.01)
-    assert "at most 0.63° off true north" in done("info city.parquet")
+    assert "at most 0.63° off true north" in run_ok("info city.parquet")
 
 
 @pytest.mark.parametrize("tiles", ["", "--tile 200"])
 def test_what_a_load_warns_of_is_kept_with_the_data(
-    city: Path, run: Run, done: Done, tiles: str
+    city: Path, run: Run, run_ok: RunOk, tiles: str
 ) -> None:
     (city / "crossings.geojson").unlink()
     catalog = (city / "tiny.toml").read_text(encoding="utf-8")
@@ -135,23 +135,23 @@ def test_what_a_load_warns_of_is_kept_with_the_data(
     assert absent.startswith("layer 'crossings' has no file here")
     assert "1 to 9 were expected" in few
     target = "town" if tiles else "town.parquet"
-    done(f"build o.parquet --out {target} {tiles}")
+    run_ok(f"build o.parquet --out {target} {tiles}")
     notes = [absent, f"lights: {few}"]
-    assert json.loads(done(f"info {target} --json"))["notes"] == notes
-    printed = done(f"info {target}")
+    assert json.loads(run_ok(f"info {target} --json"))["notes"] == notes
+    printed = run_ok(f"info {target}")
     assert all(note in printed for note in notes)
 
 
 @pytest.mark.usefixtures("city")
-def test_origin_moves_the_grid(done: Done) -> None:
-    done("build objects.parquet --origin 5,5 --out moved.parquet")
+def test_origin_moves_the_grid(run_ok: RunOk) -> None:
+    run_ok("build objects.parquet --origin 5,5 --out moved.parquet")
     assert set(gpd.read_parquet("moved.parquet").geometry.x % 10) == {0.0}
     assert set(gpd.read_parquet("city.parquet").geometry.x % 10) == {5.0}
 
 
 @pytest.mark.usefixtures("city")
-def test_sources(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
-    listed = json.loads(done("sources --json"))
+def test_sources(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = json.loads(run_ok("sources --json"))
     names = {item["name"] for item in listed["catalogs"]}
     assert names >= {"montpellier", "opendata_paris", "openstreetmap"}
     facts = {item["name"]: item for item in listed["catalogs"]}
@@ -165,9 +165,9 @@ def test_sources(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
     assert facts["washington"]["classes"][0] == "alignment_tree"
     monkeypatch.delenv("MAPILLARY_ACCESS_TOKEN", raising=False)
     unset = "a token (MAPILLARY_ACCESS_TOKEN, not set)"
-    assert unset in done("sources")
+    assert unset in run_ok("sources")
     monkeypatch.setenv("MAPILLARY_ACCESS_TOKEN", "MLY|secret")
-    out = done("sources mapillary")
+    out = run_ok("sources mapillary")
     assert "place: world; needs files, or an area" in out
     assert "secret" not in out
     assert "osm_file" in listed["readers"]
@@ -185,11 +185,11 @@ def test_sources(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
         "sources tiny.toml --json": ('"title": "A tiny city"',),
         "draft lights.gpkg": ("[[layers]]", 'files = ["lights.gpkg"]'),
     }.items():
-        out = done(line)
+        out = run_ok(line)
         assert all(word in out for word in words), line
 
 
-def test_two_catalogues_are_loaded_and_merged(city: Path, done: Done) -> None:
+def test_two_catalogues_are_loaded_and_merged(city: Path, run_ok: RunOk) -> None:
     (city / "survey.toml").write_text(
         'name = "survey"\ntitle = "Survey"\n'
         '[[layers]]\nname = "lamps"\nclass = "street_light"\nfiles = ["survey.gpkg"]\n'
@@ -197,13 +197,13 @@ def test_two_catalogues_are_loaded_and_merged(city: Path, done: Done) -> None:
         encoding="utf-8",
     )
     write_layer(city / "survey.gpkg", shapely.Point(X + 1, Y), shapely.Point(X + 1000, Y))
-    report = json.loads(done(f"{LOAD} --catalog survey.toml --json"))
+    report = json.loads(run_ok(f"{LOAD} --catalog survey.toml --json"))
     assert report["objects"] == 22
     assert [(item["count"], item["kept"]) for item in report["conflated"]] == [(1, "tiny/lights")]
-    assert json.loads(done(f"{LOAD} --catalog survey.toml --no-merge --json"))["objects"] == 23
+    assert json.loads(run_ok(f"{LOAD} --catalog survey.toml --no-merge --json"))["objects"] == 23
 
 
-def test_which_layers_of_openstreetmap_are_read(city: Path, done: Done) -> None:
+def test_which_layers_of_openstreetmap_are_read(city: Path, run_ok: RunOk) -> None:
     kinds = (
         {"amenity": "bench"},
         {"highway": "crossing", "crossing": "zebra"},
@@ -222,17 +222,17 @@ def test_which_layers_of_openstreetmap_are_read(city: Path, done: Done) -> None:
         ("--layer clocks", 1, 1, None),
         ("--paper-classes --layer +clocks", 2, 1, None),
     ):
-        report = json.loads(done(f"{line} {options} --json"))
+        report = json.loads(run_ok(f"{line} {options} --json"))
         unread = {item["name"]: item["objects"] for item in report["unread"]}
         found = (report["objects"], unread.get("crossings"), unread.get("clocks"))
         assert found == (objects, crossings, clocks), options
-    out = done(f"{line} --paper-classes")
+    out = run_ok(f"{line} --paper-classes")
     assert "Layers not read" in out
     assert "pedestrian_crossing" not in out.partition("No objects of")[2].partition("Rows by")[0]
     assert "--layer +NAME" in out
 
 
-def test_openstreetmap_with_its_surroundings(city: Path, run: Run, done: Done) -> None:
+def test_openstreetmap_with_its_surroundings(city: Path, run: Run, run_ok: RunOk) -> None:
     write_osm(
         city / "town.osm",
         node(1, 7.42, 43.73, {"amenity": "bench"}),
@@ -242,7 +242,7 @@ def test_openstreetmap_with_its_surroundings(city: Path, run: Run, done: Done) -
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
     surroundings = "--out o.parquet --buildings b.parquet --streets s.parquet"
-    assert "EPSG:32632" in done(f"load town.osm --catalog openstreetmap {surroundings}")
+    assert "EPSG:32632" in run_ok(f"load town.osm --catalog openstreetmap {surroundings}")
     assert list(gpd.read_parquet("b.parquet").geom_type) == ["Polygon"]
     assert list(gpd.read_parquet("s.parquet").geom_type) == ["LineString"]
     load = "load extract.osm --catalog openstreetmap --out o.parquet --json"
@@ -253,7 +253,7 @@ def test_openstreetmap_with_its_surroundings(city: Path, run: Run, done: Done) -
         node(2, 7.46, 43.73, {"amenity": "bench"}),
     )
     for clip, outside, kept in (("", 0, 2), ("--clip box", 1, 1), ("--clip 7.45,43,8,44", 1, 1)):
-        report = json.loads(done(f"{load} {clip}"))
+        report = json.loads(run_ok(f"{load} {clip}"))
         (benches,) = (one for one in report["sources"] if one["name"] == "benches")
         assert (benches["outside"], benches["kept"]) == (outside, kept)
         assert any("--area" in note for note in report["notes"]) == bool(clip)
@@ -325,8 +325,8 @@ def test_fetch_from_a_service_needs_no_more_than_its_address_and_a_dataset(
         sentence(run(fetch), "a web page")
 
 
-def test_demo(tmp_path: Path, done: Done) -> None:
-    out = done("demo --queries 5 --out", tmp_path / "demo")
+def test_demo(tmp_path: Path, run_ok: RunOk) -> None:
+    out = run_ok("demo --queries 5 --out", tmp_path / "demo")
     for name in ("map.html", "city.gpkg", "city.parquet"):
         assert name in out
         assert (tmp_path / "demo" / name).stat().st_size > 0
@@ -364,21 +364,21 @@ def test_a_query_loads_no_tables_or_maps_and_writes_nothing(city: Path, options:
     assert sorted(city.rglob("*")) == before
 
 
-def test_what_lies_beside_a_database_is_told_and_removed(city: Path, done: Done) -> None:
+def test_what_lies_beside_a_database_is_told_and_removed(city: Path, run_ok: RunOk) -> None:
     old = city / "city.parquet.generic-8d47.likelihood"
     old.write_bytes(b"1" * 300_000)
-    assert "likelihood index of an older version" in done("info city.parquet")
-    beside = json.loads(done("info city.parquet --json"))["beside"]
+    assert "likelihood index of an older version" in run_ok("info city.parquet")
+    beside = json.loads(run_ok("info city.parquet --json"))["beside"]
     assert [(one["what"], one["needed"]) for one in beside] == [
         ("street objects", True),
         ("likelihood index of an older version", False),
     ]
-    assert "0.3 MB in all" in done("clean city.parquet --dry-run")
-    told = json.loads(done("clean city.parquet --json"))
+    assert "0.3 MB in all" in run_ok("clean city.parquet --dry-run")
+    told = json.loads(run_ok("clean city.parquet --json"))
     assert (told["dry_run"], told["bytes"], told["removed"]) == (False, 300_000, beside[1:])
     assert not old.exists()
-    assert "nothing to remove next to city.parquet" in done("clean city.parquet")
-    assert "street objects" in done("clean city.parquet --objects")
+    assert "nothing to remove next to city.parquet" in run_ok("clean city.parquet")
+    assert "street objects" in run_ok("clean city.parquet --objects")
     assert not (city / "city.objects").exists()
 
 
@@ -391,35 +391,35 @@ def test_the_console_script_is_installed() -> None:
 
 
 @pytest.mark.usefixtures("city")
-def test_the_likelihood_is_evaluated_and_drawn(run: Run, done: Done) -> None:
+def test_the_likelihood_is_evaluated_and_drawn(run: Run, run_ok: RunOk) -> None:
     line = "evaluate city.parquet --queries 20 --noise light"
-    summary = json.loads(done(line, "--out", "eval", "--json"))
+    summary = json.loads(run_ok(line, "--out", "eval", "--json"))
     assert summary["settings"]["method"] == "likelihood:light:on_grid"
     assert 0 <= summary["results"]["coverage"] <= 1
     code, out, err = run(line)
     assert (code, "Answered" in out) == (0, True)
     assert "index" not in err  # it is kept beside the database
-    done("map city.parquet --evaluation eval --out map.html")
+    run_ok("map city.parquet --evaluation eval --out map.html")
     assert "likelihood:light:on_grid" in text("map.html")
 
 
 def test_many_queries_are_answered_line_by_line(
-    city: Path, done: Done, monkeypatch: pytest.MonkeyPatch
+    city: Path, run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = b'{"id": "a", "types": "DD"}\n{"types": "?D", "bearings": [10, 200]}\n'
     (city / "queries.jsonl").write_bytes(lines)
     for method in ("edit+edit", "likelihood"):
-        out = done("localize city.parquet --queries queries.jsonl --method", method)
+        out = run_ok("localize city.parquet --queries queries.jsonl --method", method)
         answers = [json.loads(line) for line in out.splitlines()]
         assert [answer["id"] for answer in answers] == ["a", 2]
         assert all(answer["candidates"] for answer in answers)
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(lines)))
-    assert len(done("localize city.parquet --queries - --require 2D").splitlines()) == 2
+    assert len(run_ok("localize city.parquet --queries - --require 2D").splitlines()) == 2
 
 
 @pytest.mark.usefixtures("city")
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
-def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: str) -> None:
+def test_what_a_photo_shows_is_said_in_words_and_repeated(run_ok: RunOk, method: str) -> None:
     words = "lamp at 80 within 12 m, crossing at 120 far, street light at 200"
     query = (
         "localize city.parquet --top 2 --method",
@@ -430,7 +430,7 @@ def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: st
         "--look",
         90,
     )
-    answer = json.loads(done(*query, "--json"))
+    answer = json.loads(run_ok(*query, "--json"))
     seen = answer["query"]
     assert (seen["types"], seen["bearings"]) == ("DXD", [80.0, 120.0, 200.0])
     assert seen["ranges"] == [pytest.approx(7.3, abs=0.1), pytest.approx(25, abs=1), None]
@@ -439,13 +439,13 @@ def test_what_a_photo_shows_is_said_in_words_and_repeated(done: Done, method: st
     notes += ["edit+edit does not use ranges and sectors"] if method == "edit+edit" else []
     for note, words in zip(answer["notes"], notes, strict=True):
         assert words in note
-    out = done(*query)
+    out = run_ok(*query)
     assert "Seen: D 80° 7.28 m ± 56 %, X 120° 25.2 m ± 28 %, D 200°; looked at 55-125°." in out
     line = json.dumps(seen | {"id": "again"})
     Path("queries.jsonl").write_text(line)
     noise = ("--noise", "by-hand") if method == "likelihood" else ()
     again = json.loads(
-        done("localize city.parquet --queries queries.jsonl --top 2 --method", method, *noise)
+        run_ok("localize city.parquet --queries queries.jsonl --top 2 --method", method, *noise)
     )
     assert again["query"] == seen
     assert again["candidates"] == answer["candidates"]
@@ -478,16 +478,16 @@ def test_every_line_of_a_batch_has_an_answer_or_an_error(city: Path, run: Run, m
     ("seen", "note"), [("--types X", "X (crossing)"), ("--bearings=", "nothing was seen")]
 )
 def test_what_no_cell_sees_and_nothing_are_answered(
-    done: Done, method: str, seen: str, note: str
+    run_ok: RunOk, method: str, seen: str, note: str
 ) -> None:
     query = f"localize few.parquet {seen} --method {method}"
-    (said,) = json.loads(done(f"{query} --json"))["notes"]
+    (said,) = json.loads(run_ok(f"{query} --json"))["notes"]
     assert note in said
-    assert f"Note: {said}" in done(query)
+    assert f"Note: {said}" in run_ok(query)
 
 
 def test_buildings_streets_and_an_area_narrow_what_is_built(
-    city: Path, run: Run, done: Done
+    city: Path, run: Run, run_ok: RunOk
 ) -> None:
     square = shapely.box(770_000, 6_280_005, 770_400, 6_280_025)
     street = shapely.LineString([(770_000, 6_280_000), (770_400, 6_280_000)])
@@ -509,7 +509,7 @@ def test_buildings_streets_and_an_area_narrow_what_is_built(
         "wide": "--streets streets.geojson --viewpoints streets --street-width 40",
         "area": "--area area.parquet",
     }.items():
-        assert "cells of mean length" in done(f"{build} {options}")
+        assert "cells of mean length" in run_ok(f"{build} {options}")
         database = open_database("narrow.parquet")
         cells[name], seen[name] = len(database), int(database.lengths.sum())
     assert cells["outdoor"] < cells["buildings"] <= cells["all"]
@@ -555,7 +555,7 @@ def test_usage_errors_exit_2(run: Run) -> None:
     assert (code, "Traceback" in err) == (2, False)
 
 
-def test_a_file_without_a_crs_needs_one(city: Path, run: Run, done: Done) -> None:
+def test_a_file_without_a_crs_needs_one(city: Path, run: Run, run_ok: RunOk) -> None:
     bare = text("tiny.toml").replace(
         'files = ["lights.*"]\ncrs = "EPSG:2154"', 'files = ["lights.*"]'
     )
@@ -565,7 +565,7 @@ def test_a_file_without_a_crs_needs_one(city: Path, run: Run, done: Done) -> Non
         gpd.GeoDataFrame(geometry=[shapely.Point(X, Y)]).to_file(city / "lights.shp")
     line = f"{LOAD} --layer lights"
     sentence(run(line), "lights.shp")
-    done(line, "--crs", "EPSG:2154")
+    run_ok(line, "--crs", "EPSG:2154")
     sentence(run(line, "--crs", "EPSG:0"), "EPSG:0")
     sentence(run(line, "--crs", "EPSG:4978"), "EPSG:4978", "geocentric")
     sentence(run(line, "--crs", "EPSG:5773"), "EPSG:5773", "vertical")

@@ -10,7 +10,7 @@ import pytest
 from sentences import sentence
 
 if TYPE_CHECKING:
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 SPEC = """
 database = "city.parquet"
@@ -36,7 +36,7 @@ def _spec(town: Path) -> None:  # noqa: ARG001
     write_spec()
 
 
-def test_an_experiment_is_run_and_compared(run: Run, done: Done) -> None:
+def test_an_experiment_is_run_and_compared(run: Run, run_ok: RunOk) -> None:
     code, out, _ = run(EXPERIMENT, "results")
     assert code == 0
     for words in ("phone: medium, compass:5, view:180", "refined, t = 1", "results: results"):
@@ -45,37 +45,37 @@ def test_an_experiment_is_run_and_compared(run: Run, done: Done) -> None:
     assert (code, err) == (0, "")
     cases = list(json.loads(out))
     assert cases == ["phone/paper-top1", "phone/refined-top1"]
-    done(EXPERIMENT, "side-by-side", "--workers", 2)
+    run_ok(EXPERIMENT, "side-by-side", "--workers", 2)
     assert Path("side-by-side/figures.csv").read_text() == Path("results/figures.csv").read_text()
     paths = [f"results/{case}" for case in cases]
-    out = done("compare", *paths)
+    out = run_ok("compare", *paths)
     assert f"{paths[1]} places " in out.splitlines()[0]
     assert "p50" in out
     assert paths[0] in "".join(out.split())  # lines are broken at 80 signs
-    same = json.loads(done("compare results results --json"))
+    same = json.loads(run_ok("compare results results --json"))
     assert list(same) == cases
     assert {row["difference"] for row in same["phone/paper-top1"]} <= {0.0, None}
-    done("map city.parquet --evaluation", paths[1], "--out", "map.html")
+    run_ok("map city.parquet --evaluation", paths[1], "--out", "map.html")
 
 
-def test_what_is_refused(run: Run, done: Done) -> None:
+def test_what_is_refused(run: Run, run_ok: RunOk) -> None:
     sentence(run(EXPERIMENT, "results", "--workers", -1), "--workers was given as -1", "0 to 1,024")
     write_spec(SPEC.replace("edit+edit", "edti+edit"))
     sentence(run(EXPERIMENT, "results"), "'edti'", "nearest is 'edit'")
     write_spec(SPEC.replace("30", "1000000"))
     sentence(run(EXPERIMENT, "results"), "1000000 queries")
     write_spec()
-    done(EXPERIMENT, "results")
+    run_ok(EXPERIMENT, "results")
     write_spec(SPEC.replace("compass:5", "compass:6"))
     sentence(run(EXPERIMENT, "results"), "another experiment", "distortions")
     write_spec(SPEC.replace("paper", "best").replace("30", "20"))
-    done(EXPERIMENT, "other")
+    run_ok(EXPERIMENT, "other")
     sentence(run("compare results other"), "different queries")
     pair = "compare results/phone/paper-top1 other"
     sentence(run(pair), "a single evaluation", "none in common")
 
 
-def test_distortions_on_the_command_line(done: Done) -> None:
+def test_distortions_on_the_command_line(run_ok: RunOk) -> None:
     default = "light:resort=false:false_class=frequency"
     several = "--distortion medium,missing:bench,view:120 --keep-order"
     for options, distortions in (
@@ -84,5 +84,5 @@ def test_distortions_on_the_command_line(done: Done) -> None:
         (f"--distortion {default} --false-class uniform", ["light:resort=false"]),
         ("--distortion light --false-class frequency", ["light:false_class=frequency"]),
     ):
-        out = done(f"evaluate city.parquet --queries 5 --json {options}")
+        out = run_ok(f"evaluate city.parquet --queries 5 --json {options}")
         assert json.loads(out)["settings"]["distortions"] == distortions

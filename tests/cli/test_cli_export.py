@@ -23,7 +23,7 @@ from semsig_gis.exports import cell_errors
 from semsig_gis.objects import open_objects, save_objects
 
 if TYPE_CHECKING:
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 
 @pytest.fixture(autouse=True)
@@ -58,12 +58,12 @@ def test_a_city_goes_into_a_geopackage_and_back(run: Run) -> None:
     assert Path("back_objects.parquet").read_bytes() == Path("objects.parquet").read_bytes()
 
 
-def test_one_layer(done: Done) -> None:
-    done("export city.parquet --out cells.csv")
+def test_one_layer(run_ok: RunOk) -> None:
+    run_ok("export city.parquet --out cells.csv")
     assert "chance_found" in pd.read_csv("cells.csv").columns
-    done("export city.parquet --geometry point --out p.parquet")
+    run_ok("export city.parquet --geometry point --out p.parquet")
     assert set(gpd.read_parquet("p.parquet").geom_type) == {"Point"}
-    done("export city.parquet --evaluation evaluation --layer error --out e.tif")
+    run_ok("export city.parquet --evaluation evaluation --layer error --out e.tif")
     expected = cell_errors(small_evaluation(), small_city()[0]).astype("float32")
     np.testing.assert_array_equal(raster_values("e.tif"), expected)
 
@@ -75,20 +75,20 @@ def raster_values(path: str) -> list[float]:
 
 
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
-def test_what_must_be_searched_after_a_query(method: str, done: Done) -> None:
+def test_what_must_be_searched_after_a_query(method: str, run_ok: RunOk) -> None:
     types = small_city()[0].types(7)
     line = f"localize city.parquet --types {types} --method {method} --out answer.gpkg"
-    out = done(line, "--within", 15)
+    out = run_ok(line, "--within", 15)
     assert "km2" in out
     assert "% of the city" in out
-    searched = json.loads(done(line, "--json"))["searched"]
+    searched = json.loads(run_ok(line, "--json"))["searched"]
     regions = gpd.read_file("answer.gpkg", layer="regions")
     assert regions["cells"].sum() == searched["cells"]
     assert regions.geometry.area.sum() == pytest.approx(searched["km2"] * 1e6)
 
 
-def test_the_chance_of_every_cell(done: Done) -> None:
-    out = done("localize city.parquet --types DD --method likelihood --out p.tif")
+def test_the_chance_of_every_cell(run_ok: RunOk) -> None:
+    out = run_ok("localize city.parquet --types DD --method likelihood --out p.tif")
     assert out.splitlines()[-1] == "chances: p.tif"
     assert sum(raster_values("p.tif")) == pytest.approx(1.0, abs=1e-4)
 
@@ -115,18 +115,18 @@ def test_the_number_of_cells_that_tie_is_printed(
     assert f"\n{words}" in capsys.readouterr().out
 
 
-def test_formats_for_other_programs(run: Run, done: Done) -> None:
+def test_formats_for_other_programs(run: Run, run_ok: RunOk) -> None:
     hexagons = "--objects objects.parquet --evaluation evaluation --h3 10"
-    done(f"export city.parquet {hexagons} --out hexagons.geojson")
+    run_ok(f"export city.parquet {hexagons} --out hexagons.geojson")
     table = gpd.read_file("hexagons.geojson")
     assert table["cells"].sum() == len(small_city()[0])
     assert {"chance_found", "objects", "queries", "found"} <= set(table.columns)
     save_with_store(small_city()[0], ObjectStore.of(small_city()[1]), "stored.parquet")
-    done("export stored.parquet --h3 10 --out stored.fgb")
+    run_ok("export stored.parquet --h3 10 --out stored.fgb")
     assert gpd.read_file("stored.fgb")["objects"].sum() == len(small_city()[1])
-    done("export city.parquet --out cells.pmtiles")
+    run_ok("export city.parquet --out cells.pmtiles")
     assert Path("cells.pmtiles").read_bytes()[:8] == b"PMTiles\x03"
-    done("export city.parquet --objects objects.parquet --out city.json")
+    run_ok("export city.parquet --objects objects.parquet --out city.json")
     assert set(json.loads(Path("city.json").read_text())["assets"]) == {"database", "objects"}
     sentence(run("export city.parquet --h3 9 --out city.json"), "city.json", "--objects")
     sentence(run("export city.parquet --h3 16 --out a.fgb"), "--h3", "16")

@@ -25,7 +25,7 @@ from semsig_gis.evaluation.identifiability import analysis
 from semsig_gis.objects import save_objects
 
 if TYPE_CHECKING:
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 # Each class is left out once, which takes its time.
 WORLD = random_town(codes=[1, 3, 10])
@@ -42,7 +42,7 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects), "city.parquet")
 
 
-def test_the_columns_are_printed_drawn_and_exported(run: Run, done: Done) -> None:
+def test_the_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> None:
     code, out, err = run("identify city.parquet --noise medium --check 40")
     assert code == 0
     for words in ("Identifiability, medium noise", "What each class adds", "by 1,000 objects",
@@ -58,19 +58,19 @@ def test_the_columns_are_printed_drawn_and_exported(run: Run, done: Done) -> Non
     facts = json.loads(out)
     assert facts["chance_found"] == pytest.approx(cells["chance_found"].mean())
     assert facts["classes"][0]["objects"] > 0
-    assert json.loads(done("info city.parquet --json"))["identifiability"] == facts
-    assert "Identifiability, medium noise" in done("info city.parquet")
+    assert json.loads(run_ok("info city.parquet --json"))["identifiability"] == facts
+    assert "Identifiability, medium noise" in run_ok("info city.parquet")
 
-    done("map city.parquet --identifiability --out map.html")
+    run_ok("map city.parquet --identifiability --out map.html")
     assert "Where a query can be placed" in Path("map.html").read_text(encoding="utf-8")
-    done("export city.parquet --out city.gpkg")
+    run_ok("export city.parquet --out city.gpkg")
     exported = gpd.read_file("city.gpkg", layer="cells")
     assert exported["chance_found"].tolist() == cells["chance_found"].tolist()
 
 
-def test_another_noise_seed_or_radius_is_worked_out_anew(run: Run, done: Done) -> None:
+def test_another_noise_seed_or_radius_is_worked_out_anew(run: Run, run_ok: RunOk) -> None:
     options = "--threads 2 --check 20"
-    first = json.loads(done(IDENTIFY, *options.split()))
+    first = json.loads(run_ok(IDENTIFY, *options.split()))
     assert (first["seed"], first["radius_m"], first["check"]["seed"]) == (0, 50.0, 1)
     for line in (
         f"{IDENTIFY} {options} --seed 3",
@@ -84,33 +84,33 @@ def test_another_noise_seed_or_radius_is_worked_out_anew(run: Run, done: Done) -
         assert json.loads(out) != first
 
 
-def test_photos_are_told_where_they_are_shown(done: Done) -> None:
-    assert "A photo of 70 degrees from the mean cell" in done(
+def test_photos_are_told_where_they_are_shown(run_ok: RunOk) -> None:
+    assert "A photo of 70 degrees from the mean cell" in run_ok(
         "identify city.parquet --noise medium --view 70 --check 20 --out report"
     )
-    assert json.loads(done("info city.parquet --json"))["identifiability"]["view_degrees"] == 70.0
-    assert "photo of 70 degrees" in done("info city.parquet")
-    done("map city.parquet --identifiability --out map.html")
+    assert json.loads(run_ok("info city.parquet --json"))["identifiability"]["view_degrees"] == 70.0
+    assert "photo of 70 degrees" in run_ok("info city.parquet")
+    run_ok("map city.parquet --identifiability --out map.html")
     for page in ("map.html", "report/report.html"):
         assert "photo of 70 degrees" in Path(page).read_text(encoding="utf-8")
 
 
-def test_a_database_in_parts(done: Done) -> None:
+def test_a_database_in_parts(run_ok: RunOk) -> None:
     build_tiles("objects.parquet", "city", tile=TileSpec(100.0))
-    facts = json.loads(done(IDENTIFY.replace("city.parquet", "city")))
-    assert json.loads(done("info city --json"))["identifiability"] == facts
+    facts = json.loads(run_ok(IDENTIFY.replace("city.parquet", "city")))
+    assert json.loads(run_ok("info city --json"))["identifiability"] == facts
 
 
-def test_an_update_takes_the_columns_away_and_says_so(run: Run, done: Done) -> None:
-    done(IDENTIFY)
+def test_an_update_takes_the_columns_away_and_says_so(run: Run, run_ok: RunOk) -> None:
+    run_ok(IDENTIFY)
     for first in (True, False):
         code, _, err = run("update city.parquet --objects objects.parquet")
         assert (code, "run semsig identify again" in err, "identify" in err) == (0, first, first)
-        assert "Identifiability" not in done("info city.parquet")
+        assert "Identifiability" not in run_ok("info city.parquet")
 
 
-def test_columns_that_do_not_fit_are_named_and_left_out(run: Run, done: Done) -> None:
-    done(IDENTIFY)
+def test_columns_that_do_not_fit_are_named_and_left_out(run: Run, run_ok: RunOk) -> None:
+    run_ok(IDENTIFY)
     whole = open_database("city.parquet")
     save_database(whole.select(slice(9, None)), "other.parquet")
     stored = City("city.parquet").columns("identifiability")

@@ -22,7 +22,7 @@ from semsig_gis.objects import save_surroundings
 if TYPE_CHECKING:
     import geopandas as gpd
 
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 OBJECTS = random_town().street_objects
 FEWER = dataclasses.replace(OBJECTS, table=OBJECTS.table[4:].reset_index(drop=True))
@@ -38,42 +38,42 @@ def save_city(**ground: gpd.GeoDataFrame) -> None:
     save_with_store(build_database(OBJECTS), store, "city.parquet")
 
 
-def drawn(done: Done, options: str) -> str:
+def drawn(run_ok: RunOk, options: str) -> str:
     """Return the page of a map."""
-    assert done(f"map city.parquet {options} --out map.html") == "map: map.html\n"
+    assert run_ok(f"map city.parquet {options} --out map.html") == "map: map.html\n"
     return Path("map.html").read_text(encoding="utf-8")
 
 
-def test_objects_alone_and_over_an_evaluation(done: Done) -> None:
-    alone = drawn(done, "--objects objects.parquet")
+def test_objects_alone_and_over_an_evaluation(run_ok: RunOk) -> None:
+    alone = drawn(run_ok, "--objects objects.parquet")
     assert (alone.count(DRAWN_OBJECTS), alone.count(DRAWN_GROUND)) == (1, 0)
-    done("evaluate city.parquet --queries 5 --out evaluation")
-    both = drawn(done, "--evaluation evaluation --objects objects.parquet")
+    run_ok("evaluate city.parquet --queries 5 --out evaluation")
+    both = drawn(run_ok, "--evaluation evaluation --objects objects.parquet")
     assert both.count(DRAWN_OBJECTS) == 1
     assert "Localization errors" in both
 
 
-def test_streets_and_buildings_of_the_store_or_of_files(done: Done) -> None:
+def test_streets_and_buildings_of_the_store_or_of_files(run_ok: RunOk) -> None:
     objects = "--objects objects.parquet"
     save_city(footprints=HOUSE, streets=LANE)
-    page = drawn(done, objects)
+    page = drawn(run_ok, objects)
     assert page.count(DRAWN_GROUND) == 1
     assert '{"buildings":' in page
     assert '"streets":' in page
-    done("localize city.parquet --types DD --map query.html")
+    run_ok("localize city.parquet --types DD --map query.html")
     assert DRAWN_GROUND in Path("query.html").read_text(encoding="utf-8")
 
     save_city(footprints=surroundings(shapely.box(X + 9000.0, Y, X + 9010.0, Y + 10.0)))
-    assert DRAWN_GROUND not in drawn(done, objects)
+    assert DRAWN_GROUND not in drawn(run_ok, objects)
 
     save_city()
     save_surroundings(LANE, "streets.parquet")
-    page = drawn(done, f"{objects} --streets streets.parquet")
+    page = drawn(run_ok, f"{objects} --streets streets.parquet")
     assert page.count(DRAWN_GROUND) == 1
     assert '{"buildings":' not in page
 
 
-def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, done: Done) -> None:
+def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, run_ok: RunOk) -> None:
     to_degrees = Transformer.from_crs("EPSG:2154", "EPSG:4326", always_xy=True)
     corners = np.array(to_degrees.transform([X, X + 50.0, X], [Y, Y, Y + 50.0])).T
     write_osm(
@@ -81,18 +81,18 @@ def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, done: Done) ->
         *(node(at, lon, lat) for at, (lon, lat) in enumerate(corners.tolist(), start=1)),
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
-    page = drawn(done, "--objects objects.parquet --buildings town.osm")
+    page = drawn(run_ok, "--objects objects.parquet --buildings town.osm")
     assert "OpenStreetMap contributors (ODbL" in page
 
 
-def test_everything_on_one_map(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_everything_on_one_map(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(analysis.identify, trials=60, class_trials=5)
     monkeypatch.setattr(analysis, "identify", quick)
-    done("evaluate city.parquet --queries 5 --out evaluation")
-    done("identify city.parquet")
-    done("localize city.parquet --types DD --method likelihood --out answer.tif")
+    run_ok("evaluate city.parquet --queries 5 --out evaluation")
+    run_ok("identify city.parquet")
+    run_ok("localize city.parquet --types DD --method likelihood --out answer.tif")
     options = "--evaluation evaluation --ambiguity --identifiability --drift city.parquet"
-    page = drawn(done, f"{options} --location answer.tif --objects objects.parquet")
+    page = drawn(run_ok, f"{options} --location answer.tif --objects objects.parquet")
     for name in (
         *("Same types", "Chance to be found", "What has changed", "Chance within 50 m"),
         "Share of queries that fail",
@@ -102,16 +102,16 @@ def test_everything_on_one_map(done: Done, monkeypatch: pytest.MonkeyPatch) -> N
     assert DRAWN_OBJECTS in page
 
 
-def test_a_raster_of_something_else_is_no_answer(done: Done, run: Run) -> None:
-    done("export city.parquet --out cells.tif")
+def test_a_raster_of_something_else_is_no_answer(run_ok: RunOk, run: Run) -> None:
+    run_ok("export city.parquet --out cells.tif")
     outcome = run("map city.parquet --location cells.tif --out map.html")
     sentence(outcome, "cells.tif does not contain the chances of the cells", "give a .tif file")
 
 
 @pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml", "parquet", "csv", "fgb"])
-def test_answers_of_all_formats_are_drawn(done: Done, suffix: str) -> None:
-    done(f"localize city.parquet --types DD --method likelihood --out answer.{suffix}")
-    page = drawn(done, f"--location answer.{suffix}")
+def test_answers_of_all_formats_are_drawn(run_ok: RunOk, suffix: str) -> None:
+    run_ok(f"localize city.parquet --types DD --method likelihood --out answer.{suffix}")
+    page = drawn(run_ok, f"--location answer.{suffix}")
     assert '"Regions to search (' in page
     assert '"Region 1"' in page
     assert ('"Candidates (10)"' in page) == (suffix in {"gpkg", "geojson", "kml"})
@@ -119,10 +119,10 @@ def test_answers_of_all_formats_are_drawn(done: Done, suffix: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["objects.parquet", "words.geojson", "cells.gpkg"])
-def test_what_is_no_answer_is_not_drawn(done: Done, run: Run, name: str) -> None:
+def test_what_is_no_answer_is_not_drawn(run_ok: RunOk, run: Run, name: str) -> None:
     Path("words.geojson").write_text("words", encoding="utf-8")
     if name == "cells.gpkg":
-        done("export city.parquet --out cells.gpkg")
+        run_ok("export city.parquet --out cells.gpkg")
     outcome = run(f"map city.parquet --location {name} --out map.html")
     sentence(outcome, name, "give a file that semsig localize --out wrote")
     assert not Path("map.html").exists()

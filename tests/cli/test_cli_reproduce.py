@@ -12,13 +12,13 @@ from worlds import QUERIES, save_town
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 
-def test_a_finished_run_is_reported_again(reproduced: Path, done: Done) -> None:
+def test_a_finished_run_is_reported_again(reproduced: Path, run_ok: RunOk) -> None:
     database = reproduced.parent / "city.parquet"
     options = ("--out", reproduced, "--queries", QUERIES, "--json")
-    rows = json.loads(done("reproduce", database, *options))
+    rows = json.loads(run_ok("reproduce", database, *options))
     assert (reproduced / "report.md").stat().st_size > 1000
     page = (reproduced / "report.html").read_text("utf-8")
     assert f"semsig reproduce {database}" in page
@@ -32,9 +32,9 @@ def test_a_finished_run_is_reported_again(reproduced: Path, done: Done) -> None:
     assert any(row["paper"] == 0.3861 for row in rows)
 
 
-def test_a_small_run_with_workers(tmp_path: Path, done: Done) -> None:
+def test_a_small_run_with_workers(tmp_path: Path, run_ok: RunOk) -> None:
     line = "reproduce --size small --queries 3 --workers 1"
-    out = done(line, save_town(tmp_path), "--out", tmp_path / "out")
+    out = run_ok(line, save_town(tmp_path), "--out", tmp_path / "out")
     assert out.startswith("At medium distortion the method that the paper recommends places ")
     assert "0.3733" in out
     assert f"report: {tmp_path / 'out' / 'report.html'}" in out

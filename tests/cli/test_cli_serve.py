@@ -33,7 +33,7 @@ def town(tmp_path: Path) -> Path:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are sent in another way")
-def test_the_workbench_opens_and_ends_with_the_interrupt_key(town: Path, carried: None) -> None:  # noqa: ARG001
+def test_the_workbench_opens_and_ends_with_the_interrupt_key(town: Path, map_files: None) -> None:  # noqa: ARG001
     command = [sys.executable, "-c", START, "serve", str(town), "--no-browser"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

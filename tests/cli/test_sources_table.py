@@ -30,7 +30,7 @@ from semsig_gis.sources import data_folder, load_catalog
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from conftest import Done, Run
+    from conftest import Run, RunOk
 
 README = Path(__file__).parents[2] / "data_sources" / "README.md"
 TAGS: list[dict[str, str]] = [
@@ -227,7 +227,7 @@ def test_a_row_is_what_happens(
     source: str,
     command: str,
     make: Callable[[Path, Server], str | None],
-    done: Done,
+    run_ok: RunOk,
     run: Run,
     server: Server,
     moved: Callable[[str, str], None],
@@ -242,7 +242,7 @@ def test_a_row_is_what_happens(
     if verb == "fetch" and not name.endswith(".toml"):
         moved(name, address or server.url)
     if "draft.toml" in command:
-        (tmp_path / "draft.toml").write_text(done("draft trees.gpkg"), "utf-8")
+        (tmp_path / "draft.toml").write_text(run_ok("draft trees.gpkg"), "utf-8")
     code, out, told = run(f"{command} --out objects.parquet --json")
     assert code == 0, told
     if verb == "fetch" and not name.endswith(".toml"):

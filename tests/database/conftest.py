@@ -1,4 +1,4 @@
-"""What the tests of the database share: a town of sixty objects, in memory and in files."""
+"""Fixtures of the tests of databases: a town of sixty objects, in memory and in files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def path(database: SignatureDatabase, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def stored(town: World, database: SignatureDatabase, tmp_path: Path) -> Path:
-    """Return the file of the database, with the object store beside it."""
+    """Return the file of the database, saved with its object store."""
     save_with_store(database, ObjectStore.of(town.street_objects), tmp_path / "city.parquet")
     return tmp_path / "city.parquet"
 

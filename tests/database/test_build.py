@@ -55,21 +55,21 @@ def look(
     ranges: float | NDArray[np.float64] = 30.0,
     grid: GridSpec = GRID,
 ) -> SightingPairs:
-    """Return all that is seen, ordered by cell and object."""
+    """Return all sightings, ordered by cell and object."""
     objects = np.asarray(places, dtype=float)
     columns, rows = np.asarray(cells).reshape(-1, 2).T
     index, reach = PackedIndex(objects), np.broadcast_to(np.float64(ranges), len(objects))
     end, parts = 0, [SightingPairs(*(np.empty(0, kind) for kind in (int, int, float, float)))]
-    for block, seen in sightings_by_block(
+    for block, pairs in sightings_by_block(
         columns, rows, objects, grid=grid, index=index, ranges=reach
     ):
         assert block.start == end
         end = block.stop
         size = block.stop - block.start
-        assert ((seen.viewpoint >= 0) & (seen.viewpoint < size)).all()
-        assert len(seen.object) <= build.PAIRS_PER_BLOCK or size == 1
-        moved = seen.viewpoint + block.start
-        parts.append(SightingPairs(moved, seen.object, seen.bearing, seen.distance))
+        assert ((pairs.viewpoint >= 0) & (pairs.viewpoint < size)).all()
+        assert len(pairs.object) <= build.PAIRS_PER_BLOCK or size == 1
+        viewpoint = pairs.viewpoint + block.start
+        parts.append(SightingPairs(viewpoint, pairs.object, pairs.bearing, pairs.distance))
     assert end == len(columns)
     names = ("viewpoint", "object", "bearing", "distance")
     whole = SightingPairs(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
@@ -82,7 +82,7 @@ def slow_look(
     ranges: NDArray[np.float64],
     grid: GridSpec,
 ) -> SightingPairs:
-    """Measure every pair there is."""
+    """Return the sightings by measuring every pair."""
     delta = objects[None] - grid.viewpoints(*cells.T)[:, None]
     distance = np.hypot(delta[..., 0], delta[..., 1])
     bearing = wrap_degrees(np.round(bearings(delta[..., 0], delta[..., 1]), 9))
@@ -90,22 +90,22 @@ def slow_look(
     return SightingPairs(viewpoint, item, bearing[viewpoint, item], distance[viewpoint, item])
 
 
-def assert_equal(one: SightingPairs, other: SightingPairs) -> None:
+def assert_equal(first: SightingPairs, second: SightingPairs) -> None:
     for name in ("viewpoint", "object", "bearing", "distance"):
-        assert getattr(one, name).tolist() == getattr(other, name).tolist(), name
+        assert getattr(first, name).tolist() == getattr(second, name).tolist(), name
 
 
-def test_noise_beside_north_is_north() -> None:
-    seen = look([(0, 0)], [[-1e-13, 20], [1e-13, 20], [-1e-300, 20], [-5e-7, 20]])
-    assert seen.bearing[:3].tolist() == [0.0, 0.0, 0.0]
-    assert 359.9999 < seen.bearing[3] < 360.0
+def test_tiny_offsets_from_north_have_bearing_zero() -> None:
+    pairs = look([(0, 0)], [[-1e-13, 20], [1e-13, 20], [-1e-300, 20], [-5e-7, 20]])
+    assert pairs.bearing[:3].tolist() == [0.0, 0.0, 0.0]
+    assert 359.9999 < pairs.bearing[3] < 360.0
 
 
 @given(st.integers(-30, 30), st.integers(-30, 30), st.integers(1, 12))
 def test_objects_in_one_direction_have_one_bearing(dx: int, dy: int, times: int) -> None:
     # The last digits of an arctangent depend on the processor; ties must not.
-    seen = look([(0, 0)], [[dx, dy], [dx * times, dy * times]], 600.0)
-    assert seen.bearing[0] == seen.bearing[1]
+    pairs = look([(0, 0)], [[dx, dy], [dx * times, dy * times]], 600.0)
+    assert pairs.bearing[0] == pairs.bearing[1]
 
 
 @given(
@@ -114,19 +114,19 @@ def test_objects_in_one_direction_have_one_bearing(dx: int, dy: int, times: int)
     radius=st.sampled_from([0.25, 5.0, 12.5, 30.0, 61.7]),
     corner=st.sampled_from([(0.0, 0.0), (765_200.0, 6_275_000.0), (-3e6, 1e7)]),
     mixed=st.sampled_from([0.0, 0.5]),
-    kept=st.sampled_from([1.0, 0.5, 0.02]),
+    share=st.sampled_from([1.0, 0.5, 0.02]),
     exact=st.booleans(),
     blocks=st.sampled_from([(1 << 14, 1 << 20), (7, 1 << 20), (100, 1), (1 << 14, 60)]),
 )
 @settings(deadline=None)
-def test_what_is_seen_is_what_measuring_every_pair_finds(
+def test_sightings_equal_measuring_every_pair(
     *,
     seed: int,
     step: float,
     radius: float,
     corner: tuple[float, float],
     mixed: float,
-    kept: float,
+    share: float,
     exact: bool,
     blocks: tuple[int, int],
 ) -> None:
@@ -134,28 +134,28 @@ def test_what_is_seen_is_what_measuring_every_pair_finds(
     grid = GridSpec(step, tuple(rng.uniform(-50, 50, 2)))
     size = max(2.0 * radius, step)
     objects = rng.uniform(-size, size, (12, 2)) + corner
-    if exact:  # in quarters of a metre, where circles and edges of tiles are met exactly
+    if exact:  # in quarters of a metre, so that objects lie exactly on circles and edges
         grid, objects = GridSpec(step, (0.25, -4.5)), np.round(objects * 4) / 4
     ranges = np.where(rng.random(12) < mixed, radius / 5, radius)
     near = np.stack(cells_near(objects, grid=grid, radius=radius), axis=-1)
-    chosen = np.flatnonzero(rng.random(len(near)) < max(kept, 5 / len(near)))[:3000]
+    rows = np.flatnonzero(rng.random(len(near)) < max(share, 5 / len(near)))[:3000]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "CELLS_PER_BLOCK", blocks[0])
         patch.setattr(build, "PAIRS_PER_BLOCK", blocks[1])
-        found = look(near[chosen], objects, ranges, grid)
-    assert_equal(found, slow_look(near[chosen], objects, ranges, grid))
+        result = look(near[rows], objects, ranges, grid)
+    assert_equal(result, slow_look(near[rows], objects, ranges, grid))
 
 
 @given(worlds())
-@example(World(((0.0, 0.0, 3),), step=100.0, radius=10.0))  # which sees nothing
+@example(World(((0.0, 0.0, 3),), step=100.0, radius=10.0))  # no cell sees an object
 @example(World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0))
-# The last is beyond the range of a cell by one bit, and objects in one direction tie.
+# The last object is out of range of a cell by one bit; objects in one direction tie.
 @example(
     World(((35.0, 5.0, 3), (5.0, -25.0, 3), (23.0, 29.0, 3), (math.nextafter(35, 99), 5.0, 3)))
 )
 @example(World(((14.0, 26.0, 1), (8.0, 12.0, 9), (11.0, 19.0, 5), (8.0, 12.0, 2))))
 @settings(max_examples=75)
-def test_a_database_is_what_a_plain_loop_finds(world: World) -> None:
+def test_a_database_equals_a_plain_loop(world: World) -> None:
     check_against_brute_force(world)
 
 
@@ -171,25 +171,25 @@ def test_objects_on_the_edge_of_a_level_belong_to_the_next(levels: int) -> None:
 
 
 @pytest.mark.parametrize("size", [1, 7, 100, 10**6])
-def test_blocks_leave_no_seam(town: World, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_block_size_does_not_change_the_database(
+    town: World, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = town.database
     calls: list[tuple[int, int]] = []
     monkeypatch.setattr(build, "CELLS_PER_BLOCK", size)
-    parts = build_database(
-        town.street_objects, progress=lambda done, total: calls.append((done, total))
-    )
+    parts = build_database(town.street_objects, progress=lambda *call: calls.append(call))
     assert_same(parts, whole)
     total = calls[-1][1]
-    assert calls == [(min(done, total), total) for done in range(size, total + size, size)]
+    assert calls == [(min(end, total), total) for end in range(size, total + size, size)]
 
 
-def test_what_buildings_hide_is_not_seen() -> None:
+def test_objects_behind_buildings_are_not_visible() -> None:
     objects, house = lamps(), shapely.box(*(CORNER + 22), *(CORNER + 71))
     open_air = build_database(objects)
     hindered = build_database(objects, footprints=surroundings(house))
     assert hindered.occlusion == 0.5
     assert open_air.occlusion is None
-    moved = surroundings(house).to_crs("EPSG:2154").geometry[0]
+    metric_house = surroundings(house).to_crs("EPSG:2154").geometry[0]
     expected = {}
     for cell, viewpoint in zip(open_air.cell_ids, open_air.xy, strict=True):
         pairs = [
@@ -197,11 +197,11 @@ def test_what_buildings_hide_is_not_seen() -> None:
             for xy in objects.xy
             if np.hypot(*(xy - viewpoint)) <= 30
         ]
-        deep = moved.buffer(-0.5)
+        deep = metric_house.buffer(-0.5)
         free = deep.intersects(shapely.Point(viewpoint))
         expected[cell] = sum(free or not line.intersects(deep) for _, line in pairs)
-    seen = dict(zip(hindered.cell_ids.tolist(), hindered.lengths.tolist(), strict=True))
-    assert seen == {cell: size for cell, size in expected.items() if size}
+    visible = dict(zip(hindered.cell_ids.tolist(), hindered.lengths.tolist(), strict=True))
+    assert visible == {cell: size for cell, size in expected.items() if size}
     assert hindered.lengths.sum() < open_air.lengths.sum()
 
 
@@ -224,7 +224,7 @@ def test_only_viewpoints_become_cells() -> None:
     assert len(build_database(objects, viewpoints=spec, streets=streets)) > len(along)
 
 
-def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
+def test_empty_results_and_missing_crs_are_refused() -> None:
     with refused(EmptyResultError, "no cell sees", "area"):
         build_database(lamps(), viewpoints=ViewpointSpec(area=shapely.box(0, 0, 10, 10)))
     bare = gpd.GeoDataFrame(geometry=[shapely.box(0, 0, 10, 10)])
@@ -232,7 +232,7 @@ def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
         build_database(lamps(), footprints=bare)
     with refused(InputError, "no building footprint"):
         build_database(lamps(), footprints=bare.set_crs("EPSG:2154")[:0])
-    # The lamp stands deep in a building, and so does no viewpoint that would see it.
+    # The lamp is deep in a building, and every viewpoint in range is outside.
     world = World(((0.0, 0.0, CODES[0]),), radius=12.0)
     house = gpd.GeoDataFrame(geometry=[shapely.box(-2, -2, 2, 2)], crs="EPSG:2154")
     with refused(EmptyResultError, "1 objects", "check", "buildings"):
@@ -240,7 +240,9 @@ def test_what_sees_nothing_or_cannot_be_placed_is_told() -> None:
 
 
 @pytest.mark.parametrize(("radius", "step"), [(30.0, 10.0), (200.0, 20.0), (15.0, 3.0)])
-def test_as_many_pairs_are_expected_as_there_are(town: World, radius: float, step: float) -> None:
+def test_expected_number_of_pairs_is_near_the_actual_one(
+    town: World, radius: float, step: float
+) -> None:
     objects, grid = town.street_objects, GridSpec(step)
     database = build_database(objects, grid=grid, spec=SignatureSpec(radius))
     ranges = objects.taxonomy.ranges(radius)[objects.codes]
@@ -249,7 +251,7 @@ def test_as_many_pairs_are_expected_as_there_are(town: World, radius: float, ste
     assert build.expected_pairs(ranges, grid=grid, cells=3) == 3 * len(objects)
 
 
-def test_what_the_memory_does_not_hold_is_not_begun(
+def test_a_build_that_exceeds_memory_is_refused(
     town: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(resources, "free_memory", lambda: 120_000_000)

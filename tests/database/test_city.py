@@ -1,4 +1,4 @@
-"""Cities: a database with its object store beside it, and columns put into its file."""
+"""Cities: a database with its object store, and columns added to its file."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def city(request: pytest.FixtureRequest) -> City:
     return City(request.getfixturevalue(request.param))
 
 
-def test_a_city_is_the_database_and_what_lies_beside_it(
+def test_a_city_has_the_database_and_its_store(
     town: World, database: SignatureDatabase, stored: Path
 ) -> None:
     city = open_city(str(stored))
@@ -76,7 +76,7 @@ def test_a_city_is_the_database_and_what_lies_beside_it(
         _ = city.store
 
 
-def test_a_city_in_parts_is_all_of_them(parts: Path, database: SignatureDatabase) -> None:
+def test_a_city_in_parts_has_all_parts(parts: Path, database: SignatureDatabase) -> None:
     city = City(parts)
     assert_same(city.database, database)
     assert isinstance(city.dataset, PartitionedDatabase)
@@ -87,7 +87,7 @@ def test_a_city_in_parts_is_all_of_them(parts: Path, database: SignatureDatabase
     assert city.object_counts == open_store(parts).objects.class_counts
 
 
-def test_what_is_no_database_is_told(tmp_path: Path) -> None:
+def test_files_that_are_not_databases_are_refused(tmp_path: Path) -> None:
     nowhere = City(tmp_path / "nowhere.parquet")
     for act in (
         lambda: open_city(nowhere.path),
@@ -112,35 +112,35 @@ def put(city: City, table: pa.Table, *, name: str = "numbers", **facts: Any) -> 
     city.put_columns(name, table, cell_ids=city.database.cell_ids[: len(table)], facts=facts)
 
 
-def test_columns_come_back_beside_signatures_that_stay(
+def test_added_columns_are_read_and_signatures_unchanged(
     city: City, database: SignatureDatabase
 ) -> None:
     assert city.columns("numbers") is None
     assert not city.has_columns
     size = len(database)
     put(city, pa.table({"other": np.ones(size)}), name="ones")
-    for times in (1.0, 3.0):  # those of one name replace each other
+    for times in (1.0, 3.0):  # the second table replaces the first
         expected = columns(size, times=times).drop_columns(["maybe"] if times > 1.0 else [])
         put(city, expected, times=times)
         table, facts = city.columns("numbers") or (pa.table({}), {})
         assert facts == {"times": times}
         assert table["cell_id"].to_numpy().tolist() == database.cell_ids.tolist()
-        found = table.drop_columns(["cell_id"]).combine_chunks()
-        assert found.equals(expected.combine_chunks())
+        result = table.drop_columns(["cell_id"]).combine_chunks()
+        assert result.equals(expected.combine_chunks())
     table, _ = city.columns("ones") or (pa.table({}), {})
     assert table["other"].to_numpy().sum() == size
     assert city.has_columns
     assert city.columns("others") is None
     assert_same(open_database(city.path), database)
-    for file in city.files:  # which other programs read, too
-        seen = gpd.read_parquet(file)
-        rows = np.searchsorted(database.cell_ids, seen["cell_id"])
-        assert seen["number"].tolist() == (rows * 3.0).tolist()
-        assert seen.columns[-1] == "geometry"
-        assert seen.crs == database.crs
+    for file in city.files:  # other programs can read them too
+        frame = gpd.read_parquet(file)
+        rows = np.searchsorted(database.cell_ids, frame["cell_id"])
+        assert frame["number"].tolist() == (rows * 3.0).tolist()
+        assert frame.columns[-1] == "geometry"
+        assert frame.crs == database.crs
 
 
-def test_a_file_keeps_its_digest_and_a_folder_its_recipe(
+def test_added_columns_keep_the_digest_of_a_file_and_the_recipe_of_a_folder(
     path: Path, parts: Path, database: SignatureDatabase
 ) -> None:
     before = digest(path)
@@ -152,17 +152,17 @@ def test_a_file_keeps_its_digest_and_a_folder_its_recipe(
     after = read_manifest(parts)
     assert after.recipe == manifest.recipe
     assert [part.cells for part in after.parts] == [part.cells for part in manifest.parts]
-    assert len(part_files(parts)) == len(manifest.parts)  # it names the files as they are now
+    assert len(part_files(parts)) == len(manifest.parts)  # the manifest has the new digests
 
 
-def test_a_store_still_belongs_to_its_database(
+def test_added_columns_do_not_separate_a_store_from_its_database(
     town: World, database: SignatureDatabase, stored: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(tmp_path / "city.objects", tmp_path / "elsewhere")
     put(City(stored), columns(len(database)))
     for store in (open_store(stored), open_store(stored, tmp_path / "elsewhere")):
         assert len(store.objects) == len(town.street_objects)
-    # What is built anew has another digest, and no columns.
+    # A new build has another digest, and no columns.
     save_with_store(database, ObjectStore.of(town.street_objects), stored)
     assert not City(stored).has_columns
     save_database(database.select(slice(0, 9)), stored)
@@ -171,7 +171,7 @@ def test_a_store_still_belongs_to_its_database(
 
 
 @pytest.mark.parametrize("stop", [OSError(28, "No space left on device"), KeyboardInterrupt()])
-def test_an_end_on_the_way_leaves_what_was_there(
+def test_interrupted_column_writes_change_nothing(
     city: City, stop: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put(city, columns(len(city.database)))
@@ -196,7 +196,7 @@ def test_an_end_on_the_way_leaves_what_was_there(
     assert not list(city.path.parent.glob(".semsig-*"))
 
 
-def test_other_cells_are_refused(city: City, database: SignatureDatabase) -> None:
+def test_columns_of_other_cells_are_refused(city: City, database: SignatureDatabase) -> None:
     some = database.select(np.arange(5, len(database)))
     with refused(DatabaseError, "have changed since it was opened", "open the database again"):
         city.put_columns("numbers", columns(len(some)), cell_ids=some.cell_ids, facts={})
@@ -204,7 +204,7 @@ def test_other_cells_are_refused(city: City, database: SignatureDatabase) -> Non
 
 
 @pytest.mark.parametrize("number", [0, 1])
-def test_parts_that_do_not_agree_are_told(
+def test_parts_with_different_columns_are_refused(
     parts: Path, database: SignatureDatabase, number: int
 ) -> None:
     put(City(parts), columns(len(database)))
@@ -246,11 +246,11 @@ def names_in(folder: Path) -> list[str]:
 
 
 def assert_fits(store: ObjectStore, objects: StreetObjects) -> None:
-    """Check that a store holds these objects, in any order, and that its R-tree is over them."""
+    """Check that a store has these objects, in any order, and an R-tree over them."""
     columns = ["class_code", "source", "source_id", "count"]
     ours, theirs = (
-        sorted(zip(*(one.table[name] for name in columns), *one.xy.T, strict=True))
-        for one in (store.objects, objects)
+        sorted(zip(*(rows.table[name] for name in columns), *rows.xy.T, strict=True))
+        for rows in (store.objects, objects)
     )
     assert ours == theirs
     for name in ("taxonomy", "licenses", "crs"):
@@ -258,7 +258,7 @@ def assert_fits(store: ObjectStore, objects: StreetObjects) -> None:
     assert_index_fits(store)
 
 
-def test_a_store_lies_beside_its_database(stored: Path) -> None:
+def test_a_store_is_saved_next_to_its_database(stored: Path) -> None:
     assert names_in(stored.parent) == ["city.objects", "city.parquet"]
     store = open_store(stored)
     assert_fits(store, TOWN)
@@ -278,7 +278,7 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
     assert again.footprints is not None
     assert again.streets is not None
     assert again.footprints.crs == again.streets.crs == TOWN.crs
-    # To the last bit, since the sight lines of an update are held against them.
+    # To the last bit, because updates compute sight lines with them.
     assert again.footprints.geometry.tolist() == houses.to_crs(TOWN.crs).geometry.tolist()[:1]
     assert again.footprints.columns.tolist() == ["geometry"]
     assert again.footprints.attrs["licenses"] == ["City (CC0): houses"]
@@ -292,7 +292,7 @@ def test_buildings_and_streets_are_kept_in_the_crs_of_the_objects(tmp_path: Path
         ObjectStore.of(TOWN, footprints=houses.set_crs(None, allow_override=True))
 
 
-def test_a_store_that_is_missing_or_of_another_database_is_told(tmp_path: Path) -> None:
+def test_missing_stores_and_stores_of_other_databases_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "city.parquet"
     with refused(DatabaseError, "does not exist"):
         open_store(path)
@@ -312,7 +312,7 @@ def test_a_store_that_is_missing_or_of_another_database_is_told(tmp_path: Path) 
     assert names_in(tmp_path) == ["city.objects", "city.parquet"]
 
 
-def test_a_store_goes_where_its_database_goes(stored: Path, tmp_path: Path) -> None:
+def test_a_store_can_be_moved_with_its_database(stored: Path, tmp_path: Path) -> None:
     store_path(stored).rename(tmp_path / "elsewhere")
     assert_fits(open_store(stored, tmp_path / "elsewhere"), TOWN)
     (tmp_path / "far").mkdir()
@@ -337,7 +337,7 @@ def damage(file: Path, how: str) -> None:
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 255
     file.write_bytes(content if how == "flipped" else content[: len(content) // 2])
-    if how == "gone":
+    if how == "missing":
         file.unlink()
 
 
@@ -345,15 +345,15 @@ def test_the_r_tree_of_an_old_store_is_not_read(stored: Path) -> None:
     folder = store_path(stored)
     manifest = json.loads((folder / "manifest.json").read_text())
     for name in ("rtree.dat", "rtree.idx", "rtree.npy"):
-        (folder / name).write_bytes(b"what ends a program that reads it" * 99)
+        (folder / name).write_bytes(b"an R-tree that would end the program" * 99)
         manifest["files"][name] = digest(folder / name)
     (folder / "manifest.json").write_text(json.dumps(manifest))
     assert_fits(open_store(stored), TOWN)
 
 
 @pytest.mark.parametrize("name", ["objects.parquet", "footprints.parquet", "streets.parquet"])
-@pytest.mark.parametrize("how", ["cut", "flipped", "gone"])
-def test_other_damage_is_told(
+@pytest.mark.parametrize("how", ["cut", "flipped", "missing"])
+def test_damaged_store_files_are_refused(
     database: SignatureDatabase, tmp_path: Path, name: str, how: str
 ) -> None:
     path = tmp_path / "city.parquet"
@@ -374,7 +374,7 @@ def test_other_damage_is_told(
         ({"files": {}}, "objects.parquet is damaged"),
     ],
 )
-def test_a_damaged_manifest_is_told(stored: Path, content: Any, words: str) -> None:  # noqa: ANN401
+def test_damaged_store_manifests_are_refused(stored: Path, content: Any, words: str) -> None:  # noqa: ANN401
     manifest = store_path(stored) / "manifest.json"
     if isinstance(content, dict):
         content = json.dumps(json.loads(manifest.read_text()) | content)
@@ -401,12 +401,12 @@ def test_reading_changes_nothing(stored: Path) -> None:
     assert len(names_in(stored.parent)) == 2
 
 
-def test_what_waits_for_its_database_is_put_in_its_place(
+def test_a_waiting_store_is_moved_to_its_final_folder(
     stored: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waiting = stored.with_name("city.objects.next")
     store_path(stored).rename(waiting)
-    with monkeypatch.context() as patch:  # where nobody knows who else does so
+    with monkeypatch.context() as patch:  # no lock is available
         patch.setattr(store_module, "folder_locked", lambda _: nullcontext(enter_result=False))
         assert_fits(open_store(stored), TOWN)
         assert City(stored).store_path == waiting
@@ -423,16 +423,16 @@ def read_only(*_: Path) -> None:
     raise InputError("nothing may be written here.")
 
 
-def test_what_waits_for_another_database_stays_aside(stored: Path, tmp_path: Path) -> None:
+def test_a_waiting_store_of_another_database_is_ignored(stored: Path, tmp_path: Path) -> None:
     other = save(tmp_path / "other" / "city.parquet", fewer(7))
     store_path(other).rename(stored.with_name("city.objects.next"))
     assert_fits(open_store(stored), TOWN)
-    other.replace(stored)  # a run that is killed after this has done so
+    other.replace(stored)  # as by a run that is killed after this step
     assert_fits(open_store(stored), fewer(7))
     assert names_in(tmp_path) == ["city.objects", "city.parquet", "other"]
 
 
-def test_a_city_is_read_as_it_was_at_one_moment(
+def test_database_and_store_are_read_from_one_state(
     stored: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     city, opened = open_city(stored), open_objects
@@ -454,7 +454,9 @@ def test_a_city_is_read_as_it_was_at_one_moment(
     assert not City(stored).has_columns
 
 
-def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_database_and_store_unchanged(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -463,7 +465,7 @@ def test_a_full_disk_leaves_what_was_there(stored: Path, monkeypatch: pytest.Mon
 
     for name, act, file in (
         ("save_objects", full, "city.objects"),
-        ("save_database", full_partial, str(stored)),  # the name that was given
+        ("save_database", full_partial, str(stored)),  # the final name
     ):
         with monkeypatch.context() as patch:
             patch.setattr(store_module, name, act)

@@ -40,10 +40,10 @@ def test_cells_are_ordered_and_numbered(database: SignatureDatabase) -> None:
     assert database.present_codes.tolist() == sorted(set(database.codes.tolist()))
 
 
-def test_places_are_in_their_cells(database: SignatureDatabase) -> None:
+def test_places_are_assigned_to_their_cells(database: SignatureDatabase) -> None:
     cells = np.arange(len(database))
-    aside = np.random.default_rng(1).uniform(-4.9, 4.9, (len(cells), 2))
-    assert (database.cells_at(database.xy + aside) == cells).all()
+    offsets = np.random.default_rng(1).uniform(-4.9, 4.9, (len(cells), 2))
+    assert (database.cells_at(database.xy + offsets) == cells).all()
     far = database.xy.min(axis=0) - 1000.0
     assert database.cells_at([far, database.xy[2]]).tolist() == [-1, 2]
 
@@ -62,14 +62,14 @@ def test_cells_are_a_table_of_squares_or_points(database: SignatureDatabase) -> 
         database.to_geodataframe(geometry="square")  # type: ignore[arg-type]
 
 
-def test_a_signature_is_a_part_of_the_arrays(database: SignatureDatabase) -> None:
+def test_a_signature_is_a_slice_of_the_arrays(database: SignatureDatabase) -> None:
     for cell in range(0, len(database), 37):
         part = slice(database.offsets[cell], database.offsets[cell + 1])
         signature = database.signature(cell)
         types = TAXONOMY.decode(database.codes[part])
         bearings = database.bearings[part].tolist()
-        told = {"types": types, "bearings": bearings, "length": len(types)}
-        assert signature.to_dict(TAXONOMY) == told
+        values = {"types": types, "bearings": bearings, "length": len(types)}
+        assert signature.to_dict(TAXONOMY) == values
         assert database.types(cell) == types
         for levels in (7, 8, 16, 24, 32):
             again = dataclasses.replace(database, spec=SignatureSpec(levels=levels))
@@ -78,7 +78,9 @@ def test_a_signature_is_a_part_of_the_arrays(database: SignatureDatabase) -> Non
 
 
 @given(st.lists(st.integers(0, 3), min_size=1))
-def test_parts_join_into_the_whole(database: SignatureDatabase, owners: list[int]) -> None:
+def test_joined_parts_equal_the_whole_database(
+    database: SignatureDatabase, owners: list[int]
+) -> None:
     owner = np.resize(owners, len(database))
     parts = [database.select(owner == number) for number in range(4)]
     joined = join_databases(parts[::-1])
@@ -93,7 +95,7 @@ def test_selected_cells_keep_their_signatures(database: SignatureDatabase) -> No
     assert len(database.select(slice(0, 0))) == 0
 
 
-def test_databases_that_do_not_fit_are_not_joined(database: SignatureDatabase) -> None:
+def test_databases_with_different_settings_are_not_joined(database: SignatureDatabase) -> None:
     half = database.select(slice(10))
     for change, word in (
         ({"grid": GridSpec(20.0)}, "grid (GridSpec(step=10.0, "),
@@ -132,9 +134,9 @@ def test_distinct_sequences_by_length_then_first_appearance(rows: list[list[int]
     assert len(table) == len(distinct)
     assert [tuple(table[index].tolist()) for index in range(len(table))] == distinct
     assert [distinct[index] for index in table.inverse.tolist()] == list(map(tuple, rows))
-    assert table.counts.tolist() == [counts[one] for one in distinct]
-    assert table.lengths.tolist() == [len(one) for one in distinct]
-    assert table.strings == ["".join(map(chr, one)) for one in distinct]
+    assert table.counts.tolist() == [counts[row] for row in distinct]
+    assert table.lengths.tolist() == [len(row) for row in distinct]
+    assert table.strings == ["".join(map(chr, row)) for row in distinct]
 
 
 @given(ROWS, st.sampled_from([1, 130, 600, 1 << 20]))
@@ -152,12 +154,12 @@ def test_histogram_counts_every_value_block_by_block(rows: list[list[int]], bloc
 
 
 @given(ROWS, st.lists(VALUES, max_size=5))
-def test_overlap_is_that_of_sets(rows: list[list[int]], query: list[int]) -> None:
+def test_overlap_equals_set_operations(rows: list[list[int]], query: list[int]) -> None:
     table = table_of(rows)
     both, either = table.overlap(sequence(*query))
     sets = [set(table[index].tolist()) for index in range(len(table))]
-    assert both.tolist() == [len(one & set(query)) for one in sets]
-    assert either.tolist() == [len(one | set(query)) for one in sets]
+    assert both.tolist() == [len(values & set(query)) for values in sets]
+    assert either.tolist() == [len(values | set(query)) for values in sets]
     some = np.arange(0, len(table), 2)
     assert [part.tolist() for part in table.overlap(sequence(*query), only=some)] == [
         both[some].tolist(),
@@ -173,7 +175,7 @@ def test_counts_of_a_very_long_sequence_do_not_wrap() -> None:
 def test_arrays_are_read_only(database: SignatureDatabase, path: Path) -> None:
     of_database = (*ARRAYS, "xy", "lengths", "levels", "present_codes")
     of_table = ("values", "offsets", "inverse", "counts", "lengths", "histogram")
-    for one, names in (
+    for owner, names in (
         (database, of_database),
         (open_database(path), of_database),
         (database.signature(0), ("codes",)),
@@ -181,10 +183,10 @@ def test_arrays_are_read_only(database: SignatureDatabase, path: Path) -> None:
     ):
         for name in names:
             with pytest.raises(ValueError, match="read-only"):
-                getattr(one, name)[...] = 0
+                getattr(owner, name)[...] = 0
 
 
-def test_a_table_does_not_follow_its_input_which_may_be_strided() -> None:
+def test_a_table_copies_its_input() -> None:
     values = np.arange(8, dtype=np.uint8)[::2]
     table = SequenceTable.from_csr(values, np.array([0, 2, 4], np.int32))
     values[:] = 9
@@ -194,13 +196,13 @@ def test_a_table_does_not_follow_its_input_which_may_be_strided() -> None:
 @pytest.mark.parametrize(
     "offsets", [[], [0], [1, 3], [0, 2], [0, 4], [0, 3, 2, 3], [[0, 3]]], ids=str
 )
-def test_offsets_that_do_not_divide_the_values(offsets: list[int]) -> None:
+def test_offsets_that_do_not_divide_the_values_are_refused(offsets: list[int]) -> None:
     with pytest.raises(InputError, match="do not divide their 3 values"):
         SequenceTable.from_csr(sequence(1, 2, 3), np.array(offsets, np.int64))
 
 
 @pytest.mark.parametrize("values", [np.array([1, 300]), np.zeros((2, 2), np.uint8)])
-def test_values_that_are_no_sequence(values: NDArray[np.uint8]) -> None:
+def test_values_that_are_not_sequences_are_refused(values: NDArray[np.uint8]) -> None:
     with pytest.raises(InputError, match="one-dimensional uint8 array"):
         checked_sequence(values)
     with pytest.raises(InputError, match="one-dimensional uint8 array"):

@@ -1,4 +1,4 @@
-"""Real processes of dask: one cluster for the module, and some that a test starts and kills."""
+"""Builds with dask processes: a cluster for the module, and processes that a test kills."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ TOWN = World((*CITY.objects, *((x + 1500.0, y + 1500.0, code) for x, y, code in 
 
 
 def build(folder: Path, name: str = "city", **options: object) -> dict[str, bytes]:
-    """Build the town in tiles and return every file that this has left."""
+    """Build the town in tiles and return every file of the result."""
     if not (folder / "objects.parquet").exists():
         save_objects(TOWN.street_objects, folder / "objects.parquet")
     build_tiles(folder / "objects.parquet", folder / name, tile=TileSpec(SIDE), **options)  # type: ignore[arg-type]
-    # A task that an interrupt left behind on a cluster may still tidy up its scratch folder.
+    # After an interrupt, a task on a cluster may still be removing its temporary folder.
     tiles = folder / name
     files = [path.relative_to(tiles).as_posix() for path in tiles.rglob("*") if path.is_file()]
     return {file: (tiles / file).read_bytes() for file in files if not file.startswith(".semsig-")}
@@ -51,7 +51,11 @@ def build(folder: Path, name: str = "city", **options: object) -> dict[str, byte
 
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    return build(tmp_path_factory.mktemp("serial"))
+    folder = tmp_path_factory.mktemp("serial")
+    files = build(folder)
+    assert len(files) > 15
+    assert_same(open_database(folder / "city"), TOWN.database)
+    return files
 
 
 def script(folder: Path, body: str) -> list[str]:
@@ -68,32 +72,25 @@ def script(folder: Path, body: str) -> list[str]:
     return [sys.executable, "-W", "error", str(path)]
 
 
-def test_the_parts_are_the_whole(serial: dict[str, bytes], tmp_path: Path) -> None:
-    assert len(serial) > 15
-    assert build(tmp_path) == serial
-    assert_same(open_database(tmp_path / "city"), TOWN.database)
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 def test_workers_write_the_same_files_as_one_process(
     serial: dict[str, bytes], tmp_path: Path, workers: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
     others = set(multiprocessing.active_children())
-    told: list[tuple[int, int]] = []
-    found = build(tmp_path, workers=workers, progress=lambda *done: told.append(done))
-    assert found == serial
+    calls: list[tuple[int, int]] = []
+    assert build(tmp_path, workers=workers, progress=lambda *call: calls.append(call)) == serial
     assert {path.name for path in tmp_path.iterdir()} == {"city", "objects.parquet"}
-    total = told[-1][1]
-    assert told == [(done, total) for done in range(1, total + 1)]
+    total = calls[-1][1]
+    assert calls == [(count, total) for count in range(1, total + 1)]
     assert capfd.readouterr() == ("", "")
     assert set(multiprocessing.active_children()) == others
 
 
-def test_a_scheduler_elsewhere_gives_the_same_files(
+def test_a_scheduler_writes_the_same_files_as_one_process(
     serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster
 ) -> None:
     assert build(tmp_path, scheduler=cluster.scheduler_address) == serial
-    assert len(cluster.workers) == 2  # it is not ours to end
+    assert len(cluster.workers) == 2  # the cluster is still running
 
 
 def test_one_process_does_not_load_dask(tmp_path: Path) -> None:
@@ -102,30 +99,30 @@ def test_one_process_does_not_load_dask(tmp_path: Path) -> None:
         build_tiles(*paths, tile=tile)
         print([name for name in ("dask", "distributed", "tornado") if name in sys.modules])
     """
-    done = subprocess.run(script(tmp_path, body), check=True, capture_output=True, text=True)
-    assert (done.stdout, done.stderr) == ("[]\n", "")
+    run = subprocess.run(script(tmp_path, body), check=True, capture_output=True, text=True)
+    assert (run.stdout, run.stderr) == ("[]\n", "")
 
 
-def test_a_worker_killed_in_the_middle_does_not_matter(
+def test_a_killed_worker_does_not_change_the_files(
     serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster
 ) -> None:
     killed: list[int] = []
 
-    def kill(done: int, total: int) -> None:
+    def kill(count: int, total: int) -> None:
         if not killed:
-            assert done < total
+            assert count < total
             killed.append(cluster.workers[0].pid)
             os.kill(killed[0], signal.SIGKILL)
 
     assert build(tmp_path, scheduler=cluster.scheduler_address, progress=kill) == serial
     end = time.monotonic() + PATIENCE_S
-    while cluster.workers[0].pid in {None, killed[0]}:  # until the cluster has started another one
+    while cluster.workers[0].pid in {None, killed[0]}:  # until the cluster has started a new worker
         assert time.monotonic() < end
         time.sleep(0.1)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="kills a group of processes")
-def test_a_killed_run_goes_on_where_it_was(serial: dict[str, bytes], tmp_path: Path) -> None:
+def test_a_killed_run_is_resumed(serial: dict[str, bytes], tmp_path: Path) -> None:
     save_objects(TOWN.street_objects, tmp_path / "objects.parquet")
     body = """
         def stop(done, total):
@@ -136,9 +133,9 @@ def test_a_killed_run_goes_on_where_it_was(serial: dict[str, bytes], tmp_path: P
         if __name__ == "__main__":
             build_tiles(*paths, tile=tile, workers=2, progress=stop)
     """
-    # What the killed process has no time to remove is removed with the test.
+    # The killed process cannot remove its temporary files; the test does.
     (tmp_path / "scratch").mkdir()
-    # It ends when nobody holds its output any more: its workers, which end when they are alone.
+    # `run` returns when the workers have closed the output too: they end without their parent.
     run = subprocess.run(
         script(tmp_path, body),
         check=False,
@@ -158,34 +155,34 @@ def test_a_killed_run_goes_on_where_it_was(serial: dict[str, bytes], tmp_path: P
 
     before = finished()
     assert 2 <= len(before) < len(serial)  # of three tiles one may have no cell
-    told: list[str] = []
-    assert build(tmp_path, tell=told.append) == serial
+    messages: list[str] = []
+    assert build(tmp_path, tell=messages.append) == serial
     assert before.items() <= finished().items()
-    assert len(told) == 1
-    assert "unfinished run" in told[0]
+    assert len(messages) == 1
+    assert "unfinished run" in messages[0]
 
 
 def test_an_interrupted_run_keeps_its_tiles(
     serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster
 ) -> None:
-    def interrupt(done: int, _: int) -> None:
-        if done >= 4:
+    def interrupt(count: int, _: int) -> None:
+        if count >= 4:
             raise KeyboardInterrupt
 
     for options in ({"scheduler": cluster.scheduler_address}, {}):
         with pytest.raises(KeyboardInterrupt):
             build(tmp_path, progress=interrupt, **options)
-    seen: list[int] = []
-    assert build(tmp_path, progress=lambda done, _: seen.append(done)) == serial
-    assert seen[0] > 4
+    counts: list[int] = []
+    assert build(tmp_path, progress=lambda count, _: counts.append(count)) == serial
+    assert counts[0] > 4
 
 
 @pytest.mark.parametrize("where", ["here", "cluster"])
-def test_a_tile_that_always_fails_is_named_and_the_others_are_kept(
+def test_a_failing_tile_is_reported_and_the_others_are_kept(
     serial: dict[str, bytes], tmp_path: Path, cluster: LocalCluster, where: str
 ) -> None:
     path = tmp_path / "objects.parquet"
-    # A class that nobody knows, in the small place of one tile that stands apart.
+    # An unknown class, in a tile far from the others.
     odd = World((*TOWN.objects, (*(CORNER + 3100.0).tolist(), CODES[5])))
     save_objects(odd.street_objects, path)
     table = pq.read_table(path)
@@ -197,11 +194,12 @@ def test_a_tile_that_always_fails_is_named_and_the_others_are_kept(
     with refused(DatabaseError, "tile_3841_31390.parquet could not be built", "250", "kept"):
         build(tmp_path, **options)
     assert not (tmp_path / "city").exists()
-    kept = {file.name: file.read_bytes() for file in (tmp_path / "city.partial").glob("*.parquet")}
-    assert kept == {name: serial[name] for name in serial if name.startswith("tile")}
+    files = (tmp_path / "city.partial").glob("*.parquet")
+    expected = {name: serial[name] for name in serial if name.startswith("tile")}
+    assert {file.name: file.read_bytes() for file in files} == expected
 
 
-def test_a_tile_that_kills_its_workers_is_named_and_the_others_are_kept(
+def test_a_tile_that_kills_its_workers_is_reported_and_the_others_are_kept(
     serial: dict[str, bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -218,12 +216,12 @@ def test_a_tile_that_kills_its_workers_is_named_and_the_others_are_kept(
         build(tmp_path, workers=2)
     assert capfd.readouterr() == ("", "")
     monkeypatch.undo()
-    seen: list[tuple[int, int]] = []
-    assert build(tmp_path, progress=lambda *done: seen.append(done)) == serial
-    assert len(seen) == 1  # it alone was left
+    calls: list[tuple[int, int]] = []
+    assert build(tmp_path, progress=lambda *call: calls.append(call)) == serial
+    assert len(calls) == 1  # only this tile was missing
 
 
-def test_a_run_in_which_all_fails_ends_soon_and_leaves_nothing(
+def test_a_run_stops_after_ten_failures_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried = set()
@@ -239,7 +237,7 @@ def test_a_run_in_which_all_fails_ends_soon_and_leaves_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["objects.parquet"]
 
 
-def test_a_full_disk_leaves_the_database_that_was_there(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_the_old_database(tmp_path: Path) -> None:
     small, city, file = World(TOWN.objects[-40:]), tmp_path / "city", tmp_path / "city.parquet"
     save_objects(small.street_objects, tmp_path / "small.parquet")
     save_objects(TOWN.street_objects, tmp_path / "objects.parquet")

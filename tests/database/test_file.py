@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 @given(world=worlds())
 @example(world=World(((0.0, 5999.99, 3), (0.0, 0.0, 1)), step=1000.0, radius=6000.0))
 @settings(max_examples=25)
-def test_a_saved_database_comes_back(
+def test_a_saved_database_is_read_unchanged(
     world: World, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     if not brute_force(world):
@@ -76,7 +76,7 @@ def test_geopandas_reads_the_columns(database: SignatureDatabase, path: Path) ->
     assert [item["code"] for item in specs["taxonomy"]] == CODES
 
 
-def test_a_cut_file_is_an_error(path: Path) -> None:
+def test_truncated_files_are_refused(path: Path) -> None:
     content = path.read_bytes()
     for size in np.linspace(0, len(content) - 1, 80).astype(int).tolist():
         path.write_bytes(content[:size])
@@ -85,19 +85,19 @@ def test_a_cut_file_is_an_error(path: Path) -> None:
 
 
 def rewrite(path: Path, table: pa.Table, **specs: Any) -> None:  # noqa: ANN401
-    """Write a table in the place of a file, with its metadata but for some of the specs."""
+    """Replace a file by a table with the same metadata, except some of the specs."""
     metadata = dict(pq.read_metadata(path).metadata)
     changed = json.loads(metadata[b"semsig"])
     for key, value in specs.items():
         changed[key] = value
         if value is None:
             del changed[key]
-    kept = {b"geo": metadata[b"geo"], b"semsig": json.dumps(changed).encode()}
-    pq.write_table(table.replace_schema_metadata(kept), path)
+    new = {b"geo": metadata[b"geo"], b"semsig": json.dumps(changed).encode()}
+    pq.write_table(table.replace_schema_metadata(new), path)
 
 
-def swap(table: pa.Table, one: str, other: str) -> pa.Table:
-    names = {one: other, other: one}
+def swap(table: pa.Table, first: str, second: str) -> pa.Table:
+    names = {first: second, second: first}
     return table.rename_columns([names.get(name, name) for name in table.column_names])
 
 
@@ -143,7 +143,7 @@ DAMAGE = {
 
 
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
-def test_columns_that_do_not_fit_are_an_error(
+def test_inconsistent_columns_are_refused(
     database: SignatureDatabase, path: Path, damage: Callable[[pa.Table], pa.Table]
 ) -> None:
     table = pq.read_table(path)
@@ -178,37 +178,35 @@ def test_columns_that_do_not_fit_are_an_error(
         *({"format": number} for number in (None, 1, 99)),
     ],
 )
-def test_specs_that_do_not_fit_are_an_error(path: Path, specs: dict[str, Any]) -> None:
+def test_invalid_specs_are_refused(path: Path, specs: dict[str, Any]) -> None:
     rewrite(path, pq.read_table(path), **specs)
     words = "another version" if "format" in specs else "is damaged"
     with refused(DatabaseError, str(path), words, "build the database again"):
         open_database(path)
 
 
-def test_a_file_of_street_objects_is_named_as_such(objects_file: Path) -> None:
+def test_a_file_of_street_objects_is_refused_by_its_kind(objects_file: Path) -> None:
     with refused(DatabaseError, str(objects_file), "street objects", "signature database"):
         open_database(objects_file)
 
 
-def test_pieces_and_columns_of_others_do_no_harm(database: SignatureDatabase, path: Path) -> None:
+def test_row_groups_and_other_columns_are_accepted(database: SignatureDatabase, path: Path) -> None:
     table = pq.read_table(path)
     pq.write_table(table, path, row_group_size=7)
     assert_same(open_database(path), database)
-    turned = table.select(["geometry", "distances", "length", "bearings", "types", "cell_id"])
-    rewrite(path, turned.append_column("note", [["x"] * len(table)]))
+    reordered = table.select(["geometry", "distances", "length", "bearings", "types", "cell_id"])
+    rewrite(path, reordered.append_column("note", [["x"] * len(table)]))
     assert_same(open_database(path), database)
 
 
-def test_the_parts_are_opened_whole_or_one_after_the_other(
-    database: SignatureDatabase, parts: Path
-) -> None:
+def test_parts_are_opened_together_or_one_by_one(database: SignatureDatabase, parts: Path) -> None:
     assert_same(open_database(str(parts)), database)
     dataset = open_dataset(parts)
     assert len(dataset) == len(database)
     assert dataset.taxonomy == database.taxonomy
-    seen = [part.cell_ids for part in dataset.parts()]
-    assert len(seen) > 8
-    assert sorted(np.concatenate(seen).tolist()) == database.cell_ids.tolist()
+    ids = [part.cell_ids for part in dataset.parts()]
+    assert len(ids) > 8
+    assert sorted(np.concatenate(ids).tolist()) == database.cell_ids.tolist()
     rows = [0, 17, 5, len(database) - 1]
     assert dataset.row_numbers(database.cell_ids[rows]).tolist() == rows
     table = gpd.read_parquet(parts)
@@ -216,9 +214,7 @@ def test_the_parts_are_opened_whole_or_one_after_the_other(
     assert table.crs == database.crs
 
 
-def test_the_manifest_tells_what_is_there_and_how_it_was_built(
-    database: SignatureDatabase, parts: Path
-) -> None:
+def test_the_manifest_lists_parts_and_recipe(database: SignatureDatabase, parts: Path) -> None:
     manifest = read_manifest(parts)
     assert manifest.recipe["grid"] == {"step": 10.0, "origin": [0.0, 0.0]}
     assert manifest.recipe["tile"] == {"cells": 8}
@@ -239,7 +235,7 @@ PARTS = st.builds(PartFile, st.tuples(NUMBERS, NUMBERS), SIZES, SIZES, SIZES, DI
 
 
 @given(st.lists(PARTS, unique_by=lambda part: part.tile))
-def test_a_manifest_is_read_as_it_was_written(
+def test_a_manifest_is_read_unchanged(
     tmp_path_factory: pytest.TempPathFactory, parts: list[PartFile]
 ) -> None:
     folder = tmp_path_factory.mktemp("manifest")
@@ -250,7 +246,7 @@ def test_a_manifest_is_read_as_it_was_written(
 
 
 @pytest.mark.parametrize("opened", [open_database, open_dataset])
-def test_a_folder_that_is_not_whole_is_named(
+def test_an_incomplete_folder_is_refused(
     parts: Path, tmp_path: Path, opened: Callable[[Path], object]
 ) -> None:
     with refused(DatabaseError, str(tmp_path), "not a signature database in parts"):
@@ -281,7 +277,9 @@ def test_a_folder_that_is_not_whole_is_named(
         opened(parts)
 
 
-def test_parts_that_do_not_fit_each_other_are_refused(town: World, parts: Path) -> None:
+def test_parts_with_different_settings_or_common_cells_are_refused(
+    town: World, parts: Path
+) -> None:
     manifest = read_manifest(parts)
     first, second, *others = manifest.parts
     file = parts / second.file
@@ -314,17 +312,17 @@ def test_parts_that_do_not_fit_each_other_are_refused(town: World, parts: Path) 
         ("[" * 100_000, "damaged"),
     ],
 )
-def test_a_damaged_manifest_is_named(tmp_path: Path, content: str, words: str) -> None:
+def test_a_damaged_manifest_is_refused(tmp_path: Path, content: str, words: str) -> None:
     (tmp_path / MANIFEST).write_text(content, encoding="utf-8")
     for opened in (open_database, open_dataset, read_manifest):
         with refused(DatabaseError, MANIFEST, words):
             opened(tmp_path)
 
 
-def test_a_digest_is_that_of_the_joined_content(tmp_path: Path) -> None:
-    one, other, empty = (tmp_path / name for name in "abc")
-    one.write_bytes(b"a" * 3_000_000)
-    other.write_bytes(b"b")
+def test_a_digest_covers_the_joined_content_of_files(tmp_path: Path) -> None:
+    first, second, empty = (tmp_path / name for name in "abc")
+    first.write_bytes(b"a" * 3_000_000)
+    second.write_bytes(b"b")
     empty.touch()
-    assert digest(one, other, empty) == hashlib.sha256(b"a" * 3_000_000 + b"b").hexdigest()
+    assert digest(first, second, empty) == hashlib.sha256(b"a" * 3_000_000 + b"b").hexdigest()
     assert digest(empty) == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"

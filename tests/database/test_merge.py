@@ -1,4 +1,4 @@
-"""Merging: the databases of two places come to what is built from the objects of both."""
+"""Merging: the result equals a build from the objects of both databases."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import shapely
 from sentences import refused
 from worlds import CODES, CORNER, TAXONOMY, assert_same, objects_of, surroundings
 
-from semsig_gis.core import DatabaseError, GridSpec, SignatureSpec, Taxonomy
+from semsig_gis.core import DatabaseError, GridSpec, SignatureSpec
 from semsig_gis.database import (
     ObjectStore,
     TileSpec,
@@ -36,13 +36,9 @@ if TYPE_CHECKING:
     from semsig_gis.objects import StreetObjects
 
 EAST = float(CORNER[0])
-CLASSES = Taxonomy(
-    tuple(
-        dataclasses.replace(one, range_m={CODES[0]: 45.0, CODES[1]: 12.5}.get(one.code))
-        for one in TAXONOMY.classes
-    )
-)
-# Houses wall to wall from west to east, across the border, and some that stand alone.
+RANGES = zip((TAXONOMY.by_code(code).name for code in CODES), (45.0, 12.5), strict=False)
+CLASSES = TAXONOMY.with_ranges(dict(RANGES))
+# Rows of joined houses from west to east, across the border, with some gaps.
 HOUSES = surroundings(
     *(
         shapely.transform(shapely.box(x, y, x + 11.96, y + 9), lambda xy: xy + CORNER)
@@ -69,11 +65,11 @@ def city(
     east: float,
     **specs: Any,  # noqa: ANN401
 ) -> Path:
-    """Build the database of a strip of the town, which has what stands or begins there."""
+    """Build the database of a strip of the town, with the shapes that begin in the strip."""
 
     def cut(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-        left = table.geometry.bounds["minx"] - EAST
-        return table[(left >= west) & (left < east)]
+        x = table.geometry.bounds["minx"] - EAST
+        return table[(x >= west) & (x < east)]
 
     part = dataclasses.replace(objects, table=cut(objects.table))
     around: dict[str, Any] = {
@@ -90,7 +86,7 @@ def objects() -> StreetObjects:
     rng = np.random.default_rng(7)
     places = np.round(rng.uniform((0, 0), (400, 160), (180, 2)) * 4) / 4
     codes = rng.choice(CODES[:6], 180)
-    # At the border of 200 m: seen from just 45 m, and nothing of the west lies nearer to it.
+    # At the border at 200 m: visible from 45 m, and no western object is nearer to the border.
     places[(places[:, 0] > 195) & (places[:, 0] < 200), 0] -= 5.0
     places[:2], codes[:2] = [(195, 85), (200, 85)], CODES[0]
     rows = zip(*(places + CORNER).T, codes, ["trees"] * 180, map(str, range(180)), strict=True)
@@ -99,7 +95,7 @@ def objects() -> StreetObjects:
 
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
 @pytest.mark.parametrize(("end", "start"), [(200, 200), (230, 170), (120, 300), (400, 0)])
-def test_a_merger_is_built_from_both(
+def test_a_merged_database_equals_a_build_from_both(
     objects: StreetObjects, tmp_path: Path, mode: ViewpointMode, end: float, start: float
 ) -> None:
     west = city(objects, tmp_path / "west.parquet", mode, 0, end)
@@ -112,17 +108,17 @@ def test_a_merger_is_built_from_both(
         build_database(store.objects, viewpoints=ViewpointSpec(mode=mode), **around), whole
     )
     assert region.read_bytes() == whole.read_bytes()
-    left = objects.xy[:, 0] - EAST
-    kept = objects.table[(left < end) | (left >= start)]
-    assert sorted(store.objects.table["source_id"]) == sorted(kept["source_id"])
-    assert report.shared_objects == ((left < end) & (left >= start)).sum()
+    x = objects.xy[:, 0] - EAST
+    expected = objects.table[(x < end) | (x >= start)]
+    assert sorted(store.objects.table["source_id"]) == sorted(expected["source_id"])
+    assert report.shared_objects == ((x < end) & (x >= start)).sum()
     ids = [open_database(path).cell_ids for path in (west, east)]
     assert report.shared_cells == np.isin(ids[0], ids[1]).sum()
     assert (report.recomputed == 0) == (end == 120)
-    assert (report.cells, report.objects) == (len(open_database(region)), len(kept))
+    assert (report.cells, report.objects) == (len(open_database(region)), len(expected))
     if start == end:
-        save_with_store(*_whole(objects, mode), tmp_path / "all.parquet")
-        assert (tmp_path / "all.parquet").read_bytes() == region.read_bytes()
+        town = city(objects, tmp_path / "town.parquet", mode, 0, 400)
+        assert town.read_bytes() == region.read_bytes()
 
 
 def test_tiles_are_merged_into_a_file(objects: StreetObjects, tmp_path: Path) -> None:
@@ -144,16 +140,9 @@ def test_tiles_are_merged_into_a_file(objects: StreetObjects, tmp_path: Path) ->
     assert_same(open_database(region), open_database(expected))
 
 
-def _whole(objects: StreetObjects, mode: ViewpointMode) -> tuple[Any, ObjectStore]:
-    around: dict[str, Any] = {
-        "footprints": None if mode == "all" else HOUSES,
-        "streets": STREETS if mode == "streets" else None,
-    }
-    database = build_database(objects, viewpoints=ViewpointSpec(mode=mode), **around)
-    return database, ObjectStore.of(objects, **around)
-
-
-def test_what_was_made_in_another_way_is_refused(objects: StreetObjects, tmp_path: Path) -> None:
+def test_databases_with_different_settings_are_not_merged(
+    objects: StreetObjects, tmp_path: Path
+) -> None:
     west = city(objects, tmp_path / "west.parquet", "all", 0, 200)
     out = tmp_path / "region.parquet"
     others = dataclasses.replace(objects, table=objects.table.to_crs("EPSG:32631"))

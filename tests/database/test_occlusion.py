@@ -29,7 +29,7 @@ def oracle(
     polygons: NDArray[np.object_],
     tolerance: float,
 ) -> bool:
-    """Decide one pair from the buildings round about, one polygon after the other."""
+    """Return whether a pair is hidden, by testing each polygon near the line."""
     line = shapely.LineString([start, end])
     window = line.buffer(5 * tolerance + 1)
     around = [polygon for polygon in polygons if polygon.intersects(window)]
@@ -45,16 +45,16 @@ def oracle(
 def check_against_oracle(
     polygons: NDArray[np.object_], pairs: int, rng: np.random.Generator
 ) -> float:
-    """Return the share of so many random pairs that are hidden."""
+    """Return the share of random pairs that are hidden."""
     starts, ends = random_pairs(polygons, pairs, rng)
-    found = hidden(starts, ends, footprints=Footprints(polygons))
+    result = hidden(starts, ends, footprints=Footprints(polygons))
     tree = shapely.STRtree(polygons)
     expected = [
         oracle(start, end, polygons[tree.query(shapely.LineString([start, end]).buffer(9))], 0.5)
         for start, end in zip(starts, ends, strict=True)
     ]
-    assert found.tolist() == expected
-    return float(found.mean())
+    assert result.tolist() == expected
+    return float(result.mean())
 
 
 def random_pairs(
@@ -78,10 +78,10 @@ SPIKE = shapely.Polygon([(0, 0), (10, 0), (10, 10), (10, 30), (10, 10), (0, 10)]
 @pytest.mark.parametrize(
     ("start", "end", "houses", "tolerance", "expected"),
     [
-        # A house hides what is behind it.
+        # A house hides an object behind it.
         ((5, -8), (5, 12), [HOUSE], 0.5, True),
         ((5, -8), (20, -8), [HOUSE], 0.5, False),
-        # An object in a facade is seen from its own side at any slant.
+        # An object in a facade is visible from its own side at any angle.
         *(((5, -8), (5, depth), [HOUSE], 0.5, False) for depth in (-0.2, 0.0, 0.4)),
         *(((-20, -1), (9, depth), [HOUSE], 0.5, False) for depth in (-0.2, 0.0, 0.4)),
         *(((5, 18), (5, depth), [HOUSE], 0.5, True) for depth in (-0.2, 0.0, 0.4)),
@@ -107,12 +107,12 @@ SPIKE = shapely.Polygon([(0, 0), (10, 0), (10, 10), (10, 30), (10, 10), (0, 10)]
         ((12, 12), (12, -3), [BLOCK], 0.5, True),
         ((5, 20), (15, 20), [SPIKE], 0.5, False),
         ((5, -8), (5, 12), [SPIKE], 0.5, True),
-        # There may be nothing deep enough, and nothing between.
+        # No part of a building is deep enough; both ends are the same place.
         ((-5, 5), (15, 5), [HOUSE], 6.0, False),
         ((-5, 5), (-5, 5), [HOUSE], 0.5, False),
     ],
 )
-def test_what_buildings_hide(
+def test_buildings_hide_objects_behind_them(
     start: tuple[float, float],
     end: tuple[float, float],
     houses: list[shapely.Polygon],
@@ -141,7 +141,7 @@ def test_footprints_are_repaired_or_refused() -> None:
             Footprints([HOUSE], tolerance=tolerance)
 
 
-def test_blocks_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_block_size_does_not_change_occlusion(monkeypatch: pytest.MonkeyPatch) -> None:
     polygons = np.array([HOUSE, shapely.box(15, 3, 30, 20)])
     starts, ends = random_pairs(polygons, 500, np.random.default_rng(3))
     starts = starts[np.repeat(np.arange(100), 5)]
@@ -157,34 +157,34 @@ EDGES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=40)
 
 
 @given(EDGES)
-def test_what_a_chain_of_pairs_joins_has_one_label(edges: list[tuple[int, int]]) -> None:
+def test_connected_nodes_have_one_label(edges: list[tuple[int, int]]) -> None:
     first, second = np.array(edges, np.int64).reshape(-1, 2).T
     labels = occlusion._component_labels(first, second, 31)
-    groups = [{thing} for thing in range(31)]
+    groups = [{node} for node in range(31)]
     for a, b in edges:
         joined = groups[a] | groups[b]
-        for thing in joined:
-            groups[thing] = joined
+        for node in joined:
+            groups[node] = joined
     assert labels.tolist() == [min(group) for group in groups]
 
 
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
-def test_random_towns_equal_the_oracle(seed: int) -> None:
+def test_occlusion_in_random_towns_equals_the_oracle(seed: int) -> None:
     rng = np.random.default_rng(seed)
     corners, sizes = rng.uniform(0, 60, (12, 2)), rng.uniform(0.3, 20, (12, 2))
     polygons = np.asarray(shapely.box(*corners.T, *(corners + sizes).T))
     check_against_oracle(polygons, 40, rng)
 
 
-def test_helsinki_equals_the_oracle(geodata: Path) -> None:
+def test_occlusion_in_helsinki_equals_the_oracle(geodata: Path) -> None:
     spec = load_catalog("openstreetmap").layer("buildings")
     (layer,) = osm_file.read_layers(geodata / "osm/helsinki_2019.osm.pbf", [spec])
     polygons = layer.table.to_crs(layer.table.estimate_utm_crs()).geometry.to_numpy()
     assert 0.2 < check_against_oracle(polygons, 2000, np.random.default_rng(1)) < 0.8
 
 
-def test_montpellier_equals_the_oracle(geodata: Path) -> None:
+def test_occlusion_in_montpellier_equals_the_oracle(geodata: Path) -> None:
     table = gpd.read_file(geodata / "montpellier/VilleMTP_MTP_Batiments.zip").to_crs("EPSG:2154")
     footprints = Footprints(table.geometry.to_numpy())
     assert footprints.repaired == 1
@@ -192,7 +192,7 @@ def test_montpellier_equals_the_oracle(geodata: Path) -> None:
     assert 0.2 < check_against_oracle(polygons, 2000, np.random.default_rng(2)) < 0.8
 
 
-def test_whole_blocks_of_houses_are_looked_at() -> None:
+def test_buildings_near_include_their_block() -> None:
     row = [shapely.box(10 * number, 0, 10 * number + 10, 8) for number in range(30)]
     houses = np.array([shapely.box(40, 20, 45, 25), *row])
     near = buildings_near(houses, np.array([[0.0, -5.0]]), distance=20.0)

@@ -44,33 +44,41 @@ CENTRES = [shapely.Point(xy) for xy in GRID.viewpoints(*CELLS)]
 
 
 def choose(spec: ViewpointSpec, **surroundings: Any) -> list[bool]:  # noqa: ANN401
-    chosen: list[bool] = choose_viewpoints(*CELLS, grid=GRID, spec=spec, **surroundings).tolist()
-    return chosen
+    mask: list[bool] = choose_viewpoints(*CELLS, grid=GRID, spec=spec, **surroundings).tolist()
+    return mask
 
 
-def test_outdoor_is_outside_the_footprints_and_an_area_holds_in_every_mode() -> None:
+def test_modes_and_areas_choose_viewpoints() -> None:
     yard = shapely.box(0, 0, 70, 70) - shapely.box(21, 21, 49, 49)
     area = shapely.Polygon([(0, 0), (100, 0), (0, 100)])
     footprints = Footprints([yard])
     assert all(choose(ViewpointSpec(), footprints=footprints))
-    chosen = choose(ViewpointSpec(mode="outdoor"), footprints=footprints)
-    assert chosen == [not yard.intersects(centre) for centre in CENTRES]
+    mask = choose(ViewpointSpec(mode="outdoor"), footprints=footprints)
+    assert mask == [not yard.intersects(centre) for centre in CENTRES]
     assert choose(ViewpointSpec(area=area)) == [area.intersects(centre) for centre in CENTRES]
-    chosen = choose(ViewpointSpec(mode="streets", area=shapely.box(0, 0, 30, 30)), streets=[LINE])
-    assert [index for index, kept in enumerate(chosen) if kept] == [0, 10, 20]
+    mask = choose(ViewpointSpec(mode="streets", area=shapely.box(0, 0, 30, 30)), streets=[LINE])
+    assert [index for index, is_viewpoint in enumerate(mask) if is_viewpoint] == [0, 10, 20]
 
 
-def test_nobody_stands_in_a_building_along_a_street() -> None:
-    arcade = shapely.box(30, 0, 55, 10)  # holds two centres, and a third is on its outline
+def test_centres_in_buildings_along_a_street_are_no_viewpoints() -> None:
+    arcade = shapely.box(30, 0, 55, 10)  # contains two centres, and a third is on its outline
     spec, footprints = ViewpointSpec(mode="streets", width=1.0), Footprints([arcade])
     assert sum(choose(spec, streets=[LINE])) == 10
-    chosen = choose(spec, streets=[LINE], footprints=footprints)
-    assert [number // 10 for number, kept in enumerate(chosen) if kept] == [0, 1, 2, 6, 7, 8, 9]
+    mask = choose(spec, streets=[LINE], footprints=footprints)
+    assert [number // 10 for number, is_viewpoint in enumerate(mask) if is_viewpoint] == [
+        0,
+        1,
+        2,
+        6,
+        7,
+        8,
+        9,
+    ]
 
 
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([7, 1 << 18]))
-def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
+def test_viewpoints_along_streets_equal_a_plain_loop(seed: int, block: int) -> None:
     rng = np.random.default_rng(seed)
     lines = [shapely.LineString(rng.uniform(0, 100, (3, 2))) for _ in range(6)]
     widths = rng.uniform(1, 20, 6)
@@ -79,9 +87,9 @@ def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
     spec = ViewpointSpec(mode="streets")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(viewpoints, "PLACES_PER_BLOCK", block)
-        one = choose(spec, streets=[*lines, None, shapely.LineString()])
+        equal = choose(spec, streets=[*lines, None, shapely.LineString()])
         own = choose(spec, streets=lines, widths=widths)
-    assert one == [min(line.distance(centre) for line in lines) <= 8 for centre in CENTRES]
+    assert equal == [min(line.distance(centre) for line in lines) <= 8 for centre in CENTRES]
     assert own == [
         any(line.distance(centre) <= reach for line, reach in zip(lines, reaches, strict=True))
         for centre in CENTRES
@@ -98,14 +106,14 @@ def test_streets_equal_a_plain_loop(seed: int, block: int) -> None:
         ("streets", {"streets": [LINE], "widths": [0.0]}, ["half-widths", "above 0"]),
     ],
 )
-def test_what_does_not_serve_a_mode_is_refused(
+def test_missing_or_invalid_surroundings_are_refused(
     mode: ViewpointMode, surroundings: dict[str, Any], words: list[str]
 ) -> None:
     with refused(InputError, *words):
         choose(ViewpointSpec(mode=mode), **surroundings)
 
 
-def test_a_wrong_choice_is_refused() -> None:
+def test_invalid_viewpoint_specs_are_refused() -> None:
     with refused(InputError, "'street'", "nearest is 'streets'"):
         ViewpointSpec(mode="street")  # type: ignore[arg-type]
     for width in (0.0, -1.0, np.nan):
@@ -116,7 +124,7 @@ def test_a_wrong_choice_is_refused() -> None:
             ViewpointSpec(area=area)  # type: ignore[arg-type]
 
 
-def test_a_choice_survives_json() -> None:
+def test_a_viewpoint_spec_survives_json() -> None:
     area = shapely.Polygon(np.random.default_rng(0).uniform(6e6, 7e6, (3, 2)))
     for spec in (ViewpointSpec(), ViewpointSpec(mode="streets", width=5.5, area=area)):
         assert ViewpointSpec.from_dict(json.loads(json.dumps(spec.to_dict()))) == spec
@@ -124,7 +132,7 @@ def test_a_choice_survives_json() -> None:
         ViewpointSpec.from_dict({"mode": "all", "width": 8.0, "area": "POLYGON (("})
 
 
-# --- What is seen -----------------------------------------------------------------------------
+# --- Visible objects --------------------------------------------------------------------------
 
 
 def test_bearings_count_clockwise_from_north() -> None:
@@ -153,7 +161,7 @@ def test_a_bearing_points_along_its_displacement(dx: float, dy: float) -> None:
 
 
 @given(worlds())
-def test_the_viewpoints_of_a_database_see_what_it_says(world: World) -> None:
+def test_visible_objects_of_cells_equal_those_at_their_viewpoints(world: World) -> None:
     objects = world.street_objects
     try:
         database = world.database
@@ -172,40 +180,41 @@ def test_the_viewpoints_of_a_database_see_what_it_says(world: World) -> None:
     assert len(stored) == len(database)
 
 
-def test_buildings_hide() -> None:
+def test_visible_objects_are_not_behind_buildings() -> None:
     world = World(((10.0, 0.0, CODES[0]), (-10.0, 0.0, CODES[0])))
     objects = world.street_objects
     wall = Footprints([shapely.box(4.0, -2.0, 6.0, 2.0)])
-    seen = visible_objects_at(
+    visible = visible_objects_at(
         objects, np.array([[0.0, 0.0]]), index=ObjectIndex(objects.xy), radius=30.0, footprints=wall
     )
-    assert seen.objects.tolist() == [1]
-    assert seen.bearings.tolist() == [270.0]
+    assert visible.objects.tolist() == [1]
+    assert visible.bearings.tolist() == [270.0]
 
 
-def test_cells_tell_what_is_seen_between_their_middles() -> None:
+def test_objects_off_the_centre_of_a_cell_are_near_the_exact_ones() -> None:
     database, objects = TOWN.database, TOWN.street_objects
-    aside, up = (part.ravel() for part in np.meshgrid([-1, 0, 1], [-1, 0, 1]))
-    ids = cell_ids(database.columns[:, None] + aside, database.rows[:, None] + up)
+    # Cells with all eight neighbours.
+    east, north = (part.ravel() for part in np.meshgrid([-1, 0, 1], [-1, 0, 1]))
+    ids = cell_ids(database.columns[:, None] + east, database.rows[:, None] + north)
     cells = np.flatnonzero(np.isin(ids, database.cell_ids).all(axis=1))
     assert len(cells) > 20
     index = ObjectIndex(objects.xy)
     places = np.array([[0.0, 0.0], [3.0, 0.0], [-3.0, 2.0], [0.0, -4.0]])
-    seen = visible_objects_off_centre(database, cells, places)
-    assert len(seen) == len(places) * len(cells)
+    estimate = visible_objects_off_centre(database, cells, places)
+    assert len(estimate) == len(places) * len(cells)
     for number, place in enumerate(places):
-        views = np.arange(number, len(seen), len(places))
-        true = visible_objects_at(objects, database.xy[cells] + place, index=index, radius=30.0)
-        # Places are good to some decimetres, by which an object may be in range or not.
-        same = seen.lengths[views] == true.lengths
+        views = np.arange(number, len(estimate), len(places))
+        exact = visible_objects_at(objects, database.xy[cells] + place, index=index, radius=30.0)
+        # The estimate errs by some decimetres, by which an object may be in range or not.
+        same = estimate.lengths[views] == exact.lengths
         assert same.mean() > 0.9
         for cell in np.flatnonzero(same).tolist():
-            rows = (seen, int(views[cell])), (true, cell)
-            parts = [slice(one.offsets[row], one.offsets[row + 1]) for one, row in rows]
+            rows = (estimate, int(views[cell])), (exact, cell)
+            parts = [slice(*view.offsets[row : row + 2]) for view, row in rows]
             near, expected = (
-                np.lexsort((one.distances[part], one.codes[part]))
-                for (one, _), part in zip(rows, parts, strict=True)
+                np.lexsort((view.distances[part], view.codes[part]))
+                for (view, _), part in zip(rows, parts, strict=True)
             )
-            assert (seen.codes[parts[0]][near] == true.codes[parts[1]][expected]).all()
-            metres = seen.distances[parts[0]][near] - true.distances[parts[1]][expected]
+            assert (estimate.codes[parts[0]][near] == exact.codes[parts[1]][expected]).all()
+            metres = estimate.distances[parts[0]][near] - exact.distances[parts[1]][expected]
             assert np.abs(metres).max() < 0.3

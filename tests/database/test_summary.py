@@ -29,7 +29,7 @@ def database() -> SignatureDatabase:
     return six_cells()
 
 
-def test_properties_of_six_cells(
+def test_summary_of_six_cells(
     database: SignatureDatabase, snapshot: Callable[[str, str], None]
 ) -> None:
     other = replace(
@@ -49,27 +49,27 @@ def test_properties_of_six_cells(
         snapshot(f"{name}.json", json.dumps(rounded, indent=1) + "\n")
 
 
-def test_the_estimate_of_the_density_is_near_the_count() -> None:
+def test_estimated_density_is_near_the_counted_one() -> None:
     """Every object is in as many signatures as there are cells in its disc, on average."""
     objects = lamps()
     database = build_database(objects)
     code = int(objects.codes[0])
     estimated, counted = (
-        next(one for one in facts["occurrences"] if one["code"] == code)["objects_per_km2"]
+        next(row for row in facts["occurrences"] if row["code"] == code)["objects_per_km2"]
         for facts in (
             database_summary(database),
             database_summary(database, object_counts={code: len(objects)}),
         )
     )
     assert estimated == pytest.approx(counted, rel=0.03)
-    # What buildings hide is missing from the estimate.
+    # The estimate lacks objects that buildings hide.
     house = surroundings(shapely.box(*CORNER, *(CORNER + 60)))
     hidden = database_summary(build_database(objects, footprints=house))
     assert hidden["occurrences"][code - 1]["objects_per_km2"] < estimated
 
 
 @given(worlds())
-def test_entropies_are_those_of_a_plain_loop(world: World) -> None:
+def test_entropies_equal_a_plain_loop(world: World) -> None:
     try:
         database = world.database
     except EmptyResultError:
@@ -81,14 +81,14 @@ def test_entropies_are_those_of_a_plain_loop(world: World) -> None:
     def entropy(values: list[object]) -> float:
         return sum(n / cells * math.log2(cells / n) for n in Counter(values).values())
 
-    for one in facts["occurrences"]:
-        counts: list[object] = [types.count(one["symbol"]) for types in signatures]
-        assert one["entropy_bits"] == pytest.approx(entropy(counts), abs=1e-9)
-        assert one["entropy_bits"] <= facts["groups"]["type"]["entropy_bits"] + 1e-9
+    for row in facts["occurrences"]:
+        counts: list[object] = [types.count(row["symbol"]) for types in signatures]
+        assert row["entropy_bits"] == pytest.approx(entropy(counts), abs=1e-9)
+        assert row["entropy_bits"] <= facts["groups"]["type"]["entropy_bits"] + 1e-9
     for kind in ("type", "angle"):
         bits = facts["groups"][kind]["entropy_bits"]
         assert bits <= facts["groups"]["both"]["entropy_bits"] + 1e-9 <= facts["cell_bits"] + 2e-9
     assert facts["groups"]["type"]["entropy_bits"] == pytest.approx(
         entropy([*signatures]), abs=1e-9
     )
-    assert np.isclose(sum(one["share"] for one in facts["occurrences"]), 1)
+    assert np.isclose(sum(row["share"] for row in facts["occurrences"]), 1)

@@ -1,4 +1,4 @@
-"""Tiles: which there are, what they are built from, how a run goes on, and that all is as whole."""
+"""Tiles: their plan, inputs and results, resumed runs, and equality with the whole database."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ if TYPE_CHECKING:
 
 def placed(*shapes: shapely.Geometry, **columns: object) -> gpd.GeoDataFrame:
     """Return shapes in the town, in its CRS."""
-    moved = [shapely.transform(shape, lambda xy: xy + CORNER) for shape in shapes]
-    return gpd.GeoDataFrame(columns, geometry=moved, crs="EPSG:2154")
+    placed_shapes = [shapely.transform(shape, lambda xy: xy + CORNER) for shape in shapes]
+    return gpd.GeoDataFrame(columns, geometry=placed_shapes, crs="EPSG:2154")
 
 
 def tiled(world: World, side: float, folder: Path, **options: Any) -> SignatureDatabase:  # noqa: ANN401
-    """Build a world in tiles and open what was written."""
+    """Build a world in tiles and open the result."""
     save_objects(world.street_objects, folder / "objects.parquet")
     build_tiles(
         folder / "objects.parquet",
@@ -74,7 +74,7 @@ def tiled(world: World, side: float, folder: Path, **options: Any) -> SignatureD
     return open_database(folder / "city")
 
 
-def test_a_tile_is_so_many_whole_cells() -> None:
+def test_the_side_of_a_tile_is_rounded_to_cells() -> None:
     assert TileSpec().cells(GridSpec()) == 200
     assert TileSpec(104.0).cells(GridSpec(step=10.0)) == 10
     assert TileSpec(1.0).cells(GridSpec(step=10.0)) == 1
@@ -103,7 +103,7 @@ def test_tiles_that_are_too_small_or_too_many_are_refused(
 
 @given(world=worlds(), side=st.sampled_from([12.0, 30.0, 77.0, 1000.0]))
 @settings(suppress_health_check=[HealthCheck.too_slow])
-def test_tiles_are_the_same_as_the_whole(world: World, side: float) -> None:
+def test_tiles_equal_the_whole_database(world: World, side: float) -> None:
     # Ranges go up to 40 m, more than some tiles.
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -116,7 +116,7 @@ def test_tiles_are_the_same_as_the_whole(world: World, side: float) -> None:
 
 
 def houses_and_streets() -> dict[str, gpd.GeoDataFrame]:
-    """Return houses wall to wall, in two parts, invalid and flat, and streets of some widths."""
+    """Return houses: joined, in two parts, invalid and flat; and streets with widths."""
     rng = np.random.default_rng(3)
     shapes: list[shapely.Geometry] = []
     for south in (10, 60, 110, 160):
@@ -139,7 +139,7 @@ def houses_and_streets() -> dict[str, gpd.GeoDataFrame]:
     ("mode", "suffix"),
     [("all", ".parquet"), ("outdoor", ".parquet"), ("streets", ".parquet"), ("streets", ".gpkg")],
 )
-def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
+def test_tiles_with_buildings_and_streets_equal_the_whole_database(
     town: World, tmp_path: Path, mode: ViewpointMode, suffix: str
 ) -> None:
     # A lamp where there is no building and no street near.
@@ -150,23 +150,23 @@ def test_tiles_with_buildings_and_streets_are_the_same_as_the_whole(
         files[role] = tmp_path / f"{role}{suffix}"
         save = save_surroundings if suffix == ".parquet" else gpd.GeoDataFrame.to_file
         save(table, files[role])
-        # Of other files than Parquet, no widths are read.
+        # Widths are read only from Parquet files.
         tables[role] = read_surroundings(files[role], role=role, crs="EPSG:2154")  # type: ignore[arg-type]
-    found = tiled(town, 50.0, tmp_path, viewpoints=viewpoints, **files)
+    result = tiled(town, 50.0, tmp_path, viewpoints=viewpoints, **files)
     whole = build_database(
         town.street_objects,
         viewpoints=viewpoints,
         footprints=tables["buildings"],
         streets=tables["streets"],
     )
-    assert_same(found, whole)
-    assert (found.viewpoints, found.occlusion) == (viewpoints, TOLERANCE_M)
-    assert len(found) < len(town.database) or mode == "all"
-    covered = Footprints(tables["buildings"].geometry.to_numpy()).cover(found.xy)
+    assert_same(result, whole)
+    assert (result.viewpoints, result.occlusion) == (viewpoints, TOLERANCE_M)
+    assert len(result) < len(town.database) or mode == "all"
+    covered = Footprints(tables["buildings"].geometry.to_numpy()).cover(result.xy)
     assert covered.any() == (mode == "all")
 
 
-def test_tables_of_buildings_and_streets_are_as_good_as_files(
+def test_tables_and_files_of_surroundings_give_equal_parts(
     objects_file: Path, tmp_path: Path
 ) -> None:
     tables: dict[str, Any] = houses_and_streets()
@@ -182,17 +182,17 @@ def test_tables_of_buildings_and_streets_are_as_good_as_files(
         build_tiles(objects_file, tmp_path / "none", streets=tables["buildings"])
 
 
-def test_a_wall_whose_neighbour_is_far_hides_as_in_the_whole(tmp_path: Path) -> None:
-    # A long house: its core is one piece only through a neighbour at the other end, three tiles
-    # away. From inside its near end, its far side across the yard must not hide.
+def test_footprints_joined_far_away_hide_as_in_the_whole_database(tmp_path: Path) -> None:
+    # A long house: its core is in one piece only because of a neighbour at the other end, three
+    # tiles away. Seen from inside its near end, its far side across the yard must not hide.
     house = shapely.box(0, 0, 130, 20) - shapely.box(0, 6, 129.2, 14)
     houses = placed(house, shapely.box(130, -10, 140, 30))
     save_surroundings(houses, tmp_path / "buildings.parquet")
     world = World(tuple((CORNER[0] + x, CORNER[1] + 25.0, CODES[0]) for x in (5.0, 15.0, 25.0)))
-    found = tiled(world, 30.0, tmp_path, buildings=tmp_path / "buildings.parquet")
-    assert_same(found, build_database(world.street_objects, footprints=houses))
-    alone = build_database(world.street_objects, footprints=houses.iloc[:1])
-    assert len(alone) != len(found)  # or nothing would have been shown
+    result = tiled(world, 30.0, tmp_path, buildings=tmp_path / "buildings.parquet")
+    assert_same(result, build_database(world.street_objects, footprints=houses))
+    without_neighbour = build_database(world.street_objects, footprints=houses.iloc[:1])
+    assert len(without_neighbour) != len(result)  # the neighbour matters
 
 
 HOUSES = placed(shapely.box(0, 0, 9, 9))
@@ -208,22 +208,20 @@ def plan(objects_file: Path, **options: Any) -> TilePlan:  # noqa: ANN401
     return plan_tiles(objects_file, out, tile=TileSpec(50.0), spec=SignatureSpec(), **options)
 
 
-def test_files_that_can_be_read_by_box_are_copied_as_they_are(
-    objects_file: Path, tmp_path: Path
-) -> None:
+def test_files_with_bounds_are_copied_unchanged(objects_file: Path, tmp_path: Path) -> None:
     houses, streets = tmp_path / "houses.parquet", tmp_path / "streets.parquet"
     save_surroundings(HOUSES, houses)
     save_surroundings(STREETS, streets)
-    found = plan(objects_file, buildings=houses, streets=streets, viewpoints=ALONG)
+    tile_plan = plan(objects_file, buildings=houses, streets=streets, viewpoints=ALONG)
     inputs = tmp_path / "city.partial" / "_inputs"
-    assert found.objects.read_bytes() == objects_file.read_bytes()
+    assert tile_plan.objects.read_bytes() == objects_file.read_bytes()
     for name, file in (("buildings", houses), ("streets", streets)):
-        assert getattr(found, name) == inputs / f"{name}.parquet"
-        assert getattr(found, name).read_bytes() == file.read_bytes()
-    assert found.folder == tmp_path / "city.partial"
-    assert (found.side, found.reach, found.street_reach) == (5, 30.0, 21.0)
-    assert found.box((15, -2), 3.0) == (747.0, -103.0, 803.0, -47.0)
-    # Streets that no viewpoint needs are left aside.
+        assert getattr(tile_plan, name) == inputs / f"{name}.parquet"
+        assert getattr(tile_plan, name).read_bytes() == file.read_bytes()
+    assert tile_plan.folder == tmp_path / "city.partial"
+    assert (tile_plan.side, tile_plan.reach, tile_plan.street_reach) == (5, 30.0, 21.0)
+    assert tile_plan.box((15, -2), 3.0) == (747.0, -103.0, 803.0, -47.0)
+    # Streets that no viewpoint needs are ignored.
     assert plan(objects_file, streets="nowhere.parquet").streets is None
 
 
@@ -235,14 +233,14 @@ def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: 
     inputs = tmp_path / "city.partial" / "_inputs"
     for name in ("plain", "degrees"):
         options = {"buildings": tmp_path / f"{name}.parquet", "viewpoints": ALONG}
-        found = plan(objects_file, streets=tmp_path / "streets.gpkg", **options)
-        assert found.objects == inputs / "objects.parquet"
-        assert found.buildings == inputs / "buildings.parquet"
-        assert found.streets == inputs / "streets.parquet"
-        assert found.street_reach == 5.0
-        assert len(open_objects(found.objects)) == len(town.objects)
+        tile_plan = plan(objects_file, streets=tmp_path / "streets.gpkg", **options)
+        assert tile_plan.objects == inputs / "objects.parquet"
+        assert tile_plan.buildings == inputs / "buildings.parquet"
+        assert tile_plan.streets == inputs / "streets.parquet"
+        assert tile_plan.street_reach == 5.0
+        assert len(open_objects(tile_plan.objects)) == len(town.objects)
         times = {path: path.stat().st_mtime_ns for path in inputs.iterdir()}
-        assert plan(objects_file, streets=tmp_path / "streets.gpkg", **options) == found
+        assert plan(objects_file, streets=tmp_path / "streets.gpkg", **options) == tile_plan
         assert {path: path.stat().st_mtime_ns for path in inputs.iterdir()} == times
 
 
@@ -259,7 +257,7 @@ def test_other_files_are_copied_once(objects_file: Path, town: World, tmp_path: 
         ({"buildings": "houses.geojson"}, (InputError, CrsError), []),  # no CRS is guessed
     ],
 )
-def test_what_cannot_be_used_is_said_at_once_and_leaves_nothing(
+def test_invalid_inputs_are_refused_before_the_run(
     objects_file: Path,
     tmp_path: Path,
     options: dict[str, Any],
@@ -279,14 +277,14 @@ def test_what_cannot_be_used_is_said_at_once_and_leaves_nothing(
     assert not (tmp_path / "city.partial").exists()
 
 
-def test_a_run_knows_its_inputs_by_their_content(objects_file: Path, tmp_path: Path) -> None:
+def test_a_run_identifies_its_inputs_by_content(objects_file: Path, tmp_path: Path) -> None:
     HOUSES.to_file(tmp_path / "houses.shp")
     options = {"buildings": tmp_path / "houses.shp"}
-    done = plan(objects_file, **options).folder / "tile_0_0.empty"
-    done.touch()
+    marker = plan(objects_file, **options).folder / "tile_0_0.empty"
+    marker.touch()
     for path in tmp_path.glob("houses.*"):
-        path.write_bytes(path.read_bytes())  # later, and the same
-    assert plan(objects_file, **options).folder == done.parent
+        path.write_bytes(path.read_bytes())  # newer, with the same content
+    assert plan(objects_file, **options).folder == marker.parent
     (tmp_path / "houses.prj").write_text((tmp_path / "houses.prj").read_text() + " ")
     with refused(InputError, "inputs, buildings", "delete that folder"):
         plan(objects_file, **options)
@@ -302,7 +300,7 @@ def build(folder: Path, database: SignatureDatabase) -> PartFile:
     return describe_part((0, 0), database, path)
 
 
-def test_tiles_that_are_done_are_found_and_damaged_ones_built_again(
+def test_finished_tiles_are_reused_and_damaged_ones_deleted(
     database: SignatureDatabase, tmp_path: Path
 ) -> None:
     folder = begin_run(tmp_path / "new" / "city", RECIPE)
@@ -314,7 +312,7 @@ def test_tiles_that_are_done_are_found_and_damaged_ones_built_again(
     assert not path.exists()
 
 
-def test_a_database_appears_whole_and_replaces_what_was_there(
+def test_a_finished_database_replaces_the_old_one(
     database: SignatureDatabase, tmp_path: Path
 ) -> None:
     target, link = tmp_path / "city", tmp_path / "latest"
@@ -337,7 +335,9 @@ def test_a_database_appears_whole_and_replaces_what_was_there(
     assert link.is_symlink()
 
 
-def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: Path) -> None:
+def test_folders_with_other_files_are_never_replaced(
+    database: SignatureDatabase, tmp_path: Path
+) -> None:
     target = tmp_path / "home"
     target.mkdir()
     (target / "letter.txt").touch()
@@ -346,7 +346,7 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
     (target / "letter.txt").unlink()
     folder = begin_run(target, RECIPE)
     publish_tiles(folder, [build(folder, database)])
-    (target / "notes.txt").touch()  # beside the parts
+    (target / "notes.txt").touch()  # next to the parts
     with refused(InputError, "'notes.txt'", "move that file elsewhere"):
         begin_run(target, RECIPE)
     assert {path.name for path in target.iterdir()} == {MANIFEST, part_name((0, 0)), "notes.txt"}
@@ -360,7 +360,7 @@ def test_other_things_are_never_replaced(database: SignatureDatabase, tmp_path: 
             begin_run(tmp_path / "pipe", RECIPE)
 
 
-def test_tiles_that_the_memory_does_not_hold_are_not_begun(
+def test_tiles_that_exceed_memory_are_refused(
     objects_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(resources, "free_memory", lambda: 150_000_000)
@@ -374,7 +374,7 @@ def test_tiles_that_the_memory_does_not_hold_are_not_begun(
 
 
 @pytest.mark.parametrize("fails", [1, 2])
-def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
+def test_a_failed_rename_leaves_the_old_database_and_the_run(
     database: SignatureDatabase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: int
 ) -> None:
     target, rename, calls = tmp_path / "city", Path.rename, []
@@ -395,7 +395,7 @@ def test_a_rename_that_fails_leaves_one_whole_database_and_the_run(
         with refused(InputError, str(target), "Permission denied", "run the same command again"):
             publish_tiles(folder, [part])
     assert_same(open_database(target), database)
-    # As the same command does.
+    # The same command resumes the run.
     assert finished_tiles(begin_run(target, RECIPE), [(0, 0)]) == {(0, 0): part}
     publish_tiles(folder, [part])
     assert len(open_database(target)) == 20

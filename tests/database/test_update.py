@@ -54,11 +54,9 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase, UpdateReport, ViewpointMode
     from semsig_gis.objects import Loaded, StreetObjects
 
-# Two classes that are seen from further than the others, and one from nearer.
-RANGES = {CODES[0]: 45.0, CODES[1]: 12.5}
-CLASSES = Taxonomy(
-    tuple(dataclasses.replace(c, range_m=RANGES.get(c.code)) for c in TAXONOMY.classes)
-)
+# One class with a larger visibility range than the others, and one with a smaller.
+RANGES = zip((TAXONOMY.by_code(code).name for code in CODES), (45.0, 12.5), strict=False)
+CLASSES = TAXONOMY.with_ranges(dict(RANGES))
 SIZE = 300.0
 
 
@@ -71,7 +69,7 @@ def house(x: float, y: float) -> shapely.Polygon:
     return shapely.box(*at(x, y), *at(x + 20, y + 12))
 
 
-# Houses in rows that share walls, one of them drawn wrongly, and one that stands alone.
+# Rows of joined houses, an invalid one and a detached one.
 HOUSES = surroundings(
     *(house(x, y) for x in (30, 50, 70) for y in (40, 52.05, 200)),
     shapely.Polygon([at(150, 150), at(180, 170), at(180, 150), at(150, 170)]),
@@ -107,7 +105,7 @@ def random_table(rng: np.random.Generator, size: int) -> pd.DataFrame:
 
 
 def edited(table: pd.DataFrame, rng: np.random.Generator, edits: int) -> pd.DataFrame:
-    """Return the table after so many additions, moves, removals and changes of class."""
+    """Return the table after random additions, moves, removals and changes of class."""
     for kind in rng.choice(["add", "move", "remove", "class"], edits):
         row = rng.choice(table.index)
         if kind == "add":
@@ -126,7 +124,7 @@ def builder(**options: Any) -> Callable[[StreetObjects], SignatureDatabase]:  # 
 
 
 def check_report(report: UpdateReport, before: SignatureDatabase, after: SignatureDatabase) -> None:
-    """Hold the drift of the cells against a plain comparison of the signatures."""
+    """Check the counts of a report with a plain comparison of the signatures."""
 
     def signatures(database: SignatureDatabase) -> dict[int, tuple[bytes, ...]]:
         arrays = (database.codes, database.bearing_units, database.distance_units)
@@ -163,24 +161,24 @@ def check_report(report: UpdateReport, before: SignatureDatabase, after: Signatu
 @example(seed=1, size=120, edits=[30], houses=True, mode="outdoor", area=False)
 @example(seed=2, size=120, edits=[30], houses=True, mode="streets", area=True)
 @example(seed=11, size=250, edits=[20] * 10, houses=True, mode="streets", area=False)
-def test_an_update_is_a_rebuild(
+def test_an_update_equals_a_rebuild(
     *, seed: int, size: int, edits: list[int], houses: bool, mode: ViewpointMode, area: bool
 ) -> None:
     rng = np.random.default_rng(seed)
     table = random_table(rng, size)
-    given: dict[str, Any] = {
+    options: dict[str, Any] = {
         "footprints": HOUSES if houses or mode == "outdoor" else None,
         "streets": STREETS if mode == "streets" else None,
     }
-    build = builder(viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **given)
+    build = builder(viewpoints=ViewpointSpec(mode=mode, area=AREA if area else None), **options)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "city.parquet")
         try:
             first = build(objects_of(table))
         except EmptyResultError:
             return
-        save_with_store(first, ObjectStore.of(objects_of(table), **given), path)
-        for number in edits:  # each time what the update before has written
+        save_with_store(first, ObjectStore.of(objects_of(table), **options), path)
+        for number in edits:  # each update continues from the last one
             before, layers = open_database(path), {*open_store(path).objects.table["source"]}
             table = edited(table, rng, number)
             new = objects_of(table)
@@ -191,7 +189,7 @@ def test_an_update_is_a_rebuild(
                     build(new)
                 return
             after, store = open_database(path), open_store(path)
-            # Layers that lost their last object are not in the new table, and so they stay.
+            # Layers without objects are not in the new table, so they are kept.
             assert {*report.kept} == layers - {*table["source"]}
             assert_same(after, build(store.objects if report.kept else new))
             assert_index_fits(store)
@@ -200,7 +198,7 @@ def test_an_update_is_a_rebuild(
 
 
 @pytest.mark.parametrize("mode", ["outdoor", "streets"])
-def test_far_from_buildings_and_streets(mode: ViewpointMode) -> None:
+def test_updates_far_from_buildings_and_streets_equal_a_rebuild(mode: ViewpointMode) -> None:
     rng = np.random.default_rng(3)
     town, hamlet = random_table(rng, 80), random_table(rng, 30)
     hamlet[["x", "y"]] += 2000.0
@@ -228,7 +226,7 @@ def path(table: pd.DataFrame, tmp_path: Path) -> Path:
     return tmp_path / "city.parquet"
 
 
-def test_only_what_is_in_range_is_computed(path: Path, table: pd.DataFrame) -> None:
+def test_only_cells_in_range_of_a_change_are_recomputed(path: Path, table: pd.DataFrame) -> None:
     database = open_database(path)
     x, y = at(100.25, 120.5)
     columns, rows = np.meshgrid(np.arange(76520, 76550), np.arange(627500, 627530))
@@ -241,13 +239,11 @@ def test_only_what_is_in_range_is_computed(path: Path, table: pd.DataFrame) -> N
         near = distances <= reach
         assert report.recomputed == near.sum()
         assert report.changed + report.appeared == near.sum()
-        (item,) = (one for one in report.classes if one.added)
+        (item,) = (change for change in report.classes if change.added)
         assert (item.class_name, item.added) == (CLASSES.by_code(code).name, 1)
 
 
-def test_a_file_stays_where_nothing_is_new_or_another_is_written(
-    path: Path, table: pd.DataFrame
-) -> None:
+def test_an_update_without_changes_keeps_the_file(path: Path, table: pd.DataFrame) -> None:
     content, other = path.read_bytes(), path.with_name("later.parquet")
     update_file(path, objects_of(table[3:]), out=other)
     assert_same(open_database(other), build_database(objects_of(table[3:])))
@@ -258,7 +254,7 @@ def test_a_file_stays_where_nothing_is_new_or_another_is_written(
     assert_index_fits(open_store(path))
 
 
-def test_layers_that_were_not_loaded_stay(path: Path, table: pd.DataFrame) -> None:
+def test_layers_that_were_not_loaded_are_kept(path: Path, table: pd.DataFrame) -> None:
     trees = table[table["source"] == "trees"][5:]
     report = update_file(path, objects_of(trees))
     values = json.loads(json.dumps(report.to_dict()))
@@ -273,7 +269,7 @@ def test_layers_that_were_not_loaded_stay(path: Path, table: pd.DataFrame) -> No
     assert sum(item.removed for item in report.classes) == 5
 
 
-def test_a_new_class_is_taken_up(path: Path, table: pd.DataFrame) -> None:
+def test_an_update_adds_a_new_class(path: Path, table: pd.DataFrame) -> None:
     drain = ObjectClass(250, "9", "drain", "Drain", 20.0)
     extended = CLASSES.extended([drain])
     more = pd.concat([table, table[:4].assign(class_code=250, source="drains")])
@@ -288,24 +284,24 @@ def test_a_new_class_is_taken_up(path: Path, table: pd.DataFrame) -> None:
     assert (report.classes[-1].before, report.classes[-1].added) == (0, 4)
 
 
-def test_what_does_not_fit_is_refused(path: Path, table: pd.DataFrame) -> None:
+def test_incompatible_updates_of_a_file_are_refused(path: Path, table: pd.DataFrame) -> None:
     before = {file: file.read_bytes() for file in (path, *store_path(path).iterdir())}
     far = CLASSES.extended([ObjectClass(250, "9", "tower", "Tower", 90.0)])
     with refused(InputError, "'tower'", "90 m", "45 m", "build the database again"):
         update_file(path, objects_of(table, far))
     with refused(InputError, "seen from 45 m"):
         update_file(path, objects_of(table, TAXONOMY))
-    moved = objects_of(table)
-    moved = dataclasses.replace(moved, table=moved.table.to_crs("EPSG:32631"))
+    other_crs = objects_of(table)
+    other_crs = dataclasses.replace(other_crs, table=other_crs.table.to_crs("EPSG:32631"))
     with refused(CrsError, "EPSG:32631", "EPSG:2154"):
-        update_file(path, moved)
+        update_file(path, other_crs)
     for file in (path.with_name("none.parquet"), path.parent):
         with pytest.raises(DatabaseError):
             update_file(file, objects_of(table))
     assert {file: file.read_bytes() for file in before} == before
 
 
-def test_a_city_must_not_come_to_nothing(town: World) -> None:
+def test_an_update_without_remaining_cells_is_refused(town: World) -> None:
     objects = town.street_objects
     area = ViewpointSpec(area=shapely.box(*CORNER, *(CORNER + 30)))
     away = dataclasses.replace(objects, table=objects.table[(objects.xy > CORNER + 90).all(axis=1)])
@@ -313,7 +309,7 @@ def test_a_city_must_not_come_to_nothing(town: World) -> None:
         update_database(build_database(objects, viewpoints=area), ObjectStore.of(objects), away)
 
 
-def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
+def test_a_store_without_buildings_or_streets_is_refused() -> None:
     objects = objects_of(random_table(np.random.default_rng(5), 60))
     spec = ViewpointSpec(mode="streets")
     database = build_database(objects, viewpoints=spec, footprints=HOUSES, streets=STREETS)
@@ -332,7 +328,7 @@ def test_a_store_without_what_the_database_was_built_with_is_told() -> None:
 @example(seed=1, side=130.0, edits=3, mode="streets")
 @example(seed=2, side=130.0, edits=0, mode="all")
 @settings(max_examples=3)
-def test_an_update_of_tiles_is_a_rebuild(
+def test_an_update_of_tiles_equals_a_rebuild(
     *, seed: int, side: float, edits: int, mode: ViewpointMode
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -349,7 +345,7 @@ def test_an_update_of_tiles_is_a_rebuild(
         save_objects(objects_of(edited(table, rng, edits)), new)
         before = open_database(city)
         report = update_tiles(city, new)
-        if report.kept:  # layers that lost their last object are not among the new ones
+        if report.kept:  # layers without objects are not in the new file
             save_objects(open_store(city).objects, new)
         build_tiles(new, rebuilt, **specs, **options)
         assert folder_bytes(city) == folder_bytes(rebuilt)
@@ -372,23 +368,23 @@ def tiled(table: pd.DataFrame, tmp_path: Path) -> Path:
     return tmp_path / "tiles"
 
 
-def test_only_the_cells_of_tiles_that_see_a_change_are_computed(
+def test_only_cells_of_tiles_in_range_of_a_change_are_recomputed(
     tiled: Path, table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     new, later = tmp_path / "new.parquet", tmp_path / "later.parquet"
-    moved = table.copy()
-    moved.loc[0, ["x", "y"]] = at(50.0, 50.0)
-    objects = objects_of(moved)
+    later_table = table.copy()
+    later_table.loc[0, ["x", "y"]] = at(50.0, 50.0)
+    objects = objects_of(later_table)
     objects = dataclasses.replace(objects, licenses=(Licence("B (ODbL)", ()),), notes=("new",))
-    save_objects(objects_of(moved), new)
+    save_objects(objects_of(later_table), new)
     save_objects(objects, later)
     computed: list[int] = []
 
-    def noted(objects: StreetObjects, columns: Any, *given: Any, **options: Any) -> Any:  # noqa: ANN401
+    def count(objects: StreetObjects, columns: Any, *args: Any, **options: Any) -> Any:  # noqa: ANN401
         computed.append(len(columns))
-        return build_cells(objects, columns, *given, **options)
+        return build_cells(objects, columns, *args, **options)
 
-    monkeypatch.setattr("semsig_gis.database.tiles.build_cells", noted)
+    monkeypatch.setattr("semsig_gis.database.tiles.build_cells", count)
     report = update_tiles(tiled, new)
     assert sum(computed) == report.recomputed > 0
     assert len(computed) < len(list(tiled.glob("tile_*")))
@@ -399,18 +395,18 @@ def test_only_the_cells_of_tiles_that_see_a_change_are_computed(
     assert folder_bytes(tiled) == folder_bytes(tmp_path / "rebuilt")
 
 
-def test_an_update_of_tiles_goes_on_where_it_was_interrupted(
+def test_an_interrupted_update_of_tiles_is_resumed(
     tiled: Path, table: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     new, before, tiles = tmp_path / "new.parquet", open_database(tiled), iter(range(4))
-    moved = table.copy()
-    moved[["x", "y"]] += 1.25
-    save_objects(objects_of(moved), new)
+    later_table = table.copy()
+    later_table[["x", "y"]] += 1.25
+    save_objects(objects_of(later_table), new)
 
-    def interrupted(*given: Any) -> Any:  # noqa: ANN401
+    def interrupted(*args: Any) -> Any:  # noqa: ANN401
         if next(tiles, None) is None:
             raise KeyboardInterrupt
-        return update_tile(*given)
+        return update_tile(*args)
 
     monkeypatch.setattr("semsig_gis.database.update.update_tile", interrupted)
     with pytest.raises(KeyboardInterrupt):
@@ -422,12 +418,14 @@ def test_an_update_of_tiles_goes_on_where_it_was_interrupted(
     assert folder_bytes(tiled) == folder_bytes(tmp_path / "rebuilt")
 
 
-def test_tiles_have_a_store(tiled: Path, table: pd.DataFrame, tmp_path: Path) -> None:
+def test_tiles_keep_their_inputs_as_a_store(
+    tiled: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
     houses = tmp_path / "houses.gpkg"
     HOUSES.to_file(houses)
     options: dict[str, Any] = {"viewpoints": ViewpointSpec(mode="streets"), "streets": STREETS}
     build_tiles(tmp_path / "old.parquet", tiled, buildings=houses, **options)
-    houses.unlink()  # none of the files is needed any more
+    houses.unlink()  # the database has copies
     (tmp_path / "old.parquet").unlink()
     store = open_store(tiled)
     assert sorted(store.objects.table["source_id"]) == sorted(table["source_id"])
@@ -444,7 +442,7 @@ def test_tiles_have_a_store(tiled: Path, table: pd.DataFrame, tmp_path: Path) ->
     assert folder_bytes(tiled) == content
 
 
-def test_what_does_not_fit_tiles_is_refused(
+def test_incompatible_updates_of_tiles_are_refused(
     tiled: Path, table: pd.DataFrame, tmp_path: Path
 ) -> None:
     far = tmp_path / "far.parquet"
@@ -476,14 +474,16 @@ def monaco(geodata: Path, year: int) -> Loaded:
 
 
 @pytest.mark.parametrize("mode", ["all", "outdoor", "streets"])
-def test_a_year_in_monaco(geodata: Path, tmp_path: Path, mode: ViewpointMode) -> None:
+def test_an_update_of_monaco_by_a_year_equals_a_rebuild(
+    geodata: Path, tmp_path: Path, mode: ViewpointMode
+) -> None:
     before, after = monaco(geodata, 2021), monaco(geodata, 2022)
-    given: dict[str, Any] = {"footprints": before.buildings, "streets": before.streets}
-    given = {} if mode == "all" else given
-    build = builder(viewpoints=ViewpointSpec(mode=mode), **given)
+    options: dict[str, Any] = {"footprints": before.buildings, "streets": before.streets}
+    options = {} if mode == "all" else options
+    build = builder(viewpoints=ViewpointSpec(mode=mode), **options)
     path = tmp_path / "monaco.parquet"
     first = build(before.objects)
-    save_with_store(first, ObjectStore.of(before.objects, **given), path)
+    save_with_store(first, ObjectStore.of(before.objects, **options), path)
     report = update_file(path, after.objects)
     assert_same(open_database(path), build(after.objects))
     check_report(report, first, open_database(path))

@@ -99,7 +99,9 @@ def test_maplibre_draws_them(file: Path, browser: Chrome) -> None:
             browser.execute_async_script("look(...arguments)", lon, lat, zoom)
             for zoom in (DETAIL + 2, DETAIL - 1.5)
         )
-        asked = [seen.headers.get("range") for seen in server.seen if seen.path == "/city.pmtiles"]
+        asked = [
+            seen.headers.get("range") for seen in server.requests if seen.path == "/city.pmtiles"
+        ]
         assert {*server.paths()} == {
             "/tiles_page.html", "/city.pmtiles", *(f"/{name}" for name in names)
         }  # fmt: skip

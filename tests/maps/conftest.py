@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def page(browser: Chrome, tmp_path: Path, carried: None) -> Iterator[MapPage]:  # noqa: ARG001
+def page(browser: Chrome, tmp_path: Path, map_files: None) -> Iterator[MapPage]:  # noqa: ARG001
     """Return a page to open a map in, which must report no error and request nothing."""
     yield MapPage(browser, tmp_path)
     assert_quiet(browser)

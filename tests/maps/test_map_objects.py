@@ -164,7 +164,7 @@ def test_search_works_by_keyboard(page: MapPage) -> None:
         assert status.text == "Nothing on this map has that name, number or place."
 
 
-@pytest.mark.usefixtures("carried")
+@pytest.mark.usefixtures("map_files")
 def test_colours_are_switched_and_stored(browser: Chrome, tmp_path: Path) -> None:
     page = MapPage(browser, tmp_path)
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}

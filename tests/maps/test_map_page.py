@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from selenium.webdriver import Chrome
 
-carried = pytest.mark.usefixtures("carried")
+carried = pytest.mark.usefixtures("map_files")
 
 
 def map_with_marker(*elements: folium.Element) -> folium.Map:

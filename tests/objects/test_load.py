@@ -276,11 +276,11 @@ def test_openstreetmap_is_fetched_clipped_and_cached(server: Server, tmp_path: P
     (layer,) = fetch_layers(here.layers, here, area=area, cache=cache, http=http)
     assert layer.table["source_id"].tolist() == ["node/1"]
     assert (layer.counts.read, layer.counts.outside) == (2, 1)
-    request_count = len(server.seen)
+    request_count = len(server.requests)
     _, offline = open_cache(tmp_path / "cache", offline=True)
     (again,) = fetch_layers(here.layers, here, area=area, cache=cache, http=offline)
     assert again.table["source_id"].tolist() == ["node/1"]
-    assert len(server.seen) == request_count
+    assert len(server.requests) == request_count
     far = find_area("1,2,3,4", here, cache=cache, http=offline)
     with refused(SourceError, "127.0.0.1"):
         fetch_layers(here.layers, here, area=far, cache=cache, http=offline)
@@ -293,4 +293,4 @@ def test_place_name_needs_a_geocoder_in_the_catalogue(server: Server, tmp_path: 
     area = find_area("1,2,3,4", catalog_of(), cache=cache, http=http)
     with refused(InputError, "'town'", "semsig load"):
         fetch_layers([BENCH], catalog_of(), area=area, cache=cache, http=http)
-    assert server.seen == []
+    assert server.requests == []

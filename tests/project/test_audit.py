@@ -15,7 +15,7 @@ from servers import Answer, Server
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from servers import Seen
+    from servers import Request
 
 AUDIT = Path(__file__).parents[2] / ".ci" / "audit"
 PROBE = ("jinja2", "2.11.2")
@@ -40,8 +40,8 @@ def audit(
     pins = folder / "constraints.txt"
     pins.write_text("jinja2==3.1.6\nnumpy==2.4.0\n")
 
-    def answer(seen: Seen) -> Answer:
-        asked = json.loads(seen.body)
+    def answer(request: Request) -> Answer:
+        asked = json.loads(request.body)
         name = asked["package"]["name"]
         package = {"name": name, "ecosystem": "PyPI"}
         ranges = [{"type": "ECOSYSTEM", "events": [{"introduced": "0"}, {"fixed": "999"}]}]

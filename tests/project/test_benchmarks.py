@@ -120,7 +120,7 @@ def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
         assert (one["paper"] is None) == (one["name"].split(",")[0] not in FUSIONS | SINGLES.keys())
 
 
-@pytest.mark.usefixtures("browser", "carried")
+@pytest.mark.usefixtures("browser", "map_files")
 def test_pictures_of_pages_are_taken(tmp_path: Path) -> None:
     subprocess.run(
         f"{sys.executable} -m benchmarks.pictures --size small --map drift workbench "

@@ -32,7 +32,7 @@ from semsig_gis.cli.commands import app
 from semsig_gis.cli.console import VARIABLE
 from semsig_gis.core import DEFAULT_METHOD
 from semsig_gis.evaluation import parse_chain
-from semsig_gis.localization import NOISES, Method
+from semsig_gis.localization import METRIC_NAMES, NOISES, Method
 from semsig_gis.sources import catalog_names, load_catalog
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
@@ -260,6 +260,9 @@ def test_methods_and_other_names_are_those_of_the_command() -> None:
     assert arguments.METHODS[0] == DEFAULT_METHOD  # what a dialog begins with
     for method in arguments.METHODS:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))
+    fusions = {method for method in arguments.METHODS if "+" in method and ":" not in method}
+    assert fusions == {f"{name}+{name}" for name in METRIC_NAMES}
+    assert all(fusion in arguments.METHOD_HELP for fusion in fusions)
     for name in arguments.DISTORTIONS:
         assert parse_chain(name)
     require_likelihood("likelihood", "Place")

@@ -215,7 +215,7 @@ def test_where_queries_failed(ax: Axes) -> None:
         FOUND.plot("error")  # type: ignore[arg-type]
 
 
-@pytest.mark.usefixtures("carried")
+@pytest.mark.usefixtures("map_files")
 def test_results_are_shown_on_maps() -> None:
     location, localization = (
         locate(INDEX, CITY.signature(3)),

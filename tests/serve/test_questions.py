@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from workbench import Page
 
-    Done = Callable[..., str]
+    RunOk = Callable[..., str]
 
 WIDTH, HEIGHT, FOV = 4000, 3000, 100.0
 SIDE: dict[str, Any] = {
@@ -227,14 +227,14 @@ def questions(bench: Workbench) -> dict[str, dict[str, Any]]:
     "way", ["photo", "heading unknown", "rough", "near", "two photos", "compass", "route"]
 )
 def test_command_line_returns_the_same_answer(
-    page: Page, way: str, done: Done, monkeypatch: pytest.MonkeyPatch
+    page: Page, way: str, run_ok: RunOk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answer = page.ask("/api/answer", questions(page.bench)[way])
     before, _, command = answer["command"].rpartition(" | ")
     lines = shlex.split(before)[2:]  # printf, and how each is printed
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
     _, *words = shlex.split(command)
-    out = done("", *words, *([] if lines else ["--json"]))
+    out = run_ok("", *words, *([] if lines else ["--json"]))
     result = json.loads(out.splitlines()[-1] if lines else out)
     listed = [(row["cell_id"], row["chance"]) for row in result["candidates"]]
     shown = [(row["cell"], row["chance"]) for row in answer["candidates"]]

@@ -57,7 +57,7 @@ def test_request_of_the_own_page_is_answered(page: Page) -> None:
         assert page.ask("/api/city", **own)["name"] == "town"
 
 
-def test_page_allows_only_its_own_scripts(page: Page, carried: None) -> None:  # noqa: ARG001
+def test_page_allows_only_its_own_scripts(page: Page, map_files: None) -> None:  # noqa: ARG001
     nonces = set()
     for _ in range(2):
         code, headers, content = page.send(f"/?token={page.token}", X_Semsig_Token="")

@@ -38,7 +38,7 @@ def workbench(
     browser: Chrome,
     page: Page,
     tmp_path: Path,
-    carried: None,  # noqa: ARG001
+    map_files: None,  # noqa: ARG001
 ) -> Iterator[WorkbenchPage]:
     """Return the open page, which must report no error and request no other server."""
     workbench = WorkbenchPage(browser, tmp_path, page.url)

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from servers import Script, Seen, Server
+    from servers import Request, Script, Server
 
     from semsig_gis.sources import Fetched
 
@@ -96,7 +96,7 @@ def test_file_is_fetched_with_its_description(server: Server, get: Get) -> None:
     assert datetime.fromisoformat(fetched.fetched_at).tzinfo is not None
     assert steps[-1] == (len(CONTENT), len(CONTENT))
     assert steps == sorted(steps)
-    (request,) = server.seen
+    (request,) = server.requests
     assert request.query == {"limit": "-1", "where": "a=1"}
     assert request.headers["user-agent"].startswith(f"semsig_gis/{__version__} (")
     assert get(suffix=".txt").path.suffix == ".txt"
@@ -111,14 +111,14 @@ def test_netrc_is_ignored(
     monkeypatch.setenv("NETRC", str(netrc))
     server.on("/trees", Answer(CONTENT))
     get()
-    assert "authorization" not in server.seen[0].headers
+    assert "authorization" not in server.requests[0].headers
 
 
 def test_form_is_posted(server: Server, get: Get) -> None:
     server.on("/trees", lambda request: Answer(json.dumps(request.form).encode()))
     for form in ({"data": "node;out é;"}, {"data": "way;out;"}):
         assert json.loads(get(data=form).path.read_bytes()) == form
-    assert server.seen[0].method == "POST"
+    assert server.requests[0].method == "POST"
 
 
 def test_redirect_within_the_host_is_followed(server: Server, get: Get) -> None:
@@ -160,10 +160,10 @@ def test_retry_after_header_sets_the_pause(server: Server, get: Get, slept: list
 PACKED = gzip.compress(CONTENT)
 
 
-def packed_and_cut() -> Callable[[Seen], Answer]:
+def packed_and_cut() -> Callable[[Request], Answer]:
     plain = published(PACKED, etag='"7"', cuts=[500])
 
-    def script(request: Seen) -> Answer:
+    def script(request: Request) -> Answer:
         answer = plain(request)
         if answer.status == 206:  # which may omit the headers of the first answer
             return answer
@@ -175,7 +175,7 @@ def packed_and_cut() -> Callable[[Seen], Answer]:
 def recoveries() -> dict[str, tuple[list[str | None], list[Script]]]:
     """Return the ranges of the requests after the first, and answers that give the whole file."""
 
-    def cut(**what: Any) -> Callable[[Seen], Answer]:  # noqa: ANN401 - as of `published`
+    def cut(**what: Any) -> Callable[[Request], Answer]:  # noqa: ANN401 - as of `published`
         return published(CONTENT, cuts=[1_000], **what)
 
     def gzipped(body: bytes) -> Answer:
@@ -214,11 +214,12 @@ def test_compressed_or_interrupted_answer_becomes_the_complete_file(
     ranges, script = recoveries()[case]
     server.on("/trees", *script)
     assert get().path.read_bytes() == CONTENT
-    assert [request.headers.get("range") for request in server.seen] == [None, *ranges]
+    assert [request.headers.get("range") for request in server.requests] == [None, *ranges]
     assert all(
-        ("range" in request.headers) == ("if-range" in request.headers) for request in server.seen
+        ("range" in request.headers) == ("if-range" in request.headers)
+        for request in server.requests
     )
-    assert server.seen[0].headers["accept-encoding"] == "gzip"
+    assert server.requests[0].headers["accept-encoding"] == "gzip"
 
 
 def test_interrupted_download_resumes_in_a_later_run(server: Server, get: Get) -> None:
@@ -226,7 +227,7 @@ def test_interrupted_download_resumes_in_a_later_run(server: Server, get: Get) -
     failure_of(get, "cut the connection", attempts=1)
     sizes: list[int] = []
     assert get(progress=lambda size, _: sizes.append(size)).path.read_bytes() == CONTENT
-    assert server.seen[1].headers["range"] == "bytes=1000-"
+    assert server.requests[1].headers["range"] == "bytes=1000-"
     assert sizes[0] > 1_000
 
 
@@ -234,7 +235,7 @@ def test_changed_file_is_not_resumed(server: Server, get: Get) -> None:
     newer = b'{"trees": []}'
     server.on("/trees", published(CONTENT, etag='"7"', cuts=[1_000]), published(newer, etag='"8"'))
     assert get().path.read_bytes() == newer
-    assert server.seen[1].headers["if-range"] == '"7"'
+    assert server.requests[1].headers["if-range"] == '"7"'
 
 
 BOMB = zipped(b"\0" * 50_000_000)
@@ -268,7 +269,7 @@ def test_unusable_answer_is_an_error(
     answer, what, words, times = REFUSALS[case]
     server.on("/trees", answer)
     error = failure_of(get, words.replace("HOST", f"127.0.0.1:{server.port}"), **what)
-    assert len(server.seen) == times
+    assert len(server.requests) == times
     assert slept == [1.0, 2.0] * (case == "busy")
     assert isinstance(error, TooLargeError) == ("max_bytes" in what)
     if answer.status >= 400:
@@ -283,7 +284,7 @@ def test_redirect_to_another_host_or_nowhere_is_refused(
 ) -> None:
     server.on("/trees", answers(b"", 301, Location=target.format(port=server.port)))
     failure_of(get, f"127.0.0.1:{server.port} redirects to localhost:{server.port}, which neither")
-    assert len(server.seen) == 1
+    assert len(server.requests) == 1
     server.on("/trees", answers(b"", 308, Location=""))
     failure_of(get, "127.0.0.1")
 
@@ -329,7 +330,7 @@ def test_slow_answer_is_retried_once_and_reported(
     server.on("/trees", answer)
     lines: list[str] = []
     failure_of(get, words, "2 times", timeout=(PATIENCE_S, 0.5), attempts=5, report=lines.append)
-    assert len(server.seen) == 2
+    assert len(server.requests) == 2
     (line,) = lines
     assert words in line
     assert line.endswith("attempt 2 of 2 in 1 s")
@@ -347,7 +348,7 @@ def test_request_ends_at_its_deadline(server: Server, get: Get, *, slow_head: bo
 def test_no_pause_goes_beyond_the_deadline(server: Server, get: Get) -> None:
     server.on("/trees", Answer(status=503, headers={"Retry-After": "60"}))
     failure_of(get, "answered 503", "30 s are over; try again later", deadline_s=30.0)
-    assert len(server.seen) == 1
+    assert len(server.requests) == 1
 
 
 def test_decompression_bomb_is_refused(server: Server, cache: Cache, get: Get) -> None:
@@ -418,7 +419,7 @@ def test_second_run_requests_only_a_changed_file(
     first = get()
     second = get()
     assert second == dataclasses.replace(first, from_cache=True)
-    assert server.seen[1].headers[header] in validators.values()
+    assert server.requests[1].headers[header] in validators.values()
     newer = b'{"trees": [1]}'
     server.on("/trees", published(newer, etag='"8"'))
     third = get()
@@ -431,9 +432,9 @@ def test_file_without_validators_is_used_while_fresh(server: Server, get: Get) -
     server.on("/trees", Answer(CONTENT))
     get()
     assert get().from_cache
-    assert len(server.seen) == 1
+    assert len(server.requests) == 1
     assert not get(fresh_s=0.0).from_cache
-    assert len(server.seen) == 2
+    assert len(server.requests) == 2
 
 
 def test_superseded_file_is_deleted_later(
@@ -456,7 +457,7 @@ def test_offline_uses_the_cache_only(server: Server, get: Get) -> None:
         get, "is not in the cache", "without --offline", params={"a": 2}, offline=True
     )
     assert isinstance(error, NotCachedError)
-    assert len(server.seen) == 1
+    assert len(server.requests) == 1
 
 
 def test_mirrors_share_cached_files(server: Server, cache: Cache, quick: HttpSpec) -> None:
@@ -464,7 +465,7 @@ def test_mirrors_share_cached_files(server: Server, cache: Cache, quick: HttpSpe
     for host in (server.url, server.other_host):
         fetched = fetch(f"{host}/trees", cache=cache, spec=quick, identity="trees")
         assert fetched.url == f"{server.url}/trees"
-    assert len(server.seen) == 1
+    assert len(server.requests) == 1
 
 
 def test_failing_server_leaves_the_cached_file(server: Server, get: Get) -> None:
@@ -489,7 +490,7 @@ def test_damaged_cached_file_is_fetched_again(
         sidecar.write_text('{"file": "')
     failure_of(get, "is damaged in the cache", offline=True)
     assert get().path.read_bytes() == CONTENT
-    assert "if-none-match" not in server.seen[1].headers
+    assert "if-none-match" not in server.requests[1].headers
     assert get(offline=True).path.read_bytes() == CONTENT
 
 
@@ -501,7 +502,7 @@ def test_unchanged_file_drops_the_part(server: Server, get: Get) -> None:
     failure_of(get, "cut", attempts=1)
     assert get().from_cache
     get()
-    assert "range" not in server.seen[3].headers
+    assert "range" not in server.requests[3].headers
 
 
 def fetch_and_check(url: str, folder: Path, times: int) -> None:
@@ -513,8 +514,8 @@ def fetch_and_check(url: str, folder: Path, times: int) -> None:
 
 
 def test_two_processes_share_a_cache(server: Server, tmp_path: Path) -> None:
-    def edition(_: Seen) -> Answer:
-        letter = b"%d" % (len(server.seen) % 10)
+    def edition(_: Request) -> Answer:
+        letter = b"%d" % (len(server.requests) % 10)
         return Answer(letter * 300_000, type="text/plain", drip=(100_000, 0.001))
 
     server.on("/trees", edition)
@@ -526,6 +527,6 @@ def test_two_processes_share_a_cache(server: Server, tmp_path: Path) -> None:
     for worker in workers:
         worker.join(60)
     assert [worker.exitcode for worker in workers] == [0, 0]
-    assert len(server.seen) == 20
+    assert len(server.requests) == 20
     assert not list((tmp_path / "cache").glob("*.part"))
     assert not list((tmp_path / "cache").glob("*.tmp*"))

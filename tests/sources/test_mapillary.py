@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from servers import Seen, Server
+    from servers import Request, Server
 
     from semsig_gis.sources import Cache
 
@@ -77,7 +77,7 @@ class Service:
     def __init__(self, features: Sequence[dict[str, Any]]) -> None:
         self.features = features
 
-    def __call__(self, request: Seen) -> Answer:
+    def __call__(self, request: Request) -> Answer:
         if request.headers.get("authorization") != f"OAuth {TOKEN}":
             error = {"error": {"message": f"Invalid token {request.headers.get('authorization')}"}}
             return Answer(json.dumps(error).encode(), status=401)
@@ -122,15 +122,15 @@ def test_full_box_is_requested_in_quarters_without_storing_the_token(
     steps: list[tuple[int, int]] = []
     files = fetch_layers(benches, spec=spec, progress=lambda *s: steps.append(s), **options)
     assert len(read_layers(files, benches)[0].table) == len(crowd) > MOST_FEATURES
-    assert len(server.seen) == 1 + 4
+    assert len(server.requests) == 1 + 4
     assert steps[-1] == (4, 4)
-    query = server.seen[0].query
+    query = server.requests[0].query
     assert query["object_values"].split(",")[:2] == ["complementary--*", "information--*"]
     assert "access_token" not in query
     # A second run uses the cache, also offline and without a token.
-    server.seen.clear()
+    server.requests.clear()
     assert fetch_layers(benches, spec=spec, **options) == files
-    assert not server.seen
+    assert not server.requests
     assert fetch_layers(benches, spec=HttpSpec(offline=True), **options) == files
     # No file name, content, address or line contains the token in any spelling.
     everything = "\n".join([*texts(cache.folder), *lines, repr(spec)])
@@ -153,7 +153,7 @@ def test_interrupted_download_stores_no_token(server: Server, cache: Cache) -> N
               Answer(body))  # fmt: skip
     spec = HttpSpec(sleep=lambda _: None, token=AccessToken(TOKEN))
     fetch_layers(CATALOG.layers, endpoints=[server.url], area=AREA, cache=cache, spec=spec)
-    assert "range" not in server.seen[1].headers
+    assert "range" not in server.requests[1].headers
     assert not any("0123456789" in text for text in texts(cache.folder))
 
 

@@ -32,7 +32,7 @@ from semsig_gis.sources.services.opendatasoft import _outline
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from servers import Seen, Server
+    from servers import Request, Server
 
     from semsig_gis.sources import Cache, Fetched, HttpSpec, RawLayer
 
@@ -416,7 +416,7 @@ def holds(condition: str, row: dict[str, Any]) -> bool:
     return bool(row[equals[1]] == equals[2])
 
 
-def exported(request: Seen) -> Answer:
+def exported(request: Request) -> Answer:
     """Answer to an export as the Explore API v2.1 does."""
     assert request.query["limit"] == "-1"
     conditions = re.findall(r"\((.+?)\)(?: and (?=\()|$)", request.query.get("where", ""))
@@ -461,14 +461,14 @@ def test_export_is_fetched_and_read(server: Server, fetched: Fetch, quick: HttpS
     assert steps[-1][0] == file.path.stat().st_size
     assert server.paths() == [DESCRIPTION, EXPORT]
     assert fetched(spec=replace(quick, offline=True)) == replace(file, from_cache=True)
-    assert len(server.seen) == 2
+    assert len(server.requests) == 2
     assert len(read(fetched(area=box(5.0, 48.0, 5.1, 48.1)).path).table) == 0  # not an error
 
 
 def test_export_is_limited_by_filter_area_and_fields(server: Server, fetched: Fetch) -> None:
     spec = replace(ALIGNED, server_where="domanialite = 'Alignement'", select=("IDBASE",))
     file = fetched(spec, endpoints=[f"{server.url}/"], area=box(2.0, 48.0, 2.36, 48.9))
-    query = server.seen[-1].query
+    query = server.requests[-1].query
     assert query["where"] == (
         "(domanialite = 'Alignement') and "
         "(in_bbox(geo_point_2d, 48.0000000, 2.0000000, 48.9000000, 2.3600000))"
@@ -482,7 +482,9 @@ def test_export_is_limited_by_filter_area_and_fields(server: Server, fetched: Fe
 def test_area_may_be_a_polygon(server: Server, fetched: Fetch) -> None:
     area = Area(shapely.Polygon([(2.355, 48.855), (2.4, 48.855), (2.38, 48.9)]), "a corner")
     file = fetched(area=area)
-    assert server.seen[-1].query["where"].startswith("(intersects(geo_point_2d, geom'POLYGON ((")
+    assert (
+        server.requests[-1].query["where"].startswith("(intersects(geo_point_2d, geom'POLYGON ((")
+    )
     assert ids(read(file.path)) == ["12", "13"]
 
 
@@ -550,7 +552,7 @@ def test_area_uses_the_name_of_the_point_field(server: Server, fetched: Fetch) -
     server.on(f"{DATASETS}/velib/exports/geojson", Answer(content))
     aliases = (("geo_point_2d", ("coordonnees_geo",)),)
     fetched(replace(PLAIN, dataset="velib", aliases=aliases), area=box(2.0, 48.0, 3.0, 49.0))
-    assert "in_bbox(coordonnees_geo, " in server.seen[-1].query["where"]
+    assert "in_bbox(coordonnees_geo, " in server.requests[-1].query["where"]
 
 
 def test_dataset_name_is_quoted_in_the_path(server: Server, cache: Cache, fetched: Fetch) -> None:

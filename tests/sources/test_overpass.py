@@ -41,7 +41,7 @@ from semsig_gis.sources.osm.overpass import fetch_layers, read_layers
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from servers import Seen, Server
+    from servers import Request, Server
 
     from semsig_gis.sources import Cache
 
@@ -84,7 +84,7 @@ BENCHES = [
 ]
 
 
-def box_of(request: Seen) -> tuple[float, float, float, float]:
+def box_of(request: Request) -> tuple[float, float, float, float]:
     """Return west, south, east and north of a query."""
     match = re.search(r"\[bbox:(.*?)\]", request.form["data"])
     assert match is not None
@@ -92,17 +92,17 @@ def box_of(request: Seen) -> tuple[float, float, float, float]:
     return west, south, east, north
 
 
-def in_box(request: Seen) -> Answer:
+def in_box(request: Request) -> Answer:
     """Answer with the benches in the box of the query."""
     west, south, east, north = box_of(request)
     inside = [b for b in BENCHES if west <= b["lon"] <= east and south <= b["lat"] <= north]
     return Answer(sent(inside))
 
 
-def wider_than(limit: float, answer: Answer) -> Callable[[Seen], Answer]:
+def wider_than(limit: float, answer: Answer) -> Callable[[Request], Answer]:
     """Return a script that answers a wider tile with `answer`."""
 
-    def script(request: Seen) -> Answer:
+    def script(request: Request) -> Answer:
         west, _, east, _ = box_of(request)
         return answer if east - west > limit + 1e-6 else in_box(request)
 
@@ -177,7 +177,7 @@ def test_area_is_fetched_in_tiles(server: Server, get: Get, slept: list[float]) 
     assert ids(paths) == ALL  # those on the border of the tiles are in both, and count once
     assert steps == [(1, 2), (2, 2)]
     assert server.paths() == ["/api/status", "/api/interpreter"] * 2
-    assert all("semsig_gis/" in request.headers["user-agent"] for request in server.seen)
+    assert all("semsig_gis/" in request.headers["user-agent"] for request in server.requests)
     assert slept == []
 
 
@@ -190,7 +190,7 @@ def test_tiles_outside_the_polygon_are_not_requested(server: Server, get: Get) -
 def test_area_across_180_degrees_is_requested_on_both_sides(server: Server, get: Get) -> None:
     get(area=parse_area("179.95,-17,-179.9,-16.9"))
     boxes = sorted(
-        box_of(request) for request in server.seen if request.path.endswith("/interpreter")
+        box_of(request) for request in server.requests if request.path.endswith("/interpreter")
     )
     assert boxes == [(-180, -17, -179.9, -16.9), (179.95, -17, 180, -16.9)]
 
@@ -198,7 +198,7 @@ def test_area_across_180_degrees_is_requested_on_both_sides(server: Server, get:
 def test_second_run_needs_no_server(server: Server, get: Get) -> None:
     first = get()
     assert get() == get(offline=True) == first
-    assert (query_count(server), len(server.seen)) == (2, 4)
+    assert (query_count(server), len(server.requests)) == (2, 4)
     with refused(NotCachedError, "is not in the cache"):
         get(offline=True, area=parse_area("1,1,2,2"))
 
@@ -466,13 +466,13 @@ def test_place_has_its_outline(server: Server, cache: Cache) -> None:
     where: dict[str, Any] = {"endpoint": f"{server.url}/", "cache": cache}
     area = find_place(" Neukölln  Berlin", **where)
     assert (area.name, area.bounds) == ("Neukölln, Berlin", (13.4, 52.4, 13.5, 52.5))
-    (request,) = server.seen
+    (request,) = server.requests
     query = {"q": "Neukölln Berlin", "polygon_geojson": "1", "format": "jsonv2"}
     assert query.items() <= request.query.items()
     assert request.headers["user-agent"].startswith("semsig_gis/")
     again = find_place("Neukölln Berlin", **where, spec=HttpSpec(offline=True))
     assert math.isclose(again.polygon.area, area.polygon.area)
-    assert len(server.seen) == 1
+    assert len(server.requests) == 1
 
 
 @pytest.mark.parametrize(

@@ -173,13 +173,13 @@ def test_store_sends_only_the_area_and_only_once(
     assert steps == [(n, 4) for n in (1, 2, 3, 4)]
     assert lines == ["s3://maps: release 2026-08-19.0, 4 files"]
     size = land.stat().st_size
-    ranges = [s.headers.get("range", "") for s in server.seen if "type%3Dland" in s.path]
+    ranges = [s.headers.get("range", "") for s in server.requests if "type%3Dland" in s.path]
     spans = [text.removeprefix("bytes=").split("-") for text in ranges if text]
     sent = sum(min(int(last) + 1, size) - int(first) for first, last in spans)
     assert 0 < sent < size / 3
-    server.seen.clear()
+    server.requests.clear()
     assert fetch_layers(SPECS, spec=spec, **options) == files
-    assert all(request.path == "/maps" for request in server.seen)  # a release does not change
+    assert all(request.path == "/maps" for request in server.requests)  # a release does not change
     offline = HttpSpec(offline=True)
     assert fetch_layers(SPECS, spec=offline, **options) == files
     with refused(NotCachedError, address, "without --offline"):

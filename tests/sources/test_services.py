@@ -80,11 +80,11 @@ def test_pages_become_one_layer_and_are_cached(
     layer = download.read()
     assert (ids(layer), xy(layer)) == (["11", "12", "13", "14", "15"], PLACES)
     assert (layer.table.crs, layer.errors, layer.notes) == ("EPSG:4326", (), ())
-    assert len(download.files) == len(service.pages_asked()) == 3
+    assert len(download.files) == len(service.page_requests()) == 3
     assert steps == [(2, 5), (4, 5), (5, 5)]
-    requests = len(service.server.seen)
+    requests = len(service.server.requests)
     again = fetched(service, spec=replace(quick, offline=True))
-    assert len(service.server.seen) == requests
+    assert len(service.server.requests) == requests
     assert ids(again.read()) == ids(layer)
 
 
@@ -103,7 +103,7 @@ def test_area_across_180_degrees_is_two_boxes(server: Server, fetched: Fetch) ->
     service = ArcGIS(server)
     service.rows = [{**ROWS[0], "xy": (179.95, 1.0)}, {**ROWS[1], "xy": (-179.95, 1.0)}]
     layer = fetched(service, area=parse_area("179.9,0,-179.9,2")).read()
-    assert (ids(layer), len(service.pages_asked())) == (["11", "12"], 2)
+    assert (ids(layer), len(service.page_requests())) == (["11", "12"], 2)
 
 
 def test_interrupted_run_continues_at_the_next_page(service: StandIn, fetched: Fetch) -> None:
@@ -111,9 +111,9 @@ def test_interrupted_run_continues_at_the_next_page(service: StandIn, fetched: F
     with refused(HttpError, "layer 'lamps'", "503", "try again later"):
         fetched(service)
     service.whole = None
-    before = len(service.pages_asked())
+    before = len(service.page_requests())
     assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
-    assert len(service.pages_asked()) == before + 1
+    assert len(service.page_requests()) == before + 1
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_arcgis_may_be_busy_and_send_an_empty_page_before_the_last(
     rest = sent({"type": "FeatureCollection", "features": features(ROWS)})
     server.on(path, sent({"count": 5}), busy, empty, rest)
     assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
-    assert (len(slept), service.pages_asked()[-1].query["resultOffset"]) == (1, "2")
+    assert (len(slept), service.page_requests()[-1].query["resultOffset"]) == (1, "2")
 
 
 # --- WFS --------------------------------------------------------------------------------------

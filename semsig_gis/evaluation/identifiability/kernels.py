@@ -32,16 +32,26 @@ def _byte(inside: int) -> int:
     return 2 * (inside % half) + inside // half
 
 
+class DetectedObjects(NamedTuple):
+    """Objects seen from n cells: first object (n + 1,), and what a detector makes of each (m,).
+
+    `rows` are class rows, `spread_of` rows of the noise of a bearing, `odds` those of detection,
+    and `leaving` the density of other objects that are detected instead.
+    """
+
+    offsets: NDArray[np.int64]
+    rows: NDArray[np.uint8]
+    bearing_units: NDArray[np.uint16]
+    spread_of: NDArray[np.uint8]
+    odds: NDArray[np.float32]
+    leaving: NDArray[np.float32]
+
+
 @compiled
 def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     lines: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    rows: NDArray[np.uint8],
-    bearing_units: NDArray[np.uint16],
-    spread_of: NDArray[np.uint8],
+    objects: DetectedObjects,
     spread: NDArray[np.float32],
-    odds: NDArray[np.float32],
-    leaving: NDArray[np.float32],
     naming: NDArray[np.float32],
     logs: NDArray[np.uint8],
     columns: NDArray[np.uint8],
@@ -49,13 +59,13 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     """Write the columns of some cells: the log-likelihood that each symbol adds, in whole steps.
 
     Fills the cells of the lines from ``lines[0]`` to ``lines[1] - 1``, `LINE_CELLS` cells each, in
-    `columns`, shape (blocks, k, bins, BLOCK_CELLS). For each object in a cell: `rows` is its class
-    row, `spread_of` its row in `spread`, shape (levels, units, bins), which is the density per
-    degree in each bin for an object at a unit of bin 0; `odds` are its odds of detection, and
-    `leaving` is the density of other objects detected instead. `naming`, by length, class and name,
-    is the probability of the name divided by the density of false objects of that name. `logs` is a
-    table of logarithms in steps, by the leading bits of a float32 of 1 or more.
+    `columns`, shape (blocks, k, bins, BLOCK_CELLS). `spread`, shape (levels, units, bins), is the
+    density per degree in each bin for an object at a unit of bin 0. `naming`, by length, class and
+    name, is the probability of the name divided by the density of false objects of that name.
+    `logs` is a table of logarithms in steps, by the leading bits of a float32 of 1 or more.
     """
+    offsets, rows, bearing_units = objects.offsets, objects.rows, objects.bearing_units
+    spread_of, odds, leaving = objects.spread_of, objects.odds, objects.leaving
     cells = len(offsets) - 1
     kinds, longest = naming.shape[1], len(naming) - 1
     symbols, bins = columns.shape[1], columns.shape[2]
@@ -232,6 +242,32 @@ def _sum_at(values: NDArray[np.uint8], symbols: NDArray[np.int64], cell: int) ->
     return total
 
 
+class CellColumns(NamedTuple):
+    """What each symbol adds to the score of each of n cells, as in `SymbolColumns`.
+
+    `values` (blocks, symbols, BLOCK_CELLS) are in steps of `step`, `constants` (d, n) by direction;
+    `powers` (2 l + 1,) are the tempered likelihood ratios of -l to l steps.
+    """
+
+    values: NDArray[np.uint8]
+    constants: NDArray[np.float32]
+    step: float
+    powers: NDArray[np.float32]
+
+
+class Comparisons(NamedTuple):
+    """Results of q looks, as in `Lookalikes`: `like` and `share` (q, p) are its cells and sums.
+
+    `rest` (q, k) is the value of `far` without each class.
+    """
+
+    near: NDArray[np.float64]
+    far: NDArray[np.float64]
+    like: NDArray[np.int64]
+    share: NDArray[np.float64]
+    rest: NDArray[np.float64]
+
+
 class CellPlaces(NamedTuple):
     """Places of n cells: rising ids, columns and rows (n, 2), and the circle around each.
 
@@ -321,31 +357,25 @@ def compare_cells(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no 
     looks: NDArray[np.int64],
     entries: Entries,
     inside: NDArray[np.bool_],
-    values: NDArray[np.uint8],
-    constants: NDArray[np.float32],
-    step: float,
+    columns: CellColumns,
     bases: BaseScores,
-    powers: NDArray[np.float32],
     sample: CellSample,
     places: CellPlaces,
     buffer: NDArray[np.unsignedinteger],
-    near: NDArray[np.float64],
-    far: NDArray[np.float64],
-    like: NDArray[np.int64],
-    share: NDArray[np.float64],
-    rest: NDArray[np.float64],
+    results: Comparisons,
 ) -> None:
     """Compare looks from cells with all cells, by the likelihood of each look there.
 
     `looks` (q,) are ``row * d + direction``, and `inside` (d, units) is whether each of d
-    directions includes each bearing. `values` (blocks, symbols, BLOCK_CELLS), `constants` (d, n)
-    and `step` are those of `SymbolColumns`; `powers` (2 l + 1,) are the ratios of -l to l steps.
-    `buffer` (2, s), at least a block wide, is working memory. Fills `near`, `far` (q,), `like` and
-    `share` (q, p), unsorted, and `rest` (q, k), the value of `far` without each class.
+    directions includes each bearing. `buffer` (2, s), at least a block wide, is working memory.
+    Fills `results`, with `like` and `share` unsorted.
     """
+    values, constants, powers = columns.values, columns.constants, columns.powers
+    near, far, like = results.near, results.far, results.like
+    share, rest = results.share, results.rest
     directions = len(constants)
     count, classes, size = len(looks), rest.shape[1], len(sample.cells)
-    top, scale = np.int32(len(powers) // 2), np.float32(step)
+    top, scale = np.int32(len(powers) // 2), np.float32(columns.step)
     # Collect the objects of all looks: those of look i are in starts[i] to starts[i + 1].
     starts = np.zeros(count + 1, np.int64)
     for look in range(count):

@@ -18,8 +18,10 @@ from semsig_gis.core import MOST_METRES, InputError, cell_ids, require_number
 from semsig_gis.evaluation.identifiability.kernels import (
     BLOCK_CELLS,
     BaseScores,
+    CellColumns,
     CellPlaces,
     CellSample,
+    Comparisons,
     Entries,
     compare_cells,
 )
@@ -105,7 +107,12 @@ def find_lookalikes(
     rows = np.asarray(looks, dtype=np.int64)
     viewpoints = rows // directions
     radius = min(radius, city_extent(database))
-    powers = _powers(columns, temperature)
+    cell_columns = CellColumns(
+        values=columns.values,
+        constants=columns.constants,
+        step=columns.step,
+        powers=_powers(columns, temperature),
+    )
     # Sums of 16 bits are twice as fast, but overflow for cells with very many objects.
     wide = database.lengths * 255 + BASE_LEVELS >= 2**16
     wide |= (columns.constants < columns.constants.max() - BASE_LEVELS * columns.step).any(axis=0)
@@ -139,19 +146,18 @@ def find_lookalikes(
             rows[part],
             entries,
             columns.inside,
-            columns.values,
-            columns.constants,
-            columns.step,
+            cell_columns,
             bases[is_wide],
-            powers,
             sample,
             places_of_cells,
             np.empty((2, max(BLOCK_CELLS, len(sample.cells))), np.uint32 if is_wide else np.uint16),
-            lookalikes.near[part],
-            lookalikes.far[part],
-            lookalikes.cells[part],
-            lookalikes.sums[part],
-            lookalikes.rise[part],
+            Comparisons(
+                near=lookalikes.near[part],
+                far=lookalikes.far[part],
+                like=lookalikes.cells[part],
+                share=lookalikes.sums[part],
+                rest=lookalikes.rise[part],
+            ),
         )
 
     _run_in_parts(compare, len(rows), threads, progress)

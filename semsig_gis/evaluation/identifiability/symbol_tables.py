@@ -22,6 +22,7 @@ from semsig_gis.evaluation.identifiability.kernels import (
     BLOCK_CELLS,
     LINE_CELLS,
     MANTISSA_BITS,
+    DetectedObjects,
     fill_columns,
     score_cells,
 )
@@ -191,24 +192,23 @@ def _write_columns(  # noqa: PLR0917 - a private helper of one caller
     # 255 steps are enough for four objects in one direction.
     peak = float(spread.max() * (table.odds[:, :, None] * table.naming).max())
     step = math.log1p(4.0 * peak) / 255.0
-    arguments = (
-        database.offsets,
-        table.row_of.astype(np.uint8)[database.codes],
-        database.bearing_units,
-        spread_of,
-        spread,
-        odds.astype(np.float32),
-        leaving.astype(np.float32),
-        table.naming.astype(np.float32),
-        _logs(step),
-        columns,
+    objects = DetectedObjects(
+        offsets=database.offsets,
+        rows=table.row_of.astype(np.uint8)[database.codes],
+        bearing_units=database.bearing_units,
+        spread_of=spread_of,
+        odds=odds.astype(np.float32),
+        leaving=leaving.astype(np.float32),
     )
+    naming, logs = table.naming.astype(np.float32), _logs(step)
     lines = -(-len(database) // LINE_CELLS)
     parts = [
         np.array([low, min(low + LINES_A_TASK, lines)]) for low in range(0, lines, LINES_A_TASK)
     ]
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda part: fill_columns(part, *arguments), parts))
+        list(
+            pool.map(lambda part: fill_columns(part, objects, spread, naming, logs, columns), parts)
+        )
     return step
 
 

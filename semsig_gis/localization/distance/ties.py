@@ -89,7 +89,12 @@ def expected_best(
         within = (limits >= expected).astype(np.float64)
     elif slots == 1:
         expected = float(np.minimum(errors, nearest).mean())
-        within = _count_within(errors, limits) / errors.size
+        # Count the errors up to each limit in bins: there are many errors and few limits.
+        order = np.argsort(limits)
+        bins = np.searchsorted(limits[order], errors)
+        within = np.empty(len(limits))
+        counts = np.bincount(bins, minlength=len(limits) + 1)
+        within[order] = counts.cumsum()[:-1] / errors.size
     else:
         ordered = np.sort(errors)
         others = np.arange(ordered.size, 0, -1, dtype=np.float64)  # g - h
@@ -99,15 +104,6 @@ def expected_best(
         expected = float((chances * np.minimum(ordered, nearest)).sum())
         within = 1.0 - beyond[np.searchsorted(ordered, limits, side="right")]
     return expected, np.where(limits >= nearest, 1.0, within)
-
-
-def _count_within(errors: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the number of errors up to each limit, for many errors and few limits."""
-    order = np.argsort(limits)
-    bins = np.searchsorted(limits[order], errors)
-    counts = np.empty(len(limits), np.int64)
-    counts[order] = np.bincount(bins, minlength=len(limits) + 1).cumsum()[:-1]
-    return counts
 
 
 def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: float) -> float:

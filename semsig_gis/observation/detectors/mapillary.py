@@ -76,25 +76,21 @@ def mapillary_picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
             left, top, right, bottom = corners
             corners = left / size[0], top / size[1], right / size[0], bottom / size[1]
         boxes.append(box_of(item["value"], corners, where))
-    shot = _shot(image, size)
-    return AnnotatedPicture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
-
-
-def _shot(image: dict[str, Any], size: tuple[int, int] | None) -> Shot:
     computed, compass = image.get("computed_compass_angle"), image.get("compass_angle")
     heading = compass if computed is None else computed
     camera = CAMERAS.get(str(image.get("camera_type", "")).lower())
     focal = next(iter(image.get("camera_parameters") or []), None)
-    where = (image.get("computed_geometry") or image.get("geometry") or {}).get("coordinates")
-    return Shot(
+    point = (image.get("computed_geometry") or image.get("geometry") or {}).get("coordinates")
+    shot = Shot(
         camera=camera,
         focal=float(focal) if focal and camera in {"pinhole", "fisheye"} else None,
         heading=None if heading is None else float(heading) % 360.0,
         heading_error=COMPASS_ERROR if computed is None else COMPUTED_ERROR,
         north="true",
         size=size,
-        position=(float(where[1]), float(where[0])) if where else None,
+        position=(float(point[1]), float(point[0])) if point else None,
     )
+    return AnnotatedPicture(name=name, boxes=tuple(boxes), shares=True, shot=shot)
 
 
 def _corners(geometry: Any, where: str) -> tuple[Corners, bool]:  # noqa: ANN401 - any JSON

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from noisy_cells import every_association, mixtures, random_database, random_query
 from view_oracle import (
+    Glimpse,
     Scene,
-    Seen,
     Thing,
     cell_loglik,
     exact_loglik,
@@ -46,7 +46,7 @@ def test_the_chances_of_none_and_of_one_detection_are_those_of_the_process(
     steps = np.linspace(math.log(0.01), math.log(30.0), 400)
     ranges = np.exp(steps) if ranged else np.array([math.nan])
     each = [
-        math.exp(form(scene, [Seen(bearing=bearing % 360.0, weights=row, range=metres)], PHOTO))
+        math.exp(form(scene, [Glimpse(bearing=bearing % 360.0, weights=row, range=metres)], PHOTO))
         for bearing in [*np.arange(-9.5, -5, 1.0), *np.arange(0.5, 50, 1.0)]
         for row in ((1.0, 0.0), (0.0, 1.0))
         for metres in ranges
@@ -80,7 +80,7 @@ def test_associations_are_summed_as_elsewhere() -> None:
         for bearing in (10.0, 30.0, 50.0)
     ]
     scene = Scene(things=things, clutter=(1.0, 1.0), reach=30.0)
-    seen = [Seen(bearing=float(a), weights=(1.0, 0.0)) for a in rng.uniform(0, 60, 3)]
+    seen = [Glimpse(bearing=float(a), weights=(1.0, 0.0)) for a in rng.uniform(0, 60, 3)]
     weights = np.array(
         [[set_loglik(Scene(things=[one], clutter=(1.0, 1.0), reach=30.0), [each], FULL_VIEW)
           for each in seen] for one in things]
