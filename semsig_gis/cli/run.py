@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
 from typing import Any
 
 import typer
 
-from semsig_gis.cli.console import app
+from semsig_gis.cli.commands import app
 from semsig_gis.core import InputError
 
-__all__ = ["MODULES", "run"]
+__all__ = ["run"]
 
-MODULES = (
-    *("demo", "load", "build", "maps", "view", "localize"),
-    *("route", "suggest", "serve", "learn", "evaluate", "export"),
-)
-"""The modules with commands, in the order of the help."""
 INTERRUPTED = 130
 
 
@@ -26,11 +20,9 @@ def run() -> int:
 
     Raises InputError for an unknown command or an invalid value of an option.
     """
-    first = sys.argv[1] if sys.argv[1:] else "--help"
-    # SPEED
-    importlib.import_module(f"semsig_gis.cli.{first if first in MODULES else 'commands'}")
+    arguments = None if sys.argv[1:] else ["--help"]
     try:
-        code = app(None if sys.argv[1:] else [first], prog_name="semsig", standalone_mode=False)
+        code = app(arguments, prog_name="semsig", standalone_mode=False)
     except typer.TyperException as error:
         context = getattr(error, "ctx", None)
         command = "semsig" if context is None else context.command_path
