@@ -111,17 +111,16 @@ class CsvTable:
             return None
         if self.shape:
             return self._shape(texts[0][1])
-        x, y = (self._number(name, text) for name, text in texts)
-        return x, y
-
-    def _number(self, name: str, text: str) -> float:
-        try:
-            value = decimal(text, english=self.separator == ",")
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise BadFeatureError(f"{name} {text!r} is not a number")
-        return value
+        numbers = []
+        for name, text in texts:
+            try:
+                value = decimal(text, english=self.separator == ",")
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value):
+                raise BadFeatureError(f"{name} {text!r} is not a number")
+            numbers.append(value)
+        return numbers[0], numbers[1]
 
     def _shape(self, text: str) -> Position:
         try:

@@ -11,7 +11,13 @@ from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import host_of
 from semsig_gis.sources.services.gml import ID, features, local_name
 from semsig_gis.sources.services.layers import Download, find_field
-from semsig_gis.sources.services.pages import Page, ServiceQuery, geojson_page, xml_root
+from semsig_gis.sources.services.pages import (
+    Page,
+    ServiceQuery,
+    geojson_page,
+    next_offset,
+    xml_root,
+)
 
 if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
@@ -179,13 +185,10 @@ def _fetch_pages(
         return client.pages(query, read, lambda *_: None, total=total, suffix=suffix)
     most = service.constraints.get("CountDefault", "")
     count = min(PAGE_ROWS, int(most) if most.isdecimal() and int(most) else PAGE_ROWS)
-
-    def then(page: Page, rows: int) -> ServiceQuery | None:
-        rest = total is None or rows < total
-        return query.with_params(count=count, startIndex=rows) if page.rows and rest else None
-
+    query = query.with_params(count=count)
     # No startIndex for the first page: a service that cannot order rows refuses it.
-    return client.pages(query.with_params(count=count), read, then, total=total, suffix=suffix)
+    then = next_offset(query, "startIndex", total)
+    return client.pages(query, read, then, total=total, suffix=suffix)
 
 
 def _gml_page(content: bytes, client: Client) -> Page:
