@@ -283,8 +283,7 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
     try:
         reply = parse_json(content.decode("utf-8-sig"))
     except ValueError as error:
-        what = "sent JSON that is not whole"
-        raise TransientError(what) from error
+        raise TransientError("sent JSON that is not whole") from error
     failure = reply.get("error") if isinstance(reply, dict) else None
     if failure:
         code = failure.get("code") if isinstance(failure, dict) else None
@@ -340,5 +339,4 @@ def xml_root(content: bytes, url: str) -> ET.Element:
     try:
         return parse_xml(content)
     except ValueError as error:
-        what = "sent XML that is not whole"
-        raise TransientError(what) from error
+        raise TransientError("sent XML that is not whole") from error

@@ -6,7 +6,7 @@ import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -43,6 +43,29 @@ class ServiceRecord(NamedTuple):
 
     values: Mapping[str, Any]
     geometry: object = None
+
+    @classmethod
+    def parse(cls, item: object) -> Self | str:
+        """Return the record in an item, or an error message if it has none.
+
+        Items are of GeoJSON, Esri's JSON, Opendatasoft 1 or 2.0, or plain JSON.
+        """
+        if not isinstance(item, dict):
+            return f"is {json.dumps(item)[:40]}, not a record"
+        if isinstance(item.get("attributes"), dict):
+            return cls(item["attributes"], item.get("geometry"))
+        if item.get("type") == "Feature":
+            fields = item.get("properties") or {}
+            if not isinstance(fields, dict):
+                return "has properties without names"
+            own = item.get(ID)
+            if own is not None and ID not in fields:
+                fields = {**fields, ID: own}
+            return cls(fields, item.get("geometry"))
+        inner = item.get("record", item)
+        if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
+            return cls(inner["fields"], inner.get("geometry"))
+        return cls(item)
 
 
 # A row that cannot be read is an error message.
@@ -105,7 +128,7 @@ def _json(path: Path) -> ServiceTable:
         items = next((content[key] for key in keys if key in content), None)
         has_geometry = "features" in content
         system = _json_crs(content, path)
-    records = [_record(item) for item in items] if isinstance(items, list) else [""]
+    records = [ServiceRecord.parse(item) for item in items] if isinstance(items, list) else [""]
     readable = [record for record in records if isinstance(record, ServiceRecord)]
     if records and not readable:
         raise SourceError(
@@ -122,29 +145,6 @@ def _json(path: Path) -> ServiceTable:
         empty=not records,
         rest=max(total - len(records), 0) if isinstance(total, int) else 0,
     )
-
-
-def _record(item: object) -> ServiceRecord | str:
-    """Return the record in an item of GeoJSON, Esri's JSON, Opendatasoft 1 or 2.0, or plain JSON.
-
-    An error message if it is none of these.
-    """
-    if not isinstance(item, dict):
-        return f"is {json.dumps(item)[:40]}, not a record"
-    if isinstance(item.get("attributes"), dict):
-        return ServiceRecord(item["attributes"], item.get("geometry"))
-    if item.get("type") == "Feature":
-        fields = item.get("properties") or {}
-        if not isinstance(fields, dict):
-            return "has properties without names"
-        own = item.get(ID)
-        if own is not None and ID not in fields:
-            fields = {**fields, ID: own}
-        return ServiceRecord(fields, item.get("geometry"))
-    inner = item.get("record", item)
-    if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
-        return ServiceRecord(inner["fields"], inner.get("geometry"))
-    return ServiceRecord(item)
 
 
 def _json_crs(content: dict[str, Any], path: Path) -> CRS | None:
