@@ -100,7 +100,8 @@ def clip_layers(layers: Sequence[RawLayer], text: str | gpd.GeoDataFrame) -> tup
 
     Examples
     --------
-    >>> from semsig_gis import CitySpec, clip_layers, synthetic_city
+    >>> from semsig_gis import CitySpec, synthetic_city
+    >>> from semsig_gis.sources import clip_layers
     >>> layers = synthetic_city(CitySpec(size=300.0))
     >>> [layer.counts.kept for layer in clip_layers(layers[:2], "2.3,48.8,2.4,48.9")]
     [0, 0]

@@ -101,7 +101,7 @@ def find_files(
 
     Examples
     --------
-    >>> from semsig_gis import LayerSpec, find_files
+    >>> from semsig_gis.sources import LayerSpec, find_files
     >>> find_files([LayerSpec(name="trees", class_name="alignment_tree")], [])[1][0].name
     'trees'
     """

@@ -102,7 +102,7 @@ def read_layer(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis import LayerSpec, read_layer
+    >>> from semsig_gis.sources import LayerSpec, read_layer
     >>> spec = LayerSpec(name="benches", class_name="bench", crs="EPSG:4326")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder, "benches.csv")

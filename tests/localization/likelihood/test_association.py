@@ -28,12 +28,12 @@ from worlds import CODES, World, random_town
 from semsig_gis.core import ObjectIndex, Signature
 from semsig_gis.database import visible_objects_in
 from semsig_gis.localization import (
+    LOST_SHARE,
     Detections,
     NoiseMixture,
     NoiseSpec,
     Pairs,
     PhotoTable,
-    align_cells,
     associate,
     associate_pairs,
     build_index,
@@ -46,9 +46,9 @@ from semsig_gis.localization import (
     photo_loglik,
     query_bearings,
     rerank,
+    score_associations,
     visible_objects_off_centre,
 )
-from semsig_gis.localization.likelihood.photo import LOST
 from semsig_gis.observation import FULL_VIEW, Photo, View
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ def test_the_sum_over_associations_is_close_and_never_too_large(
     database = random_database(seed, cells=6, longest=5)
     query = random_query(database, seed, size=size)
     cells = np.arange(len(database))
-    found = align_cells(database, query, noise, cells)
+    found = score_associations(database, query, noise, cells)
     for cell in cells.tolist():
         exact = cell_loglik(database, query, noise, cell, tails=6.0)
         assert found[cell] <= exact + 1e-3
@@ -259,7 +259,7 @@ def test_it_is_exact_where_pairs_form_no_loop(seed: int, away: float) -> None:
     noise = NoiseSpec(bearing_sigma=5.0)
     bearings = (np.repeat(places, 2)[:5] + np.array([0.0, 1.0, -2.0, 3.0, away])) % 360.0
     query = Signature(rng.choice(database.present_codes, 5), bearings)
-    found = align_cells(database, query, noise, np.zeros(1, np.int64))[0]
+    found = score_associations(database, query, noise, np.zeros(1, np.int64))[0]
     assert found == pytest.approx(cell_loglik(database, query, noise, 0), abs=1e-3)
 
 
@@ -267,10 +267,10 @@ def test_turns_are_those_of_a_turned_query() -> None:
     database = random_database(4)
     query = random_query(database, 4, size=7)
     cells, turns = np.array([3, 8]), np.array([[0.0, 30.0], [-200.0, 400.0]])
-    found = align_cells(database, query, GENERIC, cells, turns=turns)
+    found = score_associations(database, query, GENERIC, cells, turns=turns)
     for place, way in np.ndindex(turns.shape):
         turned = turned_query(query, float(turns[place, way]))
-        alone = align_cells(database, turned, GENERIC, cells[[place]])
+        alone = score_associations(database, turned, GENERIC, cells[[place]])
         assert found[place, way] == pytest.approx(alone[0], abs=1e-3)
 
 
@@ -312,14 +312,14 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
             np.logaddexp.reduce((one + prior).reshape(-1, many * turns.shape[1]), axis=1)
             for one in (bounds, whole)
         )
-        assert sums == pytest.approx(expected, abs=LOST)
+        assert sums == pytest.approx(expected, abs=LOST_SHARE)
 
 
 def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:
     database = random_database(2, cells=300)
     index = build_index(database, GENERIC)
     query = random_query(database, 2, size=8)
-    exact = align_cells(database, query, GENERIC, np.arange(300))
+    exact = score_associations(database, query, GENERIC, np.arange(300))
     scores = index.scores(query)
     found = rerank(index, query, scores, count=40).loglik
     best = np.argsort(-scores.loglik, kind="stable")
@@ -349,7 +349,7 @@ def test_a_sum_that_is_far_too_high_everywhere_hides_nothing() -> None:
     for cell in np.argsort(-database.lengths)[:12].tolist():
         query = distorted(database, cell, np.random.default_rng([cell, 1]))
         scores = index.scores(query)
-        exact = align_cells(database, query, noise, np.arange(400))
+        exact = score_associations(database, query, noise, np.arange(400))
         best = int(exact.argmax())
         found = rerank(index, query, scores, count=20).loglik
         assert exact[best] < scores.loglik.max() - 30.0

@@ -15,7 +15,7 @@ from noisy_cells import database_of, noisy_town, parts_of, random_database, turn
 from worlds import CODES, CORNER, World, random_town
 
 from semsig_gis.core import ObjectIndex, Signature
-from semsig_gis.database import Footprints, ObjectStore, visible_objects_at
+from semsig_gis.database import ObjectStore, visible_objects_at
 from semsig_gis.localization import (
     AnswerRule,
     NoiseSpec,
@@ -352,9 +352,9 @@ def detected(world: World, xy: np.ndarray, seed: int) -> Signature:
 
 
 def refined(query: Signature, world: World, **options: Any) -> Refinement:  # noqa: ANN401
-    objects = world.street_objects
+    store = ObjectStore.of(world.street_objects, footprints=options.pop("footprints", None))
     cells = options.pop("cells", world.database.xy)
-    return refine(query, cells, SHARP, objects=objects, index=ObjectIndex(objects.xy), **options)
+    return refine(query, cells, SHARP, store=store, **options)
 
 
 def test_the_place_is_as_good_as_it_says() -> None:
@@ -397,7 +397,8 @@ def test_what_else_is_known_and_buildings_count() -> None:
     likely = find(log_prior=np.log([0.1, 0.9]))
     assert likely.mass == pytest.approx(0.9, abs=1e-4)
     assert likely.xy[0] == pytest.approx(1000.0, abs=5.0)
-    hidden = find(footprints=Footprints([shapely.box(-20.0, 6.0, 20.0, 8.0)]))
+    houses = [shapely.box(-20.0, 6.0, 20.0, 8.0)]
+    hidden = find(footprints=gpd.GeoDataFrame(geometry=houses, crs=world.street_objects.crs))
     assert hidden.xy[0] == pytest.approx(1000.0, abs=5.0)
     assert hidden.mass > 0.9
 

@@ -20,7 +20,7 @@ from view_oracle import (
     set_loglik,
 )
 
-from semsig_gis.localization import NoiseSpec, align_cells
+from semsig_gis.localization import NoiseSpec, score_associations
 from semsig_gis.observation import FULL_VIEW, Photo
 
 LAMP = Thing(
@@ -62,7 +62,7 @@ def test_of_a_full_turn_it_is_what_it_was(seed: int, noise: NoiseSpec, size: int
     database = random_database(seed, cells=6, longest=4)
     query = random_query(database, seed, size=size)
     found = cell_loglik(database, query, noise, 0)
-    near = align_cells(database, query, noise, np.zeros(1, np.int64))[0]
+    near = score_associations(database, query, noise, np.zeros(1, np.int64))[0]
     assert near - 1e-2 <= found <= near + 0.35 * size + 1e-2
 
 

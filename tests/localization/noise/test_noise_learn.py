@@ -19,7 +19,6 @@ from semsig_gis.database import visible_objects_in
 from semsig_gis.localization import (
     ALL,
     Sample,
-    drawn_rates,
     estimated_rates,
     expected_counts,
     gather_evidence,
@@ -28,6 +27,7 @@ from semsig_gis.localization import (
     next_model,
     noise_from_dict,
     read_samples,
+    shrunk_rates,
 )
 from semsig_gis.observation import Photo, View
 
@@ -328,8 +328,8 @@ def test_counts_add_up(seed: int) -> None:
     hits = counts.named.sum()
     assert hits == pytest.approx(counts.chances.sum())
     # What is neither an object nor clutter came into range with the observer.
-    assert 0.8 * len(evidence.seen.bearings) < hits + counts.false.sum()
-    assert hits + counts.false.sum() <= len(evidence.seen.bearings) + 0.05
+    assert 0.8 * len(evidence.detections.bearings) < hits + counts.false.sum()
+    assert hits + counts.false.sum() <= len(evidence.detections.bearings) + 0.05
     assert (counts.named.sum(axis=1) <= counts.trials.sum() + 0.05).all()
     assert (counts.turns >= 0).all()
     new = next_model(evidence, counts, model)
@@ -386,6 +386,6 @@ def test_where_every_association_is_certain_the_intervals_are_the_text_books() -
 
 
 def test_rates_are_drawn_as_the_overall_rate_with_eight_samples() -> None:
-    found = drawn_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
+    found = shrunk_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
     assert found == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
-    assert drawn_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]
+    assert shrunk_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]
