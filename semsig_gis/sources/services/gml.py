@@ -15,7 +15,7 @@ from semsig_gis.core import CrsError
 from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -34,7 +34,7 @@ COLLECTIONS = frozenset(
 )  # fmt: skip
 GEOMETRIES = POINTS | LINES | AREAS | COLLECTIONS
 # Types of geometries that consist of parts of one type.
-MULTIPLE = {
+MULTIPLE: dict[str, Callable[..., shapely.Geometry]] = {
     "Point": shapely.MultiPoint,
     "LineString": shapely.MultiLineString,
     "Polygon": shapely.MultiPolygon,
