@@ -54,39 +54,44 @@ def profile_rows(
 
 @compiled
 def _add_up(  # noqa: PLR0917 - a kernel takes no keywords
-    odds: NDArray[np.float32],
-    leaving: NDArray[np.float32],
-    row_starts: NDArray[np.uint64],
-    name_starts: NDArray[np.uint64],
-    rows: NDArray[np.float32],
-    naming: NDArray[np.float32],
-    disc: NDArray[np.float32],
+    objects: tuple[NDArray[np.float32], ...],
+    starts: tuple[NDArray[np.uint64], ...],
+    count: np.uint64,
+    above: np.uint64,
+    first: np.uint64,
+    photo: tuple[NDArray[np.float32], ...],
     sums: NDArray[np.float32],
 ) -> None:
     """Fill `sums` (LANES,) with 1 plus what the objects of a place add to a block of detections.
 
-    By object, `row_starts` and `name_starts` are where it begins in `rows` and `named`. This is a
+    `objects` are the odds of detection and the shares out of range of `count` objects, `starts`
+    where each begins in a block of the rows and in the names. `photo` has the rows, of which the
+    block is `above` the first, the names and the disc, of which it begins at `first`. This is a
     function of its own, and written out, so that the sums stay in one register: a loop over the
     lanes takes 2.5 times as long.
     """
+    odds, leaving = objects
+    row_starts, name_starts = starts
+    rows, naming, disc = photo
     a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(1.0)
-    for entry in range(np.uint64(len(odds))):
-        odd, away, row, name = odds[entry], leaving[entry], row_starts[entry], name_starts[entry]
-        b0 = odd * rows[row] + away * disc[0]
+    for entry in range(count):
+        odd, away = odds[entry], leaving[entry]
+        row, name = row_starts[entry] + above, name_starts[entry] + first
+        b0 = odd * rows[row] + away * disc[first]
         a0 += b0 * naming[name]
-        b1 = odd * rows[row + np.uint64(1)] + away * disc[1]
+        b1 = odd * rows[row + np.uint64(1)] + away * disc[first + np.uint64(1)]
         a1 += b1 * naming[name + np.uint64(1)]
-        b2 = odd * rows[row + np.uint64(2)] + away * disc[2]
+        b2 = odd * rows[row + np.uint64(2)] + away * disc[first + np.uint64(2)]
         a2 += b2 * naming[name + np.uint64(2)]
-        b3 = odd * rows[row + np.uint64(3)] + away * disc[3]
+        b3 = odd * rows[row + np.uint64(3)] + away * disc[first + np.uint64(3)]
         a3 += b3 * naming[name + np.uint64(3)]
-        b4 = odd * rows[row + np.uint64(4)] + away * disc[4]
+        b4 = odd * rows[row + np.uint64(4)] + away * disc[first + np.uint64(4)]
         a4 += b4 * naming[name + np.uint64(4)]
-        b5 = odd * rows[row + np.uint64(5)] + away * disc[5]
+        b5 = odd * rows[row + np.uint64(5)] + away * disc[first + np.uint64(5)]
         a5 += b5 * naming[name + np.uint64(5)]
-        b6 = odd * rows[row + np.uint64(6)] + away * disc[6]
+        b6 = odd * rows[row + np.uint64(6)] + away * disc[first + np.uint64(6)]
         a6 += b6 * naming[name + np.uint64(6)]
-        b7 = odd * rows[row + np.uint64(7)] + away * disc[7]
+        b7 = odd * rows[row + np.uint64(7)] + away * disc[first + np.uint64(7)]
         a7 += b7 * naming[name + np.uint64(7)]
     sums[0] = a0
     sums[1] = a1
@@ -133,6 +138,9 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
     all_odds, all_leaving = np.empty(most, np.float32), np.empty(most, np.float32)
     all_rows, all_names = np.empty(most, np.uint64), np.empty(most, np.uint64)
     sums = np.empty(LANES, np.float32)
+    # Tuples for `_add_up`, which are not made again for each place.
+    chances, starts = (all_odds, all_leaving), (all_rows, all_names)
+    arrays = rows, naming, disc
     for place in range(part[0], part[1]):
         low, count = np.uint64(offsets[place]), np.uint64(offsets[place + 1] - offsets[place])
         length = min(count, np.uint64(longest)) * np.uint64(classes)
@@ -157,19 +165,9 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
             all_rows[entry] = bin_ * lanes
             all_names[entry] = (length + kind) * all_lanes
         # Each block of detections: the sum over the objects, and the product of these sums.
-        odds, own_leaving = all_odds[:count], all_leaving[:count]
         for block in range(np.uint64(blocks)):
-            first = block * lanes
-            _add_up(
-                odds,
-                own_leaving,
-                all_rows,
-                all_names,
-                rows[block * block_size :],
-                naming[first:],
-                disc[first:],
-                sums,
-            )
+            above, first_lane = block * block_size, block * lanes
+            _add_up(chances, starts, count, above, first_lane, arrays, sums)
             # Each pair is below 1e38, all eight together may not be.
             for lane in range(0, LANES, 2):
                 product *= np.float64(sums[lane] * sums[lane + 1])
