@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from semsig_gis.core import ObjectIndex
+from semsig_gis.database import ObjectStore
 from semsig_gis.localization import (
-    KEPT,
+    DIVIDED_PARTS,
     expected_best,
     posterior,
     rank_range,
@@ -162,30 +162,32 @@ def ask_refined(
     city: City, queries: Sequence[Query], index: LikelihoodIndex, noise: Noise, *, threads: int
 ) -> list[Outcome]:
     """Localize with refinement; the index must have the noise model of `cell_noise`."""
-    trees: SimpleQueue[ObjectIndex] = SimpleQueue()  # only one thread can use an R-tree
+    stores: SimpleQueue[ObjectStore] = SimpleQueue()  # only one thread can use an R-tree
     for _ in range(threads):
-        trees.put(ObjectIndex(city.objects.xy))
+        store = ObjectStore.of(city.objects)
+        _ = store.index  # built now, so that it is not timed
+        stores.put(store)
 
     def ask(query: Query) -> Outcome:
         if not len(query.signature):
             return _unlocalized(city, query)
-        tree = trees.get()
+        store = stores.get()
         start = time.thread_time()
         loglik = _loglik(index, query, Settings())
-        likely = np.argpartition(-loglik, min(KEPT[0], len(loglik)) - 1)[: KEPT[0]]
+        count = min(DIVIDED_PARTS[0], len(loglik))
+        likely = np.argpartition(-loglik, count - 1)[:count]
         likely = likely[np.argsort(-loglik[likely], kind="stable")]
         result = refine(
             query.signature,
             city.database.xy[likely],
             noise,
-            objects=city.objects,
-            index=tree,
+            store=store,
             step=city.database.grid.step,
             radius=city.database.spec.radius,
         )
         error = math.dist(result.xy, query.xy)
         seconds = time.thread_time() - start
-        trees.put(tree)
+        stores.put(store)
         return Outcome(
             length=query.length,
             within=tuple(float(error <= limit) for limit in NEAR),

@@ -56,8 +56,9 @@ Every step is one command. `semsig COMMAND --help` prints what these pages say.
 """
 API = """# Python names
 
-Every public name is imported from `semsig_gis`, whichever package defines it. Other names in
-modules may change without notice.
+The most used names are imported from `semsig_gis` and listed here, by the package that defines them.
+Each package exports more names, such as `semsig_gis.localization.search_regions`; `dir` lists them.
+Names that are only in modules may change without notice.
 
 ```python
 import semsig_gis as sg
@@ -197,14 +198,12 @@ def marked(text: str) -> str:
 
 
 def public_names() -> dict[str, list[str]]:
-    """Return the public names by the package or subpackage that defines them, as in the stub."""
+    """Return the public names by package, in the order of the stub."""
     stub = ROOT / "semsig_gis/__init__.pyi"
     names: defaultdict[str, list[str]] = defaultdict(list)
     for node in ast.parse(stub.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module:
-            # The module has up to two packages: `core.errors`, `localization.noise.model`.
-            package = ".".join(node.module.split(".")[:-1][:2]) or node.module
-            names[package] += [alias.name for alias in node.names]
+            names[node.module.partition(".")[0]] += [alias.name for alias in node.names]
     return names
 
 

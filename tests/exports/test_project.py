@@ -28,12 +28,12 @@ from semsig_gis.exports import (
     evaluation_layers,
     export_answer,
     export_database,
-    figures_apart,
     hexagons_layer,
     layer_fields,
     objects_layer,
     project_archive,
     shown_layers,
+    split_figures,
 )
 from semsig_gis.localization import search_regions
 from semsig_gis.objects import Licence
@@ -156,7 +156,7 @@ def test_every_field_has_a_name_that_people_read(tmp_path: Path) -> None:
     )
     layers = [
         *(cells_layer(CITY, identifiability=CHANCES), objects_layer(OBJECTS), lines),
-        *(hexagons_layer(CITY, 9, objects=OBJECTS, evaluation=EVALUATION), *figures_apart(queries)),
+        *(hexagons_layer(CITY, 9, objects=OBJECTS, evaluation=EVALUATION), *split_figures(queries)),
         *(layer for answer in answers for layer in answer),
     ]
     for layer in layers:

@@ -33,7 +33,7 @@ DOCS = ROOT / "docs"
 MOST_BYTES = 300_000
 MAIN = (
     *("index", "install", "tutorial", "gallery", "compared_with_the_paper", "how_sure"),
-    *("commands/localize", "api/localization.distance"),
+    *("commands/localize", "api/localization"),
 )
 
 pytestmark = pytest.mark.skipif(
