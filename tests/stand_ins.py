@@ -7,11 +7,13 @@ import re
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
+from geojson import collection, feature, point
 from servers import Answer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from geojson import Feature
     from servers import Request, Server
 
 Row = dict[str, Any]
@@ -40,17 +42,9 @@ def properties(row: Row, fields: Sequence[str] = FIELDS) -> Row:
     return {name: row[name] for name in fields}
 
 
-def features(rows: Sequence[Row], fields: Sequence[str] = FIELDS) -> list[dict[str, Any]]:
+def features(rows: Sequence[Row], fields: Sequence[str] = FIELDS) -> list[Feature]:
     """Return rows as GeoJSON."""
-    return [
-        {
-            "type": "Feature",
-            "id": row["OBJECTID"],
-            "geometry": {"type": "Point", "coordinates": list(row["xy"])},
-            "properties": properties(row, fields),
-        }
-        for row in rows
-    ]
+    return [feature(point(*row["xy"]), properties(row, fields), id=row["OBJECTID"]) for row in rows]
 
 
 class StandIn:
@@ -178,11 +172,7 @@ class ArcGIS(StandIn):
         names = FIELDS if query["outFields"] == "*" else query["outFields"].split(",")
         if query["f"] == "geojson":
             more_rows = {"properties": {"exceededTransferLimit": True}} if more else {}
-            content = {
-                "type": "FeatureCollection",
-                "features": features(some, names),
-                **more_rows,
-            }
+            content = collection(features(some, names), **more_rows)
             return sent(content, type="application/geo+json")
         content = {
             "geometryType": "esriGeometryPoint",
@@ -260,7 +250,7 @@ class Wfs(StandIn):
             listed = features(some, [name for name in names if name != "geom"])
             for item in listed if self.turned else ():
                 item["geometry"]["coordinates"].reverse()
-            return sent({"type": "FeatureCollection", "features": listed, "crs": crs})
+            return sent(collection(listed, crs=crs))
         return self.collection(some, total)
 
     def matching_rows(self, query: Mapping[str, str]) -> Sequence[Row] | Answer:
@@ -394,14 +384,13 @@ class OgcFeatures(StandIn):
         if self.circles or start + len(some) < len(rows):
             next_query = urlencode({**query, "offset": start + len(some)})
             links.append({"rel": "next", "href": f"{self.next_host}?{next_query}"})
-        content = {
-            "type": "FeatureCollection",
-            "features": listed,
-            "links": links,
-            "timeStamp": f"2024-01-01T00:00:{len(self.server.requests):02}Z",
-            "numberMatched": len(rows) + self.surplus,
-            "numberReturned": len(some),
-        }
+        content = collection(
+            listed,
+            links=links,
+            timeStamp=f"2024-01-01T00:00:{len(self.server.requests):02}Z",
+            numberMatched=len(rows) + self.surplus,
+            numberReturned=len(some),
+        )
         return sent(content, type="application/geo+json")
 
 
@@ -508,8 +497,7 @@ class Socrata(StandIn):
         some = self.part(rows, query["$offset"], query["$limit"])
         if request.path.endswith(".geojson"):
             assert self.place not in {"", "location"}
-            content = {"type": "FeatureCollection", "features": features(some, names)}
-            return sent(content, type="application/vnd.geo+json")
+            return sent(collection(features(some, names)), type="application/vnd.geo+json")
         return sent([self.plain(row, names) for row in some])
 
     def plain(self, row: Row, names: Sequence[str]) -> Row:

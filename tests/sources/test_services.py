@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import shapely
+from geojson import collection
+from raw_layers import ids, xy
 from sentences import refused
 from servers import Answer
 from stand_ins import (
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from servers import Server
     from stand_ins import StandIn
 
-    from semsig_gis.sources import Cache, Download, HttpSpec, RawLayer
+    from semsig_gis.sources import Cache, Download, HttpSpec
 
     Fetch = Callable[..., Download]
 
@@ -61,15 +63,6 @@ def fetched(cache: Cache, quick: HttpSpec) -> Fetch:
         return download
 
     return call
-
-
-def ids(layer: RawLayer) -> list[str]:
-    texts: list[str] = layer.table["source_id"].tolist()
-    return texts
-
-
-def xy(layer: RawLayer) -> list[tuple[float, float]]:
-    return [(x, y) for x, y in shapely.get_coordinates(layer.table.geometry.array).round(9)]
 
 
 def test_pages_become_one_layer_and_are_cached(
@@ -247,7 +240,7 @@ def test_arcgis_may_be_busy_and_send_an_empty_page_before_the_last(
     path = "/arcgis/rest/services/Street/FeatureServer/0/query"
     busy = sent({"error": {"code": 503, "message": "Service is busy"}})
     empty = sent({"features": [], "exceededTransferLimit": True})
-    rest = sent({"type": "FeatureCollection", "features": features(ROWS)})
+    rest = sent(collection(features(ROWS)))
     server.on(path, sent({"count": 5}), busy, empty, rest)
     assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
     assert (len(slept), service.page_requests()[-1].query["resultOffset"]) == (1, "2")
@@ -357,7 +350,7 @@ def test_ckan_datastore_filters_rows(server: Server, fetched: Fetch) -> None:
     assert layer.spec.terms == "City of Somewhere (CC0)"
 
 
-FILE = {"type": "FeatureCollection", "features": features(ROWS)}
+FILE = collection(features(ROWS))
 CSV = {"format": "csv", "url": "files/lamps_2023.csv", "created": "2023-05-01T00:00:00"}
 NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T00:00:00"}
 
