@@ -38,10 +38,10 @@ FIRST_MARKS = re.compile(r"^(\d*)([-+=>#.)])")
 RUN = "What was run"
 
 
-def html_page(report: Report, pictures: Mapping[str, Picture], *, alone: bool = False) -> str:
+def html_page(report: Report, pictures: Mapping[str, Picture], *, standalone: bool = False) -> str:
     """Return a report as one HTML page with embedded pictures; it loads no other files.
 
-    Unless it is to be used `alone`, it has links to the other files of the report.
+    Unless it is `standalone`, it has links to the other files of the report.
     """
     environment = Environment(
         loader=PackageLoader("semsig_gis"),
@@ -61,7 +61,7 @@ def html_page(report: Report, pictures: Mapping[str, Picture], *, alone: bool = 
             for name, picture in pictures.items()
         },
         alts={name: picture.description for name, picture in pictures.items()},
-        alone=alone,
+        standalone=standalone,
         run=RUN,
         version=__version__,
     )
@@ -145,7 +145,7 @@ def write_page(report: Report, file: str | Path) -> None:
     ...     Path(folder, "report.html").read_text("utf-8")[:15]
     '<!DOCTYPE html>'
     """
-    write_whole(file, html_page(report, _pictures(report), alone=True))
+    write_whole(file, html_page(report, _pictures(report), standalone=True))
 
 
 def write_report(report: Report, folder: str | Path) -> None:

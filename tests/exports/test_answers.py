@@ -37,7 +37,9 @@ def layers_of(file: Path) -> dict[str, gpd.GeoDataFrame]:
 
 @pytest.mark.parametrize("suffix", [".geojson", ".kml"])
 @pytest.mark.parametrize("answer", [LOCATION, small_localization()])
-def test_file_contains_all_layers_of_an_answer(answer: Location | Localization, suffix: str, tmp_path: Path) -> None:
+def test_file_contains_all_layers_of_an_answer(
+    answer: Location | Localization, suffix: str, tmp_path: Path
+) -> None:
     file = tmp_path / f"a{suffix}"
     regions = export_answer(answer, CITY, file).table
     tables = layers_of(file)

@@ -74,7 +74,9 @@ LOCATION = small_location()
 
 
 @pytest.mark.parametrize("answer", [LOCATION, small_localization()])
-def test_exported_answer_contains_regions_and_candidates(answer: Location | Localization, tmp_path: Path) -> None:
+def test_exported_answer_contains_regions_and_candidates(
+    answer: Location | Localization, tmp_path: Path
+) -> None:
     file = tmp_path / "a.gpkg"
     for path in (file, tmp_path / "a.parquet", tmp_path / "a.csv"):
         regions = export_answer(answer, CITY, path, share=0.99, within=12.0)

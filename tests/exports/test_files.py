@@ -86,9 +86,7 @@ def test_hostile_texts_in_csv_are_safe_and_read_back(tmp_path: Path) -> None:
 def test_cells_in_geoparquet_are_read_back(tmp_path: Path) -> None:
     chances, file = chances_of(CITY), tmp_path / "cells.parquet"
     steps: list[tuple[int, int]] = []
-    export_database(
-        CITY, file, identifiability=chances, progress=lambda *step: steps.append(step)
-    )
+    export_database(CITY, file, identifiability=chances, progress=lambda *step: steps.append(step))
     cells = gpd.read_parquet(file)
     assert cells.crs == CITY.crs
     assert cells["cell_id"].tolist() == CITY.cell_ids.tolist()

@@ -48,7 +48,9 @@ def assert_holds(file: Path, database: SignatureDatabase, values: np.ndarray) ->
 
 
 @pytest.mark.parametrize("grid", [GridSpec(), GridSpec(7.5, (3.0, -1e6))])
-def test_pixels_have_the_values_of_cells(grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_pixels_have_the_values_of_cells(
+    grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(raster, "TILE", 16)
     database = dataclasses.replace(small_city()[0], grid=grid)
     values = np.where(database.lengths > 3, database.lengths, np.nan)

@@ -140,7 +140,9 @@ def test_crs_without_a_code_is_stored_as_projjson(tmp_path: Path) -> None:
     assert CRS.from_json_dict(projection.projjson) == local
 
 
-def test_wrong_suffix_missing_file_and_missing_pystac_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_suffix_missing_file_and_missing_pystac_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     save_database(CITY, tmp_path / "a.parquet")
     with refused(InputError, "a.yaml does not end in .json"):
         export_item(tmp_path / "a.parquet", tmp_path / "a.yaml")
