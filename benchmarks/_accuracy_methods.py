@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from semsig_gis.core import ObjectIndex
+from semsig_gis.database import ObjectStore
 from semsig_gis.localization import (
-    KEPT,
+    DIVIDED_PARTS,
     expected_best,
     posterior,
     rank_range,
@@ -155,30 +155,32 @@ def ask_refined(
     city: City, queries: Sequence[Query], index: LikelihoodIndex, noise: Noise, *, threads: int
 ) -> list[Outcome]:
     """Answer with a place off the grid; the index is that of `cell_noise`."""
-    trees: SimpleQueue[ObjectIndex] = SimpleQueue()  # an R-tree serves one thread at a time
+    stores: SimpleQueue[ObjectStore] = SimpleQueue()  # an R-tree serves one thread at a time
     for _ in range(threads):
-        trees.put(ObjectIndex(city.objects.xy))
+        store = ObjectStore.of(city.objects)
+        _ = store.index
+        stores.put(store)
 
     def ask(query: Query) -> Outcome:
         if not len(query.seen):
             return _lost(city, query)
-        tree = trees.get()
+        store = stores.get()
         start = time.thread_time()
         loglik = _loglik(index, query, Way())
-        likely = np.argpartition(-loglik, min(KEPT[0], len(loglik)) - 1)[: KEPT[0]]
+        count = min(DIVIDED_PARTS[0], len(loglik))
+        likely = np.argpartition(-loglik, count - 1)[:count]
         likely = likely[np.argsort(-loglik[likely], kind="stable")]
         found = refine(
             query.seen,
             city.database.xy[likely],
             noise,
-            objects=city.objects,
-            index=tree,
+            store=store,
             step=city.database.grid.step,
             radius=city.database.spec.radius,
         )
         error = math.dist(found.xy, query.xy)
         seconds = time.thread_time() - start
-        trees.put(tree)
+        stores.put(store)
         return Outcome(
             length=query.length,
             within=tuple(float(error <= limit) for limit in NEAR),

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from benchmarks._soak_runs import Ending
-    from semsig_gis import LayerSpec
+    from semsig_gis.sources import LayerSpec
 
 TABLE = tomllib.loads(Path(__file__).with_name("soak.toml").read_text(encoding="utf-8"))
 _TIMED = (".lock", ".meta.json")  # of the cache: when something was fetched

@@ -25,8 +25,10 @@ import osmium
 import semsig_gis as sg
 from benchmarks._contents import digest
 from benchmarks._soak_runs import LIMIT_S
-from semsig_gis.evaluation import open_identifiability
-from semsig_gis.localization import open_noise
+from semsig_gis.database import open_dataset, open_store
+from semsig_gis.evaluation import open_experiment_spec, open_identifiability
+from semsig_gis.exports import read_geopackage
+from semsig_gis.localization import open_noise, open_rule, raster_prior
 from semsig_gis.objects import read_area
 from semsig_gis.observation import read_queries, read_route
 from semsig_gis.sources import reader
@@ -97,7 +99,7 @@ def _objects(path: Path) -> str:
 
 
 def _store(path: Path) -> str:
-    store = sg.open_store(path.parents[1] / "known.parquet")
+    store = open_store(path.parents[1] / "known.parquet")
     return f"{store.objects.table.to_csv()}"
 
 
@@ -135,7 +137,7 @@ FORMATS = (
     Format(
         name="tiles, manifest",
         file="tiles/_manifest.json",
-        read=lambda path: [*map(_arrays, sg.open_dataset(path.parent).parts())],
+        read=lambda path: [*map(_arrays, open_dataset(path.parent).parts())],
     ),
     Format(
         name="surroundings",
@@ -152,12 +154,12 @@ FORMATS = (
         file="evaluation/queries.parquet",
         read=lambda path: sg.open_evaluation(path.parent),
     ),
-    Format(name="GeoPackage of ours", file="known.gpkg", read=sg.read_geopackage),
+    Format(name="GeoPackage of ours", file="known.gpkg", read=read_geopackage),
     Format(name="catalogue", file="fuzz.toml", read=sg.load_catalog),
     Format(name="noise, TOML", file="noise.toml", read=open_noise),
     Format(name="noise, JSON", file="noise.json", read=open_noise),
-    Format(name="rule", file="rule.json", read=sg.open_rule),
-    Format(name="experiment", file="experiment.toml", read=sg.open_experiment_spec),
+    Format(name="rule", file="rule.json", read=open_rule),
+    Format(name="experiment", file="experiment.toml", read=open_experiment_spec),
     Format(
         name="queries, JSON lines",
         file="queries.jsonl",
@@ -186,7 +188,7 @@ FORMATS = (
     Format(
         name="raster",
         file="cells.tif",
-        read=lambda path: sg.raster_prior(sg.open_database(path.parent / "known.parquet"), path),
+        read=lambda path: raster_prior(sg.open_database(path.parent / "known.parquet"), path),
     ),
     *(
         Format(name=f"vector, {suffix}", file=f"objects.{suffix}", read=_loaded)

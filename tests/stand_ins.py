@@ -392,8 +392,8 @@ class OgcFeatures(StandIn):
             item["properties"] = {k: v for k, v in item["properties"].items() if v is not None}
         links = [{"rel": "self", "href": request.path}]
         if self.circles or start + len(some) < len(rows):
-            query = urlencode({**query, "offset": start + len(some)})
-            links.append({"rel": "next", "href": f"{self.next_host}?{query}"})
+            next_query = urlencode({**query, "offset": start + len(some)})
+            links.append({"rel": "next", "href": f"{self.next_host}?{next_query}"})
         content = {
             "type": "FeatureCollection",
             "features": listed,

@@ -132,6 +132,7 @@ from .text import escaped as escaped
 from .text import one_line as one_line
 from .text import percent as percent
 from .text import visible as visible
+from .text import visible_lines as visible_lines
 from .threads import WorkCancelledError as WorkCancelledError
 from .threads import cancellable as cancellable
 from .threads import cores as cores

@@ -5,6 +5,10 @@ from __future__ import annotations
 import array
 import sys
 import unicodedata
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 # Unicode categories: control, format, surrogate, line separator and paragraph separator.
 HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
@@ -19,6 +23,11 @@ def visible(text: str) -> str:
     Control characters (also line ends), direction marks and surrogates are escaped as in JSON.
     """
     return text if text.isprintable() else "".join(map(_escape_hidden, text))
+
+
+def visible_lines(texts: Iterable[str]) -> list[str]:
+    """Return texts with the same characters escaped as by `visible`, except for line ends."""
+    return ["\n".join(map(visible, text.split("\n"))) for text in texts]
 
 
 def _escape_hidden(character: str) -> str:

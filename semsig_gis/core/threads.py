@@ -68,11 +68,6 @@ def _raise_if_cancelled() -> None:
         raise WorkCancelledError
 
 
-def _disable_sharing() -> None:
-    """Let `share_rows` of this thread use no other threads, because they are all busy."""
-    _thread_state.sharing = True
-
-
 def each_in_order(
     work: Callable[[_Item], _Result], items: Iterable[_Item], *, threads: int | None = None
 ) -> Iterator[_Result]:
@@ -88,7 +83,9 @@ def each_in_order(
         break
     waiting: deque[Future[_Result]] = deque()
     threads = cores() if threads is None else threads
-    pool = ThreadPoolExecutor(threads, initializer=_disable_sharing)
+    # `share_rows` in these threads uses no further threads, because they are all busy.
+    sharing = (_thread_state, "sharing", True)
+    pool = ThreadPoolExecutor(threads, initializer=setattr, initargs=sharing)
     try:
         try:
             for item in rest:

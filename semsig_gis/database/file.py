@@ -412,7 +412,8 @@ class PartitionedDatabase(Displayed):
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis import build_tiles, save_objects
+    >>> from semsig_gis import save_objects
+    >>> from semsig_gis.database import build_tiles
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     save_objects(demo_objects, f"{folder}/objects.parquet")
     ...     tiles = build_tiles(f"{folder}/objects.parquet", f"{folder}/town")

@@ -331,7 +331,8 @@ def update_tiles(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis import build_tiles, save_objects
+    >>> from semsig_gis import save_objects
+    >>> from semsig_gis.database import build_tiles
     >>> fewer = replace(demo_objects, table=demo_objects.table[1:])
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     old, new, town = f"{folder}/old.parquet", f"{folder}/new.parquet", f"{folder}/town"

@@ -8,13 +8,14 @@ from .export import export_database as export_database
 from .export import export_item as export_item
 from .files import as_written as as_written
 from .files import formula_safe as formula_safe
+from .geopackage import GeopackageContents as GeopackageContents
 from .geopackage import read_geopackage as read_geopackage
 from .hexagons import hexagons_layer as hexagons_layer
 from .layers import answer_layers as answer_layers
 from .layers import cells_layer as cells_layer
 from .layers import evaluation_layers as evaluation_layers
-from .layers import figures_apart as figures_apart
 from .layers import objects_layer as objects_layer
+from .layers import split_figures as split_figures
 from .project import layer_fields as layer_fields
 from .project import project_archive as project_archive
 from .project import shown_layers as shown_layers

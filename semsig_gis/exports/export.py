@@ -1,10 +1,9 @@
-"""Files for other programs, by their suffix.
+"""Write files for other programs; the suffix of the file decides the format.
 
 ``.gpkg`` (`exports.geopackage`) holds many layers, with styles for QGIS; ``.parquet``, ``.fgb``,
 ``.geojson`` and ``.csv`` (`exports.files`) hold one; ``.pmtiles`` (`exports.tiles`) holds the cells
-by zoom, and ``.tif`` (`exports.rasters`) one number a cell. An answer goes into the same files, and
-whole into ``.geojson`` and ``.kml`` (`exports.answers`). ``.json`` (`exports.stac`) tells of the
-files of a database.
+by zoom, and ``.tif`` (`exports.rasters`) one number per cell. For an answer, ``.geojson`` and
+``.kml`` (`exports.answers`) hold all its layers. ``.json`` (`exports.stac`) describes a database.
 """
 
 from __future__ import annotations
@@ -20,15 +19,17 @@ from semsig_gis.evaluation import error_field
 from semsig_gis.exports import geopackage
 from semsig_gis.exports.answers import write_answer_geojson, write_answer_kml
 from semsig_gis.exports.files import write_csv, write_flatgeobuf, write_geojson, write_geoparquet
+from semsig_gis.exports.hexagons import hexagons_layer
 from semsig_gis.exports.layers import (
     answer_layers,
     cells_layer,
     evaluation_layers,
-    figures_apart,
     objects_layer,
+    split_figures,
 )
 from semsig_gis.exports.rasters import cell_errors, export_field, export_geotiff
-from semsig_gis.localization import REGION_SHARE
+from semsig_gis.exports.tiles import write_pmtiles
+from semsig_gis.localization import REGION_SHARE, search_regions
 from semsig_gis.objects import open_objects
 
 if TYPE_CHECKING:
@@ -42,16 +43,14 @@ if TYPE_CHECKING:
     from semsig_gis.localization import Answer, SearchRegions
     from semsig_gis.objects import StreetObjects
 
-    Progress = Callable[[int, int], None]
-
 LAYERS = ("cells", "objects", "evaluation", "evaluation_lines", "hexagons")
-"""What may be written of a database as layers."""
+"""Layers that `export_database` writes."""
 
 RASTERS = ("ambiguity", "identifiability", "error", "field")
-"""What may be written of a database as a raster."""
+"""Rasters that `export_database` writes."""
 
 ITEM = ".json"
-"""Suffix of an item of STAC, which tells of the files of a database."""
+"""Suffix of a STAC item, which describes the files of a database."""
 
 _MANY_LAYERS = {".gpkg": geopackage.write_layers}
 _ONE_LAYER: Mapping[str, Callable[..., None]] = {
@@ -62,26 +61,26 @@ _ONE_LAYER: Mapping[str, Callable[..., None]] = {
 }
 _RASTER = frozenset({".tif", ".tiff"})
 _TILES = ".pmtiles"
-# What a file may hold of a database, the first by default.
+# Accepted layers or rasters by suffix; the first is the default.
 _CONTENT: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys((*_MANY_LAYERS, *_ONE_LAYER), LAYERS),
     _TILES: ("cells",),
     **dict.fromkeys(sorted(_RASTER), RASTERS),
 }
-# All layers of an answer, in one file.
+# Formats that hold all layers of an answer in one file.
 _ANSWER: Mapping[str, Callable[..., None]] = {
     **_MANY_LAYERS,
     ".geojson": write_answer_geojson,
     ".kml": write_answer_kml,
 }
-# What a layer or a raster is made from, beside the cells.
+# The option that a layer or a raster needs in addition to the cells.
 _NEEDS = {
     "objects": "objects",
     **dict.fromkeys(("evaluation", "evaluation_lines", "error", "field"), "evaluation"),
     "identifiability": "identifiability",
     "hexagons": "resolution",
 }
-# What is told in a layer where it is given.
+# Options that a layer or a raster uses where they are given.
 _USES = {"cells": {"geometry"}, "field": {"smoothing"}, "hexagons": {"objects", "evaluation"}}
 
 
@@ -96,9 +95,9 @@ def export_database(
     geometry: CellGeometry | None = None,
     smooth: float | None = None,
     h3: int | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write a database, and what else there is of the city, in the format of the file's suffix.
+    """Write a database and other layers of its city, in the format of the file's suffix.
 
     Parameters
     ----------
@@ -106,71 +105,70 @@ def export_database(
         The cells.
     path : str or Path
         File to write: ``.gpkg``, ``.parquet``, ``.fgb``, ``.geojson``, ``.csv``, ``.pmtiles`` or
-        ``.tif``; it appears whole, by rename.
+        ``.tif``; a failure leaves an older file unchanged.
     layers : str or sequence of str, optional
-        What the file holds: some of `LAYERS` in a GeoPackage, by default all that is given; the
-        cells in PMTiles; one of `RASTERS` in a GeoTIFF; one of `LAYERS` in the others, by default
-        the hexagons if `h3` is given, else the first.
+        Content of the file: some of `LAYERS` in a GeoPackage (default: all that the other arguments
+        allow), ``cells`` in PMTiles, one of `RASTERS` in a GeoTIFF, one of `LAYERS` in other
+        formats (default: the hexagons if `h3` is given, else the cells).
     objects : StreetObjects, optional
         The objects that the cells see.
     identifiability : Identifiability, optional
-        What is known of the cells before any query.
+        Chances of the cells to be found, for additional columns or the raster.
     evaluation : Evaluation, optional
-        Queries and what was found for them.
+        Queries and their results.
     geometry : {"polygon", "point"}, optional
         Whether a cell is its square or its viewpoint; by default the square, in CSV the viewpoint.
     smooth : float, optional
-        How far away a query counts in the raster ``field``, in metres (see
-        `evaluation.field.error_field`).
+        Radius of the raster ``field`` in metres (see `evaluation.error_field`).
     h3 : int, optional
         Resolution of the layer ``hexagons``, from 0 to 15 (the finest; 9 is a block of houses).
     progress : callable, optional
-        Called with the number of rows written and in all.
+        Called with the numbers of rows written and in total.
 
     Raises
     ------
     EmptyResultError
         If there is no cell or no object.
     InputError
-        If the suffix is another, the file holds fewer layers than are named, a layer needs what
-        was not given, what was given is in no layer, the identifiability is that of other cells,
-        the evaluation is that of another database, the objects are in another CRS, or the file
-        is open in another program or cannot be written.
+        If the suffix is not supported, several layers are given for a format of one layer, a layer
+        needs an argument that is missing, no layer uses an argument, the identifiability or the
+        evaluation is of another database, the objects are in another CRS, or the file is open in
+        another program or cannot be written.
     UnknownNameError
-        If there is no such layer or geometry.
+        If a layer or the geometry is unknown.
 
     Notes
     -----
     Layer ``cells``, in the CRS of the database: ``cell_id``, ``x`` and ``y`` (viewpoint, metres),
     ``length`` (objects seen), ``types`` (symbols), ``bearings`` (degrees to 0.01), ``levels``
     (angle levels) and ``distances`` (metres to 0.01), each of these four clockwise from north and
-    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (cells with the
-    same types or angle levels, 1 where the cell is alone); and, where given, the columns of
-    `evaluation.identify.result.Identifiability.table`. `read_geopackage` gives the database back.
+    the numbers separated by spaces; ``type_group_size`` and ``angle_group_size`` (number of cells
+    with the same types or angle levels, including this cell); and, where given, the columns of
+    `Identifiability.table`. `read_geopackage` reads the database back.
 
     Layer ``objects``, in the CRS of the objects: ``class_code``, ``symbol``, ``class_name``,
     ``title``, ``source``, ``source_id``, ``merged`` where sources were merged, and ``count``.
 
-    Layers ``evaluation``, the queries at their true places, and ``evaluation_lines``, from there
-    to the best place where that is another one: the columns of `Evaluation.queries` and
-    ``outcome``: ``successful`` (the best place is within 50 m with a probability of 0.5 or more)
-    or ``failed``. In a GeoPackage, the columns ``p0``, ``p5``, ..., ``near1``, ... stand in a table
-    of their own, ``evaluation_figures``, by ``seed`` and ``number``.
+    Layers ``evaluation`` (queries at their true places) and ``evaluation_lines`` (from the true to
+    a different best place): the columns of `Evaluation.queries` and ``outcome``: ``successful``
+    (the best place is within 50 m with a probability of 0.5 or more) or ``failed``. A GeoPackage
+    has the columns ``p0``, ``p5``, ..., ``near1``, ... in the separate table
+    ``evaluation_figures``, by ``seed`` and ``number``.
 
-    Layer ``hexagons``, those of H3 that hold a cell, an object or a query: ``h3`` (index),
+    Layer ``hexagons``, the H3 cells that contain a cell, an object or a query: ``h3`` (index),
     ``cells`` (their number), ``mean_length`` (objects seen from the mean cell), ``ambiguous``
-    (share of the cells that look like another one, by types), ``type_group_size`` (median), and,
+    (share of the cells with the types of another cell), ``type_group_size`` (median), and,
     where given, ``chance_found`` (mean), ``objects`` and ``queries`` (their numbers) and ``found``
     (share of the queries that are ``successful``).
 
-    PMTiles hold the layer ``cells`` from the zoom at which a cell is four pixels wide, and farther
-    out the layer ``squares`` with the same columns as ``hexagons``, but for the index, the objects
+    PMTiles hold the layer ``cells`` from the zoom at which a cell is four pixels wide, and at lower
+    zooms the layer ``squares`` with the columns of ``hexagons`` except the index, the objects
     and the queries. GeoJSON has longitude and latitude (WGS 84). The specs and the licences are in
-    the metadata of every format but CSV.
+    the metadata of every format except CSV.
 
-    Raster ``field``: what became of the queries around every place, in three bands: ``failed`` (the
-    share that failed), ``error`` (their mean error in metres) and ``queries`` (how many speak). A
-    file beside a raster that ends in ``.qml`` has QGIS draw it as on the maps.
+    Raster ``field``, from the queries around every place, in three bands: ``failed`` (the share
+    that failed), ``error`` (their mean error in metres) and ``queries`` (their weighted number). A
+    style file ``.qml`` in the same folder makes QGIS draw a raster as on the maps.
 
     Examples
     --------
@@ -197,19 +195,17 @@ def export_database(
         path,
         [layers] if isinstance(layers, str) else layers,
         suffix=suffix,
-        given={name for name, value in options.items() if value is not None},
+        options={name for name, value in options.items() if value is not None},
     )
-    _require_one_city(path, database, objects, evaluation)
+    _require_same_city(path, database, objects, evaluation)
     if names == ["field"] and evaluation is not None:
         export_field(error_field(evaluation, database, radius=smooth), database, path)
         return
     if suffix in _RASTER:
-        values, unit = _numbers(names[0], database, identifiability, evaluation)
+        values, unit = _raster_values(names[0], database, identifiability, evaluation)
         export_geotiff(database, values, path, name=names[0], unit=unit)
         return
     if suffix == _TILES:
-        from semsig_gis.exports.tiles import write_pmtiles  # noqa: PLC0415 - where it is used
-
         write_pmtiles(database, path, identifiability=identifiability, progress=progress)
         return
     by_name: dict[str, Layer] = {}
@@ -219,30 +215,28 @@ def export_database(
     if objects is not None:
         by_name["objects"] = objects_layer(objects)
     if evaluation is not None:
-        by_name |= {one.name: one for one in evaluation_layers(evaluation, database)}
+        by_name |= {layer.name: layer for layer in evaluation_layers(evaluation, database)}
     if h3 is not None:
-        from semsig_gis.exports.hexagons import hexagons_layer  # noqa: PLC0415 - where it is used
-
         by_name["hexagons"] = hexagons_layer(
             database, h3, objects=objects, identifiability=identifiability, evaluation=evaluation
         )
-    written = [by_name[name] for name in names]
+    content = [by_name[name] for name in names]
     if suffix == ".gpkg" and "evaluation" in names:
-        written[names.index("evaluation")], figures = figures_apart(by_name["evaluation"])
-        written.append(figures)
+        content[names.index("evaluation")], figures = split_figures(by_name["evaluation"])
+        content.append(figures)
     if suffix in _MANY_LAYERS:
-        _MANY_LAYERS[suffix](written, path, progress=progress)
+        _MANY_LAYERS[suffix](content, path, progress=progress)
     else:
-        _ONE_LAYER[suffix](written[0], path, progress=progress)
+        _ONE_LAYER[suffix](content[0], path, progress=progress)
 
 
-def _numbers(
+def _raster_values(
     name: str,
     database: SignatureDatabase,
     identifiability: Identifiability | None,
     evaluation: Evaluation | None,
 ) -> tuple[NDArray[np.float64], str]:
-    """Return the numbers of the cells in a raster, and their unit."""
+    """Return the values of the cells in a raster, and their unit."""
     if name == "error" and evaluation is not None:
         return cell_errors(evaluation, database), "m"
     if name == "identifiability" and identifiability is not None:
@@ -250,13 +244,13 @@ def _numbers(
     return database.type_group_sizes.astype(np.float64), "cells"
 
 
-def _require_one_city(
+def _require_same_city(
     path: str | Path,
     database: SignatureDatabase,
     objects: StreetObjects | None,
     evaluation: Evaluation | None,
 ) -> None:
-    """Refuse what is empty, and what is of another city."""
+    """Raise if cells or objects are empty, or objects or the evaluation are of another city."""
     if len(database) == 0 or (objects is not None and len(objects) == 0):
         what = "object" if len(database) else "cell"
         raise EmptyResultError(f"there is no {what} to write to {path}; give at least one.")
@@ -271,8 +265,13 @@ def _require_one_city(
         evaluation.rows_in(database)
 
 
-def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[str]) -> list[str]:
-    """Return what a file holds, and refuse what lacks its data, or data that it would not hold."""
+def _content(
+    path: str | Path, names: Sequence[str], *, suffix: str, options: set[str]
+) -> list[str]:
+    """Return the names of the layers or the raster to write.
+
+    Raise if a name is not accepted or lacks an option, or if nothing uses one of `options`.
+    """
     accepted = _CONTENT[suffix]
     for name in names:
         if name not in accepted:
@@ -286,8 +285,8 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
             f"{path} can contain only one layer, but {' and '.join(names)} were given; give one of "
             "them, or write a GeoPackage."
         )
-    possible = [name for name in accepted if _NEEDS.get(name) in {None, *given}]
-    # Who gives the resolution of hexagons wants them.
+    possible = [name for name in accepted if _NEEDS.get(name) in {None, *options}]
+    # A resolution of hexagons makes them the default of a format of one layer.
     default = [name for name in accepted if _NEEDS.get(name) == "resolution" and name in possible]
     content = list(dict.fromkeys(names)) or (possible if many else [*default, accepted[0]][:1])
     for name in content:
@@ -295,11 +294,11 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
             raise InputError(
                 f"layer {name!r} was chosen for {path} with no {_NEEDS[name]}; give that as well."
             )
-    # Identifiability is part of a database, wherever it is not asked for.
+    # Identifiability is a property of the database, so it never counts as unused.
     used = {"identifiability", *(_NEEDS[name] for name in content if name in _NEEDS)}
     used.update(*(_USES.get(name, ()) for name in content))
     used -= {"geometry"} if suffix == _TILES else set()
-    unused = sorted(given - used)
+    unused = sorted(options - used)
     if unused:
         raise InputError(
             f"{path} contains only the {' and '.join(content)}, not the {' or '.join(unused)}; "
@@ -311,15 +310,15 @@ def _content(path: str | Path, names: Sequence[str], *, suffix: str, given: set[
 def export_item(
     database: str | Path, path: str | Path, *, objects: str | Path | None = None
 ) -> None:
-    """Write what a database is as an item of a SpatioTemporal Asset Catalog (STAC 1.1).
+    """Write the description of a database as an item of a SpatioTemporal Asset Catalog (STAC 1.1).
 
     Parameters
     ----------
     database : str or Path
         File of the database, or folder of its parts.
     path : str or Path
-        File to write, ``.json``; it appears whole, by rename. It names the files of the database
-        by where they are from there.
+        File to write, ``.json``; a failure leaves an older file unchanged. Paths in it are relative
+        to its folder.
     objects : str or Path, optional
         File of the objects that the cells see.
 
@@ -330,14 +329,14 @@ def export_item(
     EmptyResultError
         If there is no cell or no object.
     InputError
-        If the suffix is another, pystac is not installed, the objects are those of another city,
-        or the file cannot be written.
+        If the suffix is not ``.json``, pystac is not installed, the objects are of another city, or
+        the file cannot be written.
 
     Notes
     -----
     The item has the extent, the CRS and the grid (extension ``projection``), the licences, and the
-    files as assets, with their sizes and checksums (extension ``file``). Its date is when the
-    database was written. The names of the specs begin with ``semsig:``.
+    files as assets, with their sizes and checksums (extension ``file``). Its date is the time at
+    which the database was written. The names of the specs begin with ``semsig:``.
 
     Examples
     --------
@@ -354,10 +353,10 @@ def export_item(
     """
     _suffix(path, {ITEM})
     with extra("stac", "a STAC item"):
-        from semsig_gis.exports.stac import write_item  # noqa: PLC0415 - an extra
+        from semsig_gis.exports.stac import write_item  # noqa: PLC0415 - pystac is an extra
     city = open_city(database)
     if objects is not None:
-        _require_one_city(path, city.database, open_objects(objects), None)
+        _require_same_city(path, city.database, open_objects(objects), None)
     write_item(city, path, objects=objects)
 
 
@@ -378,23 +377,23 @@ def export_answer(
     database : SignatureDatabase
         The database that was searched.
     path : str or Path
-        File to write: ``.gpkg`` holds the regions to search, the candidates and, of the likelihood
-        method, the place, as do ``.geojson`` and ``.kml`` in degrees (WGS 84); ``.parquet``,
-        ``.fgb`` and ``.csv`` hold the regions, ``.tif`` the chance of every cell, of the likelihood
-        method only.
+        File to write: ``.gpkg``, and in degrees (WGS 84) ``.geojson`` and ``.kml``, hold the
+        regions to search, the candidates and, with the likelihood method, the place; ``.parquet``,
+        ``.fgb`` and ``.csv`` hold the regions; ``.tif`` holds the chance of every cell, with the
+        likelihood method only.
     share, within : float, optional
-        Which cells the regions hold (see `exports.regions.search_regions`).
+        Extent of the regions (see `localization.search_regions`).
 
     Returns
     -------
     SearchRegions
-        What must be searched.
+        The regions to search.
 
     Raises
     ------
     InputError
-        If the suffix is another, a number is out of range, the answer has no chances or is from
-        another database, or the file cannot be written.
+        If the suffix is not supported, a number is out of range, the answer has no chances or is
+        from another database, or the file cannot be written.
 
     Examples
     --------
@@ -411,8 +410,6 @@ def export_answer(
             f"{path} would contain the chance of every cell, which this method does not compute; "
             "use the likelihood method, or write a GeoPackage."
         )
-    from semsig_gis.localization import search_regions  # noqa: PLC0415 - only where it is used
-
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:
         facts = answer.to_dict()
@@ -426,10 +423,10 @@ def export_answer(
 
 
 def _suffix(path: str | Path, accepted: Collection[str]) -> str:
-    """Return the suffix of a file, in lower case, if it is one of some."""
+    """Return the suffix of a file in lower case; raise if it is not accepted."""
     suffix = Path(path).suffix.lower()
     if suffix not in accepted:
-        # One of each format.
+        # The message lists one suffix for each format.
         *names, last = [name for name in accepted if name != ".tiff"]
         listed = f"{', '.join(names)} or {last}" if names else last
         raise InputError(

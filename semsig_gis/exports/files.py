@@ -1,8 +1,8 @@
-"""One layer a file: GeoParquet, FlatGeobuf, GeoJSON, GeoTIFF, and CSV safe in a spreadsheet.
+"""Write one layer to one file: GeoParquet, FlatGeobuf, GeoJSON, and CSV without formulas.
 
-Spreadsheets run a cell that begins with ``=``, ``+``, ``-``, ``@``, a tab or a line end as a
-formula. A text from open data may begin so, or have such a part after a sign that the spreadsheet
-of another country takes for the end of a cell. An apostrophe before it keeps it text.
+A spreadsheet executes a cell that begins with ``=``, ``+``, ``-``, ``@``, a tab or a line end as a
+formula. A text from open data may begin so, or may contain such a part after a character that is
+the column separator in another country. An apostrophe before that part prevents it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import contextlib
 import itertools
 import json
 import re
+import sqlite3
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -32,14 +33,14 @@ from semsig_gis.storage import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping
     from pathlib import Path
 
-    from semsig_gis.exports.layers import Layer
+    from semsig_gis.exports.layers import Layer, Progress
 
 
-# What may end a cell, and what may begin a formula; the wide signs of Chinese and Japanese
-# keyboards count in some spreadsheets.
+# Characters that may end a cell, and that may begin a formula. Some spreadsheets accept the
+# full-width signs of Chinese and Japanese keyboards.
 _END = '[;,|"\t\r\n]'
 _BEGIN = "[=+\\-@'\t\r\n\uff1d\uff0b\uff0d\uff20]"
 _RISK = re.compile(f"(?:^|(?<={_END}))(?={_BEGIN})")
@@ -47,44 +48,45 @@ _MARK = re.compile(f"(?:^|(?<={_END}))'")
 
 
 def formula_safe(text: str) -> str:
-    """Return text that no spreadsheet takes for a formula; `as_written` undoes it.
+    """Return text that no spreadsheet takes for a formula; `as_written` reverses it.
 
-    An apostrophe is put before risky parts, and before apostrophes that stand at such places.
+    An apostrophe is inserted before each risky part, and before an apostrophe at such a place.
     """
     return _RISK.sub("'", text)
 
 
 def as_written(text: str) -> str:
-    """Return the text that `formula_safe` made safe, without its apostrophes."""
+    """Return the original of a text that `formula_safe` returned."""
     return _MARK.sub("", text)
 
 
-def write_csv(
-    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
-) -> None:
-    """Write a layer as one CSV file, which appears whole, by rename.
+def write_csv(layer: Layer, path: str | Path, *, progress: Progress = None) -> None:
+    """Write a layer as one CSV file, atomically.
 
-    UTF-8 with commas; texts stand in quotes and are `formula_safe`, what is missing is empty. A
-    point is ``x`` and ``y``, another geometry ``WKT``, in the CRS of the layer.
+    UTF-8 with commas. Texts are quoted and `formula_safe`, null is empty. A point is ``x`` and
+    ``y``, another geometry is ``WKT``, in the CRS of the layer.
     """
     with whole_file(path) as partial, partial.open("wb") as file:
         writer = None
         for block in layer.blocks(progress):
-            table = _plain(block, layer.geometry)
+            table = _csv_table(block, layer.geometry)
             writer = writer or csv.CSVWriter(file, table.schema)
             writer.write_table(table)
         if writer is not None:
             writer.close()
 
 
-def _plain(block: pa.Table, geometry: str) -> pa.Table:
-    """Return a block without what CSV cannot hold."""
+def _csv_table(block: pa.Table, geometry: str) -> pa.Table:
+    """Return a block with safe texts, and coordinates or WKT in place of the geometry."""
     shapes = shapely.from_wkb(block[GEOMETRY].to_numpy(zero_copy_only=False))
-    columns = {
-        name: _safe(block[name]) if pa.types.is_string(block[name].type) else block[name]
-        for name in block.column_names
-        if name != GEOMETRY
-    }
+    columns = {name: block[name] for name in block.column_names if name != GEOMETRY}
+    for name, values in columns.items():
+        risky = f"(^|{_END}){_BEGIN}"
+        if pa.types.is_string(values.type) and (
+            pc.any(pc.match_substring_regex(values, risky)).as_py()
+        ):
+            texts = [None if text is None else formula_safe(text) for text in values.to_pylist()]
+            columns[name] = pa.chunked_array([pa.array(texts, pa.string())])
     if geometry == "point":
         x, y = shapely.get_coordinates(shapes).T
         columns |= {"x": pa.array(x), "y": pa.array(y)}
@@ -93,17 +95,8 @@ def _plain(block: pa.Table, geometry: str) -> pa.Table:
     return pa.table(columns)
 
 
-def _safe(texts: pa.ChunkedArray) -> pa.ChunkedArray:
-    if not pc.any(pc.match_substring_regex(texts, f"(^|{_END}){_BEGIN}")).as_py():
-        return texts
-    safe = [None if text is None else formula_safe(text) for text in texts.to_pylist()]
-    return pa.chunked_array([pa.array(safe, pa.string())])
-
-
-def write_geoparquet(
-    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
-) -> None:
-    """Write a layer as one GeoParquet 1.1 file, which appears whole, by rename.
+def write_geoparquet(layer: Layer, path: str | Path, *, progress: Progress = None) -> None:
+    """Write a layer as one GeoParquet 1.1 file, atomically.
 
     The column ``bbox`` holds the bounds of every row as float32, rounded outwards. The metadata key
     ``semsig`` holds the specs, the classes and the licences as JSON.
@@ -124,38 +117,31 @@ def write_geoparquet(
     write_geoparquet_blocks(blocks(), path, geo=geo, specs=specs)
 
 
-def write_flatgeobuf(
-    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
-) -> None:
-    """Write a layer as one FlatGeobuf with a spatial index, which appears whole, by rename.
+def write_flatgeobuf(layer: Layer, path: str | Path, *, progress: Progress = None) -> None:
+    """Write a layer as one FlatGeobuf with a spatial index, atomically.
 
     Its metadata hold the specs, the classes and the licences as JSON, by name.
     """
-    notes = {
-        name: json.dumps(value, allow_nan=False)
-        for name, value in {**layer.facts, **layer.credits}.items()
-    }
-    options = {"TITLE": layer.title, "DESCRIPTION": _described(layer)}
+    options = {"TITLE": layer.title, "DESCRIPTION": layer.abstract}
+    metadata = layer.metadata_texts
     _write_features(
-        layer, path, "FlatGeobuf", progress, layer_metadata=notes, layer_options=options
+        layer, path, "FlatGeobuf", progress, layer_metadata=metadata, layer_options=options
     )
 
 
-def write_geojson(
-    layer: Layer, path: str | Path, *, progress: Callable[[int, int], None] | None = None
-) -> None:
-    """Write a layer as one GeoJSON of RFC 7946, which appears whole, by rename.
+def write_geojson(layer: Layer, path: str | Path, *, progress: Progress = None) -> None:
+    """Write a layer as one GeoJSON (RFC 7946), atomically.
 
     Coordinates are longitude and latitude (WGS 84) to a centimetre. The member ``semsig`` holds the
     specs, the classes and the licences.
     """
-    options = geojson_options(_described(layer), {**layer.facts, **layer.credits})
+    options = geojson_options(layer.abstract, layer.metadata)
     _write_features(layer, path, "GeoJSON", progress, layer_options=options)
 
 
-def geojson_options(description: str, about: Mapping[str, Any]) -> dict[str, str]:
-    """Return with which options GDAL writes GeoJSON of RFC 7946 that tells what it is."""
-    native = {"type": "FeatureCollection", "semsig": about}
+def geojson_options(description: str, metadata: Mapping[str, Any]) -> dict[str, str]:
+    """Return options of GDAL for GeoJSON of RFC 7946 with metadata in the member ``semsig``."""
+    native = {"type": "FeatureCollection", "semsig": metadata}
     return {
         "RFC7946": "YES",
         "DESCRIPTION": description,
@@ -164,19 +150,15 @@ def geojson_options(description: str, about: Mapping[str, Any]) -> dict[str, str
     }
 
 
-def _described(layer: Layer) -> str:
-    return "\n".join([layer.description, *layer.licenses])
-
-
 def _write_features(
     layer: Layer,
     path: str | Path,
     driver: str,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress,
     **options: Any,  # noqa: ANN401 - as pyogrio has
 ) -> None:
-    """Write a layer block by block by one of GDAL's drivers, whole."""
-    with whole_file(path) as partial, whole_by_gdal(path):
+    """Write a layer block by block with a driver of GDAL, then check the number of rows."""
+    with whole_file(path) as partial, write_errors(path):
         pyogrio.write_arrow(
             feature_stream(layer, progress),
             partial,
@@ -192,28 +174,24 @@ def _write_features(
 
 
 def feature_stream(
-    layer: Layer,
-    progress: Callable[[int, int], None] | None = None,
-    *,
-    without: Collection[str] = (),
+    layer: Layer, progress: Progress = None, *, without: Collection[str] = ()
 ) -> pa.RecordBatchReader:
-    """Return the rows of a layer as a stream, without some of the columns."""
+    """Return the rows of a layer as a stream, without the columns in `without`."""
     blocks = (
         block.drop_columns([name for name in block.column_names if name in without])
         for block in layer.blocks(progress)
     )
     first = next(blocks)
-    every = itertools.chain([first], blocks)
-    batches = (batch for block in every for batch in block.to_batches())
+    batches = (batch for block in itertools.chain([first], blocks) for batch in block.to_batches())
     return pa.RecordBatchReader.from_batches(first.schema, batches)
 
 
 @contextlib.contextmanager
-def whole_by_gdal(path: str | Path) -> Iterator[None]:
-    """Tell in one sentence of a file that GDAL could not write; its own words are the cause."""
+def write_errors(path: str | Path) -> Iterator[None]:
+    """Raise an error of GDAL or SQLite as a one-sentence `InputError` with it as the cause."""
     try:
         yield
-    except (DataSourceError, DataLayerError, FeatureError) as error:
+    except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
         raise InputError(
             f"{path} could not be written whole, so what was there before is unchanged; free "
             "some space or choose another folder."

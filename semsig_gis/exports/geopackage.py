@@ -1,10 +1,9 @@
-"""GeoPackages: cells, street objects, an evaluation and an answer as layers that QGIS colours."""
+"""Write GeoPackages of several layers with styles for QGIS, and read the cells back."""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
-import json
 import os
 import sqlite3
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyogrio
-from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+from pyogrio.errors import DataLayerError, DataSourceError
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
@@ -36,6 +35,7 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import database_of
 from semsig_gis.evaluation import identifiability_of
+from semsig_gis.exports.files import write_errors
 from semsig_gis.exports.layers import GEOMETRY_TYPES
 from semsig_gis.exports.project import layer_style, project_archive, shown_layers
 from semsig_gis.exports.styles import Style
@@ -43,26 +43,26 @@ from semsig_gis.objects import objects_of
 from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import DTypeLike
 
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Identifiability
-    from semsig_gis.exports.layers import Layer
+    from semsig_gis.exports.layers import Layer, Progress
     from semsig_gis.objects import StreetObjects
 
 
 CELLS, OBJECTS = "cells", "objects"
 CELL_COLUMNS = ("cell_id", "types", "bearings", "distances")
 OBJECT_COLUMNS = (CLASS_CODE, SOURCE, SOURCE_ID, COUNT, MERGED)
-# How the columns of `Identifiability.table` begin.
+# Prefixes of the columns of `Identifiability.table`.
 IDENTIFIABILITY_COLUMNS = ("chance_", "bits_", "lookalike_", "gain_")
 ROWS_A_BATCH = 1 << 16
 
 PROJECT_NAME = "semsig"
 VERSION = "1.2"  # the newest that QGIS 3.22 opens without a warning
-# As QGIS makes it, but for the dates, which it leaves to the rules of GeoPackages.
+# The table of styles as QGIS creates it, except that its dates follow the GeoPackage standard.
 STYLES = """
 CREATE TABLE layer_styles (
   id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
@@ -80,7 +80,7 @@ INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geome
 SELECT '', '', table_name, coalesce(column_name, ''), ?, ?, '', ?, ?, ''
 FROM gpkg_contents LEFT JOIN gpkg_geometry_columns USING (table_name) WHERE table_name = ?
 """
-# What fields are called, as the schema extension of GeoPackages has it.
+# The tables of field names and descriptions, from the schema extension of GeoPackages.
 FIELDS = """
 CREATE TABLE gpkg_data_columns (
   table_name TEXT NOT NULL, column_name TEXT NOT NULL, name TEXT, title TEXT, description TEXT,
@@ -101,7 +101,7 @@ FIELD = """
 INSERT INTO gpkg_data_columns (table_name, column_name, name, title, description)
 VALUES (?, ?, ?, ?, ?)
 """
-# As QGIS makes it; the content is a .qgz file in hexadecimal digits.
+# The table of projects as QGIS creates it; the content is a .qgz file in hexadecimal digits.
 PROJECTS = "CREATE TABLE qgis_projects (name TEXT PRIMARY KEY, metadata BLOB, content BLOB)"
 PROJECT = """
 INSERT INTO qgis_projects VALUES (?, json_object('last_modified_time',
@@ -111,18 +111,18 @@ INSERT INTO qgis_projects VALUES (?, json_object('last_modified_time',
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class GeopackageContents(Displayed):
-    """What a GeoPackage holds of a city.
+    """Contents of a GeoPackage of a city.
 
     Parameters
     ----------
     database : SignatureDatabase
         The cells.
     objects : StreetObjects or None
-        Where they were exported too.
+        The objects, if they were exported.
     identifiability : Identifiability or None
-        Where that was exported too and still fits.
+        The identifiability, if it was exported and its cells have not been changed.
     notes : tuple of str
-        What was left out, and why, a sentence each.
+        Omitted contents and the reasons, one sentence each.
 
     Examples
     --------
@@ -156,17 +156,17 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     Parameters
     ----------
     path : str or Path
-        File that `exports.export_database` wrote.
+        File that `export_database` wrote.
 
     Returns
     -------
     GeopackageContents
-        The database, and what was exported with it, as they were.
+        The database, and the objects and the identifiability that were exported with it.
 
     Raises
     ------
     DatabaseError
-        If the file is missing, damaged, or holds something else.
+        If the file is missing, damaged, or has other contents.
 
     Examples
     --------
@@ -178,7 +178,7 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     >>> bool((again.bearing_units == demo_database.bearing_units).all())
     True
     """
-    if not os.path.isfile(path):  # noqa: PTH113 - it answers where Path.is_file raises
+    if not os.path.isfile(path):  # noqa: PTH113 - it returns False where Path.is_file raises
         what = "is a folder" if os.path.isdir(path) else "does not exist"  # noqa: PTH112
         raise DatabaseError(f"{path} {what}; give a GeoPackage that semsig export wrote.")
     notes: list[str] = []
@@ -188,10 +188,11 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
             raise DatabaseError(
                 f"{path} has no layer {CELLS!r}; give a GeoPackage with the cells of a database."
             )
-        specs, crs, fields = _facts(path, CELLS)
-        more = [name for name in fields if name.startswith(IDENTIFIABILITY_COLUMNS)]
-        columns = [*CELL_COLUMNS, *(more if specs["identifiability"] else [])]
-        cells = _read(path, CELLS, columns).sort_by("cell_id")
+        specs, crs, fields = _read_specs(path, CELLS)
+        chances = [name for name in fields if name.startswith(IDENTIFIABILITY_COLUMNS)]
+        columns = [*CELL_COLUMNS, *(chances if specs["identifiability"] else [])]
+        cells = _read_columns(path, CELLS, columns).sort_by("cell_id")
+        # Degrees and metres become the integer units of a database again.
         reach = Taxonomy.from_list(specs["taxonomy"]).ranges(specs["signature"]["radius"]).max()
         signatures = pa.table(
             {
@@ -206,11 +207,11 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
         if specs["identifiability"]:
             try:
                 identifiability = identifiability_of(
-                    database, cells.select(more), specs["identifiability"], path
+                    database, cells.select(chances), specs["identifiability"], path
                 )
             except DatabaseError as error:
                 notes.append(str(error))
-        objects = _objects(path) if OBJECTS in names else None
+        objects = _read_objects(path) if OBJECTS in names else None
     except (
         *(DataSourceError, DataLayerError, CRSError, pa.ArrowException),
         *(OSError, ValueError, LookupError, TypeError),
@@ -223,35 +224,32 @@ def read_geopackage(path: str | Path) -> GeopackageContents:
     )
 
 
-def _objects(path: str | Path) -> StreetObjects:
-    specs, crs, fields = _facts(path, OBJECTS)
-    table = _read(path, OBJECTS, [name for name in OBJECT_COLUMNS if name in fields])
-    kinds = {CLASS_CODE: pa.uint8(), COUNT: pa.int32()}
-    columns = {
-        name: table[name].cast(kinds[name]) if name in kinds else table[name]
-        for name in table.column_names
-    }
-    # What was drawn in QGIS tells neither its source nor how often it was listed.
-    unknown: dict[str, str | int] = {SOURCE: "", SOURCE_ID: "", COUNT: 1}
-    columns |= {name: pc.fill_null(columns[name], value) for name, value in unknown.items()}
+def _read_objects(path: str | Path) -> StreetObjects:
+    specs, crs, fields = _read_specs(path, OBJECTS)
+    table = _read_columns(path, OBJECTS, [name for name in OBJECT_COLUMNS if name in fields])
+    columns = {name: table[name] for name in table.column_names}
+    columns[CLASS_CODE] = columns[CLASS_CODE].cast(pa.uint8())
+    # Features added in QGIS have no source and no count.
+    columns[COUNT] = pc.fill_null(columns[COUNT].cast(pa.int32()), 1)
+    columns |= {name: pc.fill_null(columns[name], "") for name in (SOURCE, SOURCE_ID)}
     if pc.min(columns[COUNT]).as_py() < 1:
-        raise ValueError("an object stands for fewer than one")
+        raise ValueError("a count of objects is below 1")
     return objects_of(pa.table(columns), specs, crs, path=path)
 
 
-def _facts(path: str | Path, layer: str) -> tuple[dict[str, Any], CRS, list[str]]:
+def _read_specs(path: str | Path, layer: str) -> tuple[dict[str, Any], CRS, list[str]]:
     """Return the specs of a layer, its CRS and the names of its fields."""
     info = pyogrio.read_info(path, layer=layer)
     metadata = info["layer_metadata"] or {}
-    # GDAL's own are in capital letters.
+    # GDAL adds entries with names in capital letters.
     specs = {
         name: parse_json(text, finite=True) for name, text in metadata.items() if name.islower()
     }
     return specs, CRS.from_user_input(specs.pop("crs")), list(info["fields"])
 
 
-def _read(path: str | Path, layer: str, columns: list[str]) -> pa.Table:
-    """Return columns of a layer, and its geometry if it is that of objects."""
+def _read_columns(path: str | Path, layer: str, columns: list[str]) -> pa.Table:
+    """Return columns of a layer; for objects, also the geometry."""
     with pyogrio.open_arrow(
         path,
         layer=layer,
@@ -259,15 +257,15 @@ def _read(path: str | Path, layer: str, columns: list[str]) -> pa.Table:
         read_geometry=layer == OBJECTS,
         batch_size=ROWS_A_BATCH,
         use_pyarrow=True,
-    ) as (facts, reader):
+    ) as (metadata, reader):
         table = reader.read_all()
     return table.rename_columns(
-        [GEOMETRY if name == facts["geometry_name"] else name for name in table.column_names]
+        [GEOMETRY if name == metadata["geometry_name"] else name for name in table.column_names]
     )
 
 
 def _units(texts: pa.ChunkedArray, units: float, kind: DTypeLike) -> pa.ChunkedArray:
-    """Return numbers that stand in texts as lists of whole units."""
+    """Parse numbers separated by spaces; return a list of whole units for each text."""
     lists = []
     for chunk in texts.chunks:
         parts = pc.split_pattern(chunk, " ")
@@ -280,54 +278,38 @@ def _units(texts: pa.ChunkedArray, units: float, kind: DTypeLike) -> pa.ChunkedA
     return pa.chunked_array(lists)
 
 
-def write_layers(
-    layers: Sequence[Layer],
-    path: str | Path,
-    *,
-    progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Write at least one layer as one GeoPackage 1.2, which appears whole, by rename.
+def write_layers(layers: Sequence[Layer], path: str | Path, *, progress: Progress = None) -> None:
+    """Write at least one layer as one GeoPackage 1.2, atomically.
 
     The table ``layer_styles`` holds the styles of QGIS; the metadata of each layer hold the specs,
-    the classes and the licences as JSON. The rows are written in blocks, so that memory stays flat.
+    the classes and the licences as JSON. The rows are written in blocks to limit the memory.
     Raises `InputError` if the file is open in another program.
     """
     target = Path(path)
     _require_closed(target)
     rows = sum(layer.rows for layer in layers)
     with whole_file(target) as partial:
-        try:
+        with write_errors(target):
             blocks = (_write_layer(layer, partial) for layer in layers)
-            for done in itertools.accumulate(itertools.chain.from_iterable(blocks)):
+            for written in itertools.accumulate(itertools.chain.from_iterable(blocks)):
                 if progress is not None:
-                    progress(done, rows)
-            _add_looks(layers, partial, target.name)
+                    progress(written, rows)
+            _write_styles(layers, partial, target.name)
             _check_indexes(layers, partial)
-        except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:
-            # GDAL's own words are pages of SQL; they stay with the cause.
-            raise InputError(
-                f"{target} could not be written whole, so what was there before is unchanged; "
-                "free some space or choose another folder."
-            ) from error
+        # Another program may have opened the old file in the meantime.
         _require_closed(target)
 
 
 def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
     """Write one layer block by block, and yield the number of rows of each block."""
     code = layer.crs.to_epsg()
-    # Of the layer and not of the file: for that, GDAL leaves a copy beside the file whenever the
-    # file is read.
-    once: dict[str, Any] = {
-        "layer_metadata": {
-            name: json.dumps(value, allow_nan=False)
-            for name, value in {**layer.facts, **layer.credits}.items()
-        },
-        "layer_options": {
-            "IDENTIFIER": layer.title,
-            "DESCRIPTION": "\n".join([layer.description, *layer.licenses]),
-        },
+    # The metadata belong to the layer: for metadata of the file, GDAL would write a copy into the
+    # folder whenever the file is read.
+    first: dict[str, Any] = {
+        "layer_metadata": layer.metadata_texts,
+        "layer_options": {"IDENTIFIER": layer.title, "DESCRIPTION": layer.abstract},
     }
-    about = {
+    geometry = {
         "geometry_name": GEOMETRY,
         "geometry_type": GEOMETRY_TYPES.get(layer.geometry),
         "crs": layer.crs.to_wkt() if code is None else f"EPSG:{code}",
@@ -338,30 +320,29 @@ def _write_layer(layer: Layer, path: Path) -> Iterator[int]:
             path,
             layer=layer.name,
             driver="GPKG",
-            **(about if layer.geometry in GEOMETRY_TYPES else {}),
+            **(geometry if layer.geometry in GEOMETRY_TYPES else {}),
             append=number > 0,
             dataset_options={"VERSION": VERSION},
-            **(once if number == 0 else {}),
+            **(first if number == 0 else {}),
         )
         yield len(block)
 
 
-def _add_looks(layers: Sequence[Layer], path: Path, file: str) -> None:
-    """Write how QGIS shows the layers: styles, names of fields, and a project of that file."""
-    titles = {layer.name: layer.title for layer in layers}
+def _write_styles(layers: Sequence[Layer], path: Path, file: str) -> None:
+    """Write the styles and field names of the layers for QGIS, and a project of the file `file`."""
     shown = shown_layers(layers, file)
+    by_name = {layer.key: layer for layer in shown}
     with contextlib.closing(sqlite3.connect(path)) as connection, connection:
         connection.executescript(STYLES + FIELDS + PROJECTS)
-        by_name = {layer.key: layer for layer in shown}
-        for layer in (by_name[name] for name in titles):
-            # A table without geometry has names of its fields alone.
+        for layer in (by_name[layer.name] for layer in layers):
+            # A table without geometry has only the style of its field names.
             for number, style in enumerate(layer.styles or (Style("Fields", ""),)):
                 qml = layer_style(layer, style)
                 values = (style.name, qml, number == 0, layer.title, layer.key)
                 connection.execute(STYLE, values)
             for field in layer.fields:
-                said = (field.alias, field.alias, field.about)
-                connection.execute(FIELD, (layer.key, field.name, *said))
+                row = (layer.key, field.name, field.alias, field.alias, field.about)
+                connection.execute(FIELD, row)
         archive = project_archive(layers, shown, Path(file).stem)
         connection.execute(PROJECT, (PROJECT_NAME, archive.hex()))
 
@@ -369,23 +350,25 @@ def _add_looks(layers: Sequence[Layer], path: Path, file: str) -> None:
 def _check_indexes(layers: Sequence[Layer], path: Path) -> None:
     """Check that all rows are in the spatial indexes.
 
-    They are the last to be written, when a layer is closed, and GDAL keeps quiet if that fails.
+    GDAL writes the indexes last, when it closes a layer, and reports no error if that fails.
     """
     with contextlib.closing(sqlite3.connect(path)) as connection:
-        for layer in (one for one in layers if one.geometry in GEOMETRY_TYPES):
+        for layer in layers:
+            if layer.geometry not in GEOMETRY_TYPES:
+                continue
             count = f"SELECT count(*) FROM rtree_{layer.name}_geom"  # noqa: S608 - our own names
             if connection.execute(count).fetchone()[0] != layer.rows:
                 raise sqlite3.DatabaseError("the spatial indexes are not complete")
 
 
 def _require_closed(path: Path) -> None:
-    """Refuse to replace a GeoPackage that another program has open.
+    """Raise if another program has the GeoPackage open.
 
-    Its log would be taken for that of the new file, and what it writes would be lost.
+    SQLite would apply its log to the new file, and what it writes would be lost.
     """
     real = Path(os.path.realpath(path))
     logs = [real.with_name(f"{real.name}-{kind}") for kind in ("wal", "journal")]
-    # os.path answers where Path raises.
+    # os.path returns False where Path raises.
     if any(map(os.path.exists, logs)) or (os.path.isfile(real) and _is_locked(real)):  # noqa: PTH113
         raise InputError(
             f"{path} is open in another program, such as QGIS, or was left half-written by one; "
@@ -394,12 +377,12 @@ def _require_closed(path: Path) -> None:
 
 
 def _is_locked(path: Path) -> bool:
-    """Return whether another program reads from or writes to an SQLite file just now."""
-    place = f"{path.as_uri()}?mode=rw"
+    """Return whether another program holds a lock on an SQLite file."""
+    uri = f"{path.as_uri()}?mode=rw"
     try:
-        with contextlib.closing(sqlite3.connect(place, uri=True, timeout=0)) as connection:
+        with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0)) as connection:
             connection.execute("BEGIN EXCLUSIVE").connection.rollback()
     except sqlite3.Error as error:
-        # Whatever else it is, it may be replaced.
+        # A file with any other error, such as one that is no database, may be replaced.
         return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
     return False

@@ -1,4 +1,4 @@
-"""What there is to say of the cells of an area together: hexagons of H3, and squares of cells."""
+"""Statistics of cells by area, and the layer of H3 hexagons with them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pyproj import Transformer
 
 from semsig_gis.core import InputError
 from semsig_gis.database import database_specs
-from semsig_gis.exports.layers import table_layer
+from semsig_gis.exports.layers import group_means, table_layer
 from semsig_gis.exports.styles import AMBIGUITY, IDENTIFIABILITY, by_amount
 
 if TYPE_CHECKING:
@@ -35,10 +35,10 @@ def hexagons_layer(
     identifiability: Identifiability | None = None,
     evaluation: Evaluation | None = None,
 ) -> Layer:
-    """Return the hexagons of H3 with a cell, an object or a query in them, in the database's CRS.
+    """Return the layer of H3 hexagons that contain a cell, object or query, in the database's CRS.
 
-    ``h3`` is the index; beside the columns of `summary`, ``objects`` counts the street objects,
-    ``queries`` those of the evaluation and ``found`` is the share of these that succeeded.
+    ``h3`` is the index. In addition to the columns of `area_statistics`, ``objects`` is the number
+    of street objects, ``queries`` the number of queries and ``found`` their share of successes.
     """
     if not 0 <= resolution <= FINEST:
         raise InputError(
@@ -46,34 +46,37 @@ def hexagons_layer(
         )
     to_degrees = Transformer.from_crs(database.crs, "EPSG:4326")
 
-    def hexagons(xy: NDArray[np.float64]) -> NDArray[np.uint64]:
-        places = zip(*(part.tolist() for part in to_degrees.transform(*xy.T)), strict=True)
-        listed = (h3.str_to_int(h3.latlng_to_cell(*place, resolution)) for place in places)
-        return np.fromiter(listed, np.uint64, len(xy))
+    def hexagon_ids(xy: NDArray[np.float64]) -> NDArray[np.uint64]:
+        places = zip(*(axis.tolist() for axis in to_degrees.transform(*xy.T)), strict=True)
+        ids = (h3.str_to_int(h3.latlng_to_cell(*place, resolution)) for place in places)
+        return np.fromiter(ids, np.uint64, len(xy))
 
+    # Number the hexagons of all places, then split the numbers by cells, objects and queries.
     places = [database.xy]
     places += [] if objects is None else [objects.xy]
-    places += [] if evaluation is None else [_places(evaluation)]
-    ids, numbers = np.unique(np.concatenate([*map(hexagons, places)]), return_inverse=True)
+    if evaluation is not None:
+        places.append(np.asarray(shapely.get_coordinates(evaluation.queries.geometry.array)))
+    ids, numbers = np.unique(np.concatenate([*map(hexagon_ids, places)]), return_inverse=True)
     of_cells, *others = np.split(numbers, np.cumsum([len(xy) for xy in places])[:-1])
     names = [*map(h3.int_to_str, ids.tolist())]
     columns: dict[str, Any] = {"h3": names}
-    columns |= summary(database, of_cells, len(ids), identifiability=identifiability)
-    draw = [("Ambiguity", "type_group_size", AMBIGUITY)]
+    columns |= area_statistics(database, of_cells, len(ids), identifiability=identifiability)
+    styles = [("Ambiguity", "type_group_size", AMBIGUITY)]
     if identifiability is not None:
-        draw.insert(0, ("Identifiability", "chance_found", IDENTIFIABILITY))
+        styles.insert(0, ("Identifiability", "chance_found", IDENTIFIABILITY))
     if objects is not None:
         columns["objects"] = np.bincount(others.pop(0), minlength=len(ids))
     if evaluation is not None:
         (of_queries,) = others
         columns["queries"] = np.bincount(of_queries, minlength=len(ids))
-        columns["found"] = _means(of_queries, evaluation.successful, len(ids))
-        draw.insert(0, ("Queries found", "found", IDENTIFIABILITY))
+        columns["found"] = group_means(of_queries, evaluation.successful, len(ids))
+        styles.insert(0, ("Queries found", "found", IDENTIFIABILITY))
+    # The corners of all hexagons are projected together.
     rings = [h3.cell_to_boundary(name) for name in names]
     latitudes, longitudes = np.concatenate([np.asarray(ring) for ring in rings]).T
     xy = np.stack(to_degrees.transform(latitudes, longitudes, direction="INVERSE"), axis=1)
-    of_corner = np.repeat(np.arange(len(rings)), [*map(len, rings)])
-    shapes = shapely.polygons(shapely.linearrings(xy, indices=of_corner))
+    hexagon_numbers = np.repeat(np.arange(len(rings)), [*map(len, rings)])
+    shapes = shapely.polygons(shapely.linearrings(xy, indices=hexagon_numbers))
     return table_layer(
         gpd.GeoDataFrame(columns, geometry=shapes, crs=database.crs),
         name="hexagons",
@@ -82,46 +85,34 @@ def hexagons_layer(
         geometry="polygon",
         licenses=database.licenses,
         facts={**database_specs(database), "h3_resolution": resolution},
-        styles=tuple(by_amount(*each, geometry="polygon", size=0.0) for each in draw),
+        styles=tuple(by_amount(*style, geometry="polygon", size=0.0) for style in styles),
     )
 
 
-def summary(
+def area_statistics(
     database: SignatureDatabase,
     areas: NDArray[np.int64],
     count: int,
     *,
     identifiability: Identifiability | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Return what there is to say of the cells of each area, by the number of each cell's area.
+    """Return statistics of the cells of each area; `areas` has the number of each cell's area.
 
-    ``cells`` counts them, ``mean_length`` is the mean number of objects that they see, and
-    ``ambiguous`` the share of them that look like another cell, by types; ``type_group_size`` is
-    the median, and ``chance_found`` the mean chance that a query from there is found. NaN where
-    there is no cell.
+    ``cells`` is their number, ``mean_length`` the mean number of objects that they see,
+    ``ambiguous`` the share of cells with the types of another cell, ``type_group_size`` the median,
+    and ``chance_found`` the mean chance to be found. NaN in an area without cells.
     """
     cells, sizes = np.bincount(areas, minlength=count), database.type_group_sizes
-    in_order = sizes[np.lexsort((sizes, areas))]
+    # Lower median: the middle row of each area, with the rows sorted by area and size.
+    ordered = sizes[np.lexsort((sizes, areas))]
     middles = np.cumsum(cells) - cells + (cells - 1) // 2
-    medians = np.where(cells > 0, in_order[np.minimum(middles, len(in_order) - 1)], np.nan)
+    medians = np.where(cells > 0, ordered[np.minimum(middles, len(ordered) - 1)], np.nan)
     columns = {
         "cells": cells,
-        "mean_length": _means(areas, database.lengths, count),
-        "ambiguous": _means(areas, sizes > 1, count),
+        "mean_length": group_means(areas, database.lengths, count),
+        "ambiguous": group_means(areas, sizes > 1, count),
         "type_group_size": medians,
     }
     if identifiability is not None:
-        columns["chance_found"] = _means(areas, identifiability.found, count)
+        columns["chance_found"] = group_means(areas, identifiability.found, count)
     return columns
-
-
-def _means(areas: NDArray[np.int64], values: NDArray[Any], count: int) -> NDArray[np.float64]:
-    """Return the mean of the values in each area, NaN where there are none."""
-    numbers = np.bincount(areas, minlength=count)
-    means = np.full(count, np.nan)
-    np.divide(np.bincount(areas, values, count), numbers, out=means, where=numbers > 0)
-    return means
-
-
-def _places(evaluation: Evaluation) -> NDArray[np.float64]:
-    return np.asarray(shapely.get_coordinates(evaluation.queries.geometry.array))

@@ -1,8 +1,9 @@
-"""What is handed on, as layers that are read in blocks."""
+"""Cells, objects, evaluations and answers as export layers that are read in blocks."""
 
 from __future__ import annotations
 
 import functools
+import json
 import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,7 @@ from semsig_gis.objects import objects_specs
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
+    from numpy.typing import NDArray
     from pyproj import CRS
 
     from semsig_gis.core import Taxonomy
@@ -48,16 +50,18 @@ if TYPE_CHECKING:
     from semsig_gis.localization import Answer, SearchRegions
     from semsig_gis.objects import StreetObjects
 
+    Progress = Callable[[int, int], None] | None  # called with the numbers of rows: done, all
+
 
 ROWS_A_BLOCK = 1 << 16
 GEOMETRY_TYPES = {"polygon": "Polygon", "line": "LineString", "point": "Point"}
-# Figures by which queries are compared, too many to be read beside all else.
+# Columns of queries that a GeoPackage moves to a separate table, because there are many of them.
 FIGURE = re.compile(r"(p|near)\d+")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Layer:
-    """A table, mostly with geometry, of which some rows at a time are in memory."""
+    """A table, usually with geometry, that is read in blocks of rows to limit the memory."""
 
     name: str
     title: str
@@ -71,15 +75,30 @@ class Layer:
     facts: Mapping[str, Any]  # plain values for JSON
     styles: tuple[Style, ...] = ()  # the first is the default
     taxonomy: Taxonomy | None = None  # of the symbols in its texts
-    reach: float = 1.0  # metres to the edge of what is seen
+    reach: float = 1.0  # longest visibility range, metres
 
     @property
     def credits(self) -> dict[str, Any]:
-        """Whom to name for the data and what wrote it, for the metadata of a file."""
+        """Licences and program version, for the metadata of a file."""
         return {"licenses": list(self.licenses), "written_by": f"semsig_gis {__version__}"}
 
-    def blocks(self, progress: Callable[[int, int], None] | None = None) -> Iterator[pa.Table]:
-        """Read the layer block by block; one without rows is a block without rows."""
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Facts and credits, for the metadata of a file."""
+        return {**self.facts, **self.credits}
+
+    @property
+    def metadata_texts(self) -> dict[str, str]:
+        """The metadata with each value as JSON text."""
+        return {key: json.dumps(value, allow_nan=False) for key, value in self.metadata.items()}
+
+    @property
+    def abstract(self) -> str:
+        """The description with the licences, a line each."""
+        return "\n".join([self.description, *self.licenses])
+
+    def blocks(self, progress: Progress = None) -> Iterator[pa.Table]:
+        """Yield the rows in blocks; a layer without rows yields one empty block."""
         for low in range(0, max(self.rows, 1), ROWS_A_BLOCK):
             high = min(low + ROWS_A_BLOCK, self.rows)
             yield self.read(slice(low, high))
@@ -93,7 +112,7 @@ def cells_layer(
     identifiability: Identifiability | None = None,
     geometry: CellGeometry = "polygon",
 ) -> Layer:
-    """Return the cells, as squares or as points."""
+    """Return the layer of the cells, as squares or as points."""
     cells = CellTable(database, geometry=geometry)
     if identifiability is not None:
         identifiability.require_cells_of(database)
@@ -101,19 +120,19 @@ def cells_layer(
     def read(rows: slice) -> pa.Table:
         columns = cells.columns(rows)
         if identifiability is not None:
-            more = identifiability.table(rows)
-            columns |= dict(zip(more.column_names, more.columns, strict=True))
+            table = identifiability.table(rows)
+            columns |= dict(zip(table.column_names, table.columns, strict=True))
         return pa.table({**columns, GEOMETRY: shapely.to_wkb(cells.shapes(rows))})
 
     step = database.grid.step
     crs = database.crs.to_json_dict()
     facts = {**database_specs(database), "crs": crs, "identifiability": None}
-    draw = functools.partial(by_amount, geometry=geometry, size=step)
-    styles = [draw("Ambiguity", "type_group_size", AMBIGUITY)]
+    style = functools.partial(by_amount, geometry=geometry, size=step)
+    styles = [style("Ambiguity", "type_group_size", AMBIGUITY)]
     if identifiability is not None:
         facts["identifiability"] = identifiability.facts
-        styles.insert(0, draw("Identifiability", "chance_found", IDENTIFIABILITY))
-    corners = [(part.min(), part.max()) for part in (database.columns, database.rows)]
+        styles.insert(0, style("Identifiability", "chance_found", IDENTIFIABILITY))
+    corners = [(axis.min(), axis.max()) for axis in (database.columns, database.rows)]
     (west, south), (east, north) = database.grid.viewpoints(*corners).tolist()
     margin = step / 2 if geometry == "polygon" else 0.0
     return Layer(
@@ -137,19 +156,19 @@ def cells_layer(
 
 
 def objects_layer(objects: StreetObjects) -> Layer:
-    """Return the street objects."""
+    """Return the layer of the street objects."""
     classes = {item.code: item for item in objects.taxonomy.classes}
     texts = [SOURCE, SOURCE_ID, *([MERGED] if MERGED in objects.table.columns else [])]
 
     def read(rows: slice) -> pa.Table:
         table = objects.table.iloc[rows]
-        kinds = [classes[code] for code in objects.codes[rows].tolist()]
+        row_classes = [classes[code] for code in objects.codes[rows].tolist()]
         return pa.table(
             {
                 CLASS_CODE: objects.codes[rows],
-                "symbol": [item.symbol for item in kinds],
-                CLASS_NAME: [item.name for item in kinds],
-                "title": [item.title for item in kinds],
+                "symbol": [item.symbol for item in row_classes],
+                CLASS_NAME: [item.name for item in row_classes],
+                "title": [item.title for item in row_classes],
                 **{name: pa.array(table[name].tolist(), pa.string()) for name in texts},
                 COUNT: table[COUNT].to_numpy(np.int32),
                 GEOMETRY: shapely.to_wkb(table.geometry.array),
@@ -173,20 +192,20 @@ def objects_layer(objects: StreetObjects) -> Layer:
 
 
 def evaluation_layers(evaluation: Evaluation, database: SignatureDatabase) -> list[Layer]:
-    """Return the queries at their true places, and lines from there to the best places."""
-    queries = evaluation.queries
+    """Return two layers: queries at their true places, and lines to their best places."""
     successful, failed = OUTCOMES
     outcomes = np.where(evaluation.successful, successful, failed)
-    queries = queries.assign(outcome=outcomes)
+    queries = evaluation.queries.assign(outcome=outcomes)
+    # Lines need a best place that differs from the true place.
     placed = queries[queries["best_x"].notna().to_numpy()]
     truth = shapely.get_coordinates(placed.geometry.array)
     best = placed[["best_x", "best_y"]].to_numpy(np.float64)
     lines = placed[["seed", "number", "cell_id", "best_cell_id", "outcome", "error_m"]].assign(
         off_m=np.hypot(*(best - truth).T)
     )
-    ends = shapely.linestrings(np.stack([truth, best], axis=1))
-    lines = lines.set_geometry(ends, crs=queries.crs)
-    lines = lines[lines["off_m"] > 0]  # a line has a length
+    segments = shapely.linestrings(np.stack([truth, best], axis=1))
+    lines = lines.set_geometry(segments, crs=queries.crs)
+    lines = lines[lines["off_m"] > 0]
     summary = evaluation.summary()
     facts = {name: summary[name] for name in ("settings", "database", "versions")}
     layer = functools.partial(
@@ -220,8 +239,8 @@ def evaluation_layers(evaluation: Evaluation, database: SignatureDatabase) -> li
     ]
 
 
-def figures_apart(queries: Layer) -> list[Layer]:
-    """Return queries without their many figures, and a table of these by seed and number."""
+def split_figures(queries: Layer) -> list[Layer]:
+    """Split the layer of queries: its other columns, and a table of figures by seed and number."""
     names = queries.read(slice(0, 0)).column_names
     figures = [name for name in names if FIGURE.fullmatch(name)]
     return [
@@ -241,11 +260,11 @@ def figures_apart(queries: Layer) -> list[Layer]:
 def answer_layers(
     answer: Answer, database: SignatureDatabase, regions: SearchRegions
 ) -> list[Layer]:
-    """Return the regions that must be searched, the candidates and, if estimated, the place."""
+    """Return layers of the regions to search, the candidates and, if estimated, the place."""
     candidates = answer.to_geodataframe()
     cells = CellTable(database.select(candidates["cell"].to_numpy()))
-    seen = cells.columns(slice(0, len(candidates)))
-    candidates = candidates.assign(bearings=seen["bearings"], distances=seen["distances"])
+    columns = cells.columns(slice(0, len(candidates)))
+    candidates = candidates.assign(bearings=columns["bearings"], distances=columns["distances"])
     facts = answer.to_dict()
     licenses, place = tuple(facts["licenses"]), facts.get("place")
     facts = {name: facts[name] for name in facts if name not in {"candidates", "crs", "licenses"}}
@@ -277,15 +296,11 @@ def answer_layers(
     ]
     if place is None:
         return layers
-    told: dict[str, Any] = {"answer": "given" if facts["answered"] else "withheld"}
-    told |= {name: value for name, value in place.items() if isinstance(value, (bool, int, float))}
-    frame = gpd.GeoDataFrame(
-        pd.DataFrame([told]),
-        geometry=gpd.points_from_xy([place["x"]], [place["y"]]),
-        crs=answer.crs,
-    )
+    row: dict[str, Any] = {"answer": "given" if facts["answered"] else "withheld"}
+    row |= {name: value for name, value in place.items() if isinstance(value, (bool, int, float))}
+    points = gpd.points_from_xy([place["x"]], [place["y"]])
     estimate = layer(
-        frame,
+        gpd.GeoDataFrame(pd.DataFrame([row]), geometry=points, crs=answer.crs),
         name="place",
         title="Place",
         description="Where the query was most probably seen from, and how sure that is.",
@@ -296,7 +311,7 @@ def answer_layers(
 
 
 def table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN401 - as `Layer` has
-    """Return a layer of a table that is in memory; what is not finite is missing in it."""
+    """Return a layer of a table in memory; numbers that are not finite become null."""
     shapes = frame.geometry
     columns = {}
     for column in frame.columns.drop(shapes.name):
@@ -315,3 +330,11 @@ def table_layer(frame: gpd.GeoDataFrame, **about: Any) -> Layer:  # noqa: ANN401
         bounds=tuple(shapes.total_bounds.tolist()),
         read=lambda rows: table.slice(rows.start, rows.stop - rows.start),
     )
+
+
+def group_means(groups: NDArray[np.int64], values: NDArray[Any], count: int) -> NDArray[np.float64]:
+    """Return the mean of the values in each group (float64, `count`); NaN in an empty group."""
+    numbers = np.bincount(groups, minlength=count)
+    means = np.full(count, np.nan)
+    np.divide(np.bincount(groups, values, count), numbers, out=means, where=numbers > 0)
+    return means

@@ -1,7 +1,7 @@
-"""What QGIS is told of the layers of a GeoPackage: names of fields, forms, tips, and a project.
+"""Project and layer properties of a GeoPackage for QGIS: field names, forms, map tips.
 
-``shown.toml`` says what the layers and fields are called; the templates are in
-``templates/qgis``. QGIS itself is not needed.
+``shown.toml`` has the titles of layers and fields; the templates are in ``templates/qgis``. QGIS
+itself is not needed.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from importlib import resources
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import lazy_loader
+
 from semsig_gis import __version__
 from semsig_gis.core import GEOMETRY, class_signs, one_line
 from semsig_gis.exports.styles import SYMBOLS, shown_line
@@ -26,34 +28,38 @@ from semsig_gis.exports.styles import SYMBOLS, shown_line
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from jinja2 import Environment
+    import jinja2
 
     from semsig_gis.exports.layers import Layer
     from semsig_gis.exports.styles import Style
+else:
+    jinja2 = lazy_loader.load("jinja2")
 
-# Size of the map on the page, and of a part of its scale bar, in metres.
+Bounds = tuple[float, float, float, float]
+
+# Size of the map on the page, and length of a segment of its scale bar, in metres.
 MAP_WIDTH, MAP_HEIGHT, BAR = 0.205, 0.160, 0.022
 SCALES = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.5)
 BARS = (1.0, 2.0, 5.0)
 CREDIT_LETTERS, CREDITS = 300, 7
-# Which table has more of which, told apart by which columns.
+# Tables with further columns of a layer: the layer, and the columns that join them.
 RELATIONS = {"evaluation_figures": ("evaluation", ("seed", "number"))}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """A field of a layer: what a person calls it, what it means, and how it is written."""
+    """A field of a layer: its title and meaning for a person, decimals, and tab of the form."""
 
     name: str
     alias: str
     about: str
     decimals: int | None
     tab: str
-    index: int  # behind the feature's number
+    index: int  # in QGIS, where the feature id has index 0
 
 
-class Sign(NamedTuple):
-    """What stands for a class in a tip."""
+class TipSign(NamedTuple):
+    """The sign of a class in a map tip."""
 
     symbol: str
     colour: str
@@ -63,7 +69,7 @@ class Sign(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ShownLayer:
-    """A layer as the templates take it."""
+    """A layer with all that the templates need."""
 
     key: str
     title: str
@@ -73,7 +79,7 @@ class ShownLayer:
     geometry: str
     styles: tuple[Style, ...]
     fields: tuple[Field, ...]
-    signs: tuple[Sign, ...]
+    signs: tuple[TipSign, ...]
     reach: float
     group: str = ""
     expression: str = ""
@@ -85,7 +91,7 @@ class ShownLayer:
 
     @property
     def id(self) -> str:
-        """What a project calls it; QGIS takes no id that is shorter."""
+        """Id in the project; QGIS does not accept a shorter id."""
         return f"semsig_layer_{self.key}"
 
     @property
@@ -95,56 +101,57 @@ class ShownLayer:
 
     @property
     def tabs(self) -> list[tuple[str, list[Field]]]:
-        """The form: fields by tabs."""
+        """Tabs of the form, each with its fields."""
         return [(tab, list(fields)) for tab, fields in groupby(self.fields, key=lambda f: f.tab)]
 
     @property
     def geometry_number(self) -> int:
-        """What QGIS calls the geometry in a style."""
+        """QGIS's number of the geometry in a style."""
         return [*SYMBOLS, "none"].index(self.geometry)
 
     @property
     def geometry_name(self) -> str:
-        """What QGIS calls the geometry in a project."""
+        """QGIS's name of the geometry in a project."""
         return {"none": "No geometry"}.get(self.geometry, self.geometry.title())
 
     def is_drawn(self, scale: float) -> bool:
-        """Return whether it is seen when the project is opened, at a scale of 1 to so many."""
-        seen = self.farther <= scale <= (self.nearer or math.inf)
-        return seen and not self.hidden and bool(self.styles)
+        """Return whether the layer is visible when the project opens at a scale of 1 to `scale`."""
+        in_range = self.farther <= scale <= (self.nearer or math.inf)
+        return in_range and not self.hidden and bool(self.styles)
 
     @property
     def tip(self) -> str:
-        """HTML that is shown under the mouse."""
+        """HTML of the map tip, with expressions of QGIS."""
         return _environment().get_template("qgis/tips.html").render(layer=self)
 
 
 def layer_fields(layer: Layer) -> tuple[Field, ...]:
-    """Return what is to be said of the fields of a layer, in the order of its form."""
+    """Return the fields of a layer, in the order of its form."""
     columns = [name for name in layer.read(slice(0, 0)).column_names if name != GEOMETRY]
-    titles = {one.name: one.title for one in layer.taxonomy.classes} if layer.taxonomy else {}
-    fields = list(_told(layer.name, columns, titles))
-    told = {field.name for field in fields}
+    titles = {item.name: item.title for item in layer.taxonomy.classes} if layer.taxonomy else {}
+    fields = list(_listed_fields(layer.name, columns, titles))
+    names = {field.name for field in fields}
     fields += [
         Field(name=name, alias=name, about="", decimals=None, tab="More", index=number)
         for number, name in enumerate(columns, start=1)
-        if name not in told
+        if name not in names
     ]
-    # Classes may have the same title, but no two fields the same name.
-    often = Counter(field.alias for field in fields)
+    # Classes may have equal titles, but the names of two fields differ.
+    counts = Counter(field.alias for field in fields)
     return tuple(
-        replace(field, alias=f"{field.alias} ({field.name})") if often[field.alias] > 1 else field
+        replace(field, alias=f"{field.alias} ({field.name})") if counts[field.alias] > 1 else field
         for field in fields
     )
 
 
-def _told(layer: str, columns: list[str], titles: dict[str, str]) -> Iterator[Field]:
-    left = list(columns)
-    for tab, entries in _shown().get(layer, {}).get("form", {}).items():
+def _listed_fields(layer: str, columns: list[str], titles: dict[str, str]) -> Iterator[Field]:
+    """Yield the fields that ``shown.toml`` lists; a column has its first matching pattern."""
+    remaining = list(columns)
+    for tab, entries in _layer_texts().get(layer, {}).get("form", {}).items():
         for pattern, (alias, about, *decimals) in entries.items():
-            fitting = re.compile(pattern.replace("#", r"(\d+)").replace("*", r"(\w+)"))
-            for match in [found for name in left if (found := fitting.fullmatch(name))]:
-                left.remove(match.string)
+            regex = re.compile(pattern.replace("#", r"(\d+)").replace("*", r"(\w+)"))
+            for match in [*filter(None, map(regex.fullmatch, remaining))]:
+                remaining.remove(match.string)
                 word = match[1] if match.groups() else ""
                 yield Field(
                     name=match.string,
@@ -157,18 +164,19 @@ def _told(layer: str, columns: list[str], titles: dict[str, str]) -> Iterator[Fi
 
 
 def layer_style(layer: ShownLayer, style: Style) -> str:
-    """Return a style of a layer as QML, with all else that QGIS is told of the layer."""
+    """Return a style of a layer as QML, with the other properties of the layer."""
     return _environment().get_template("qgis/style.qml").render(layer=layer, style=style)
 
 
 def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
-    """Return layers of a GeoPackage of that name for the templates, the uppermost first."""
-    order = [*_shown()]
-    place = file if file.isprintable() else one_line(file)  # what is not is no XML
+    """Return the layers of the GeoPackage `file` for the templates, the uppermost first."""
+    texts = _layer_texts()
+    order = [*texts]
+    place = file if file.isprintable() else one_line(file)  # XML has no control characters
     names = {layer.name for layer in layers}
-    known = sorted(layers, key=lambda one: order.index(one.name) if one.name in order else -1)
-    covers = [told for name, told in _shown().items() if name in names and "covers" in told]
-    covered = {told["covers"]: told["farther"] for told in covers}
+    # A layer is hidden at the scales where an overview layer covers it.
+    overviews = [texts[name] for name in texts if name in names and "covers" in texts[name]]
+    covered = {overview["covers"]: overview["farther"] for overview in overviews}
     relations = {of: name for name, (of, _) in RELATIONS.items() if name in names}
     return [
         ShownLayer(
@@ -182,51 +190,51 @@ def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
             fields=layer_fields(layer),
             signs=_signs(layer),
             reach=layer.reach or 1.0,
-            group=told.get("group", "Layers"),
-            expression=told.get("name", ""),
-            label=told.get("label", ""),
-            nearer=told.get("nearer", covered.get(layer.name, 0)),
-            farther=told.get("farther", 0),
-            hidden=told.get("hidden", False),
+            group=text.get("group", "Layers"),
+            expression=text.get("name", ""),
+            label=text.get("label", ""),
+            nearer=text.get("nearer", covered.get(layer.name, 0)),
+            farther=text.get("farther", 0),
+            hidden=text.get("hidden", False),
             relation=relations.get(layer.name, ""),
         )
-        for layer in known
-        for told in [_shown().get(layer.name, {})]
+        for layer in sorted(layers, key=lambda x: order.index(x.name) if x.name in order else -1)
+        for text in [texts.get(layer.name, {})]
     ]
 
 
-def _signs(layer: Layer) -> tuple[Sign, ...]:
-    """Return the signs of the classes; their names as HTML in a text of an expression."""
-    if layer.taxonomy is None:
-        return ()
-    marks = {"'": "''", "[": "&#91;", "]": "&#93;"}
+def _signs(layer: Layer) -> tuple[TipSign, ...]:
+    """Return the signs of the classes; titles are HTML inside a string of an expression."""
+    escapes = str.maketrans({"'": "''", "[": "&#91;", "]": "&#93;"})
+    signs = {} if layer.taxonomy is None else class_signs(layer.taxonomy)
     return tuple(
-        Sign(
+        TipSign(
             symbol=sign.symbol,
             colour=sign.colour,
             ink=sign.ink,
-            text="".join(
-                marks.get(one, one) for one in escape(shown_line(sign.title), quote=False)
-            ),
+            text=escape(shown_line(sign.title), quote=False).translate(escapes),
         )
-        for sign in class_signs(layer.taxonomy).values()
+        for sign in signs.values()
     )
 
 
 def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title: str) -> bytes:
     """Return a project of QGIS (``.qgz``) with layers of one GeoPackage."""
-    drawn = [layer for layer in layers if layer.geometry != "none"]
-    licences = [*dict.fromkeys(line for layer in shown for line in layer.licences)]
-    bounds = _joined([layer.bounds for layer in drawn])
+    spatial = [layer for layer in layers if layer.geometry != "none"]
+    credit = [*dict.fromkeys(line for layer in shown for line in layer.licences)]
+    if len(credit) > CREDITS:  # the page has room for a few lines
+        rest = f"and {len(credit) - CREDITS + 1} more, which the properties of the layers name"
+        credit[CREDITS - 1 :] = [rest]
+    bounds = _total_bounds([layer.bounds for layer in spatial])
     page = _page(bounds)
     text = (
         _environment()
         .get_template("qgis/project.qgs")
         .render(
             title=shown_line(title),
-            subtitle=shown_line(drawn[0].description, CREDIT_LETTERS),
-            crs=drawn[0].crs,
-            code=drawn[0].crs.to_epsg(),
+            subtitle=shown_line(spatial[0].description, CREDIT_LETTERS),
+            crs=spatial[0].crs,
+            code=spatial[0].crs.to_epsg(),
             bounds=bounds,
             page=page,
             layers=shown,
@@ -238,42 +246,31 @@ def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title:
                 for having in shown
                 if having.key == of.relation
             ],
-            credits=[*_credits(licences), f"Made with semsig_gis {__version__}"],
+            credits=[*credit, f"Made with semsig_gis {__version__}"],
         )
     )
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        # Of a date of its own, so that the same layers are the same bytes.
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        # The date is constant, so that the same layers give the same bytes.
         entry = zipfile.ZipInfo("project.qgs")
         entry.compress_type = zipfile.ZIP_DEFLATED
         archive.writestr(entry, text)
-    return packed.getvalue()
-
-
-def _credits(licences: list[str]) -> list[str]:
-    """Return whom to name on the page, on which there is room for a few."""
-    if len(licences) <= CREDITS:
-        return licences
-    rest = f"and {len(licences) - CREDITS + 1} more, which the properties of the layers name"
-    return [*licences[: CREDITS - 1], rest]
+    return content.getvalue()
 
 
 def _grouped(layers: Sequence[ShownLayer]) -> list[tuple[str, list[ShownLayer]]]:
-    return [(name, list(group)) for name, group in groupby(layers, key=lambda one: one.group)]
+    return [(name, list(group)) for name, group in groupby(layers, key=lambda x: x.group)]
 
 
-Bounds = tuple[float, float, float, float]
-
-
-def _joined(bounds: Sequence[Bounds]) -> Bounds:
-    """Return the bounds of all; a layer without rows has none."""
-    known = [box for box in bounds if all(map(math.isfinite, box))] or [(0.0, 0.0, 1.0, 1.0)]
-    west, south, east, north = zip(*known, strict=True)
+def _total_bounds(bounds: Sequence[Bounds]) -> Bounds:
+    """Return the bounds of all layers; the bounds of a layer without rows are not finite."""
+    finite = [box for box in bounds if all(map(math.isfinite, box))] or [(0.0, 0.0, 1.0, 1.0)]
+    west, south, east, north = zip(*finite, strict=True)
     return min(west), min(south), max(east), max(north)
 
 
 def _page(bounds: Bounds) -> dict[str, Any]:
-    """Return what the map on the page shows, at a round scale, and the parts of its scale bar."""
+    """Return the scale (round) and bounds of the map on the page, and its scale bar."""
     west, south, east, north = bounds
     scale = _round(max((east - west) / MAP_WIDTH, (north - south) / MAP_HEIGHT, 100.0), SCALES)
     x, y = (west + east) / 2, (south + north) / 2
@@ -288,31 +285,25 @@ def _page(bounds: Bounds) -> dict[str, Any]:
 
 
 def _round(number: float, steps: Sequence[float]) -> float:
-    """Return the least round number that is not below another."""
+    """Return the smallest round number that is not below `number`."""
     power = 10.0 ** math.floor(math.log10(number))
     return next((step * power for step in steps if step * power >= number), 10 * power)
 
 
 @functools.cache
-def _shown() -> dict[str, Any]:
+def _layer_texts() -> dict[str, Any]:
+    """Return ``shown.toml``: titles, forms and scales by layer, the uppermost first."""
     text = resources.files("semsig_gis.exports").joinpath("shown.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 
 @functools.cache
-def _environment() -> Environment:
-    from jinja2 import (  # noqa: PLC0415 - only where it is used
-        Environment,
-        PackageLoader,
-        StrictUndefined,
-        select_autoescape,
-    )
-
-    return Environment(
-        loader=PackageLoader("semsig_gis"),
-        # Tips are HTML in which expressions stand, and say what is to be escaped themselves.
-        autoescape=select_autoescape(("xml", "qml", "qgs"), default=False),
-        undefined=StrictUndefined,
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("semsig_gis"),
+        # Map tips are HTML with expressions, so their template escapes texts itself.
+        autoescape=jinja2.select_autoescape(("xml", "qml", "qgs"), default=False),
+        undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )

@@ -44,7 +44,8 @@ class ClassQuestion:
 
     Examples
     --------
-    >>> from semsig_gis import build_index, locate, named_noise, next_questions
+    >>> from semsig_gis import build_index, locate, named_noise
+    >>> from semsig_gis.localization import next_questions
     >>> index = build_index(demo_database, named_noise("generic"))
     >>> first = next_questions(index, locate(index, demo_database.signature(0)))[0]
     >>> first.text

@@ -24,6 +24,7 @@ from .location import localization_legend as localization_legend
 from .location import localization_map as localization_map
 from .location import location_legend as location_legend
 from .location import location_map as location_map
+from .location import posterior_map as posterior_map
 from .location import region_levels as region_levels
 from .objects import ground_map as ground_map
 from .objects import objects_legend as objects_legend

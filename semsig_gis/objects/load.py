@@ -560,7 +560,10 @@ def _surroundings(
         table = layer.table.to_crs(crs)
         nowhere = (table.geometry.isna() | table.geometry.is_empty).to_numpy(bool)
         other = ~nowhere & (shapely.get_dimensions(table.geometry.array) != DIMENSIONS[kind])
-        far = ~(nowhere | other) & ~_on_earth(table.geometry.array)
+        xy, row = shapely.get_coordinates(table.geometry.array, return_index=True)
+        far = np.zeros(len(table), bool)
+        far[row[~(np.abs(xy) < BEYOND_EARTH_M).all(axis=1)]] = True  # also for NaN
+        far &= ~(nowhere | other)
         counts = replace(
             layer.counts,
             unreadable=layer.counts.unreadable + int(other.sum()),
@@ -572,11 +575,3 @@ def _surroundings(
     table = pd.concat(tables, ignore_index=True).drop(columns=CLASS_NAME)
     table.attrs[LICENSES] = [str(licence) for licence in layer_licences(of_role)]
     return table, tuple(reports)
-
-
-def _on_earth(shapes: NDArray[np.object_]) -> NDArray[np.bool_]:
-    """Return a mask of the shapes with all coordinates on the Earth; false for NaN."""
-    xy, row = shapely.get_coordinates(shapes, return_index=True)
-    placed = np.ones(len(shapes), bool)
-    placed[row[~(np.abs(xy) < BEYOND_EARTH_M).all(axis=1)]] = False
-    return placed

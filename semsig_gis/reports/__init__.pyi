@@ -1,5 +1,10 @@
 # What other packages may import from here: name and module, read by `__init__.py`.
 
+from .axes import plot_answer as plot_answer
+from .axes import plot_database as plot_database
+from .axes import plot_evaluation as plot_evaluation
+from .axes import plot_identifiability as plot_identifiability
+from .axes import plot_objects as plot_objects
 from .database import database_tables as database_tables
 from .evaluation import comparison_sentence as comparison_sentence
 from .evaluation import comparison_table as comparison_table

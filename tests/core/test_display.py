@@ -12,11 +12,8 @@ from worlds import random_town
 from semsig_gis import (
     City,
     Footprints,
-    GeopackageContents,
-    LikelihoodIndex,
     Method,
     ObjectStore,
-    PartitionedDatabase,
     Reproduction,
     Sight,
     StreetObjects,
@@ -25,23 +22,23 @@ from semsig_gis import (
     cell_scene,
     check_identifiability,
     draw_scene,
-    error_field,
     evaluate,
     identify,
     load_catalog,
     localize,
     locate,
-    named_drift,
     named_noise,
     open_objects,
     quality_report,
     save_objects,
-    search_regions,
-    show_map,
     synthetic_city,
-    update_database,
 )
 from semsig_gis.core import Displayed
+from semsig_gis.database import PartitionedDatabase, update_database
+from semsig_gis.evaluation import error_field
+from semsig_gis.exports import GeopackageContents
+from semsig_gis.localization import LikelihoodIndex, named_drift, search_regions
+from semsig_gis.maps import show_map
 from semsig_gis.objects import assemble
 from semsig_gis.reports import Scene
 from semsig_gis.sources import CitySpec

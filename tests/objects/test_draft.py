@@ -418,8 +418,8 @@ def test_longest_keyword_wins_over_its_parts() -> None:
 def test_every_class_is_recognised_by_its_keywords() -> None:
     for name, phrase in keywords("classes").phrases:
         assert phrase, name
-        found = keywords("classes").find(" ".join(phrase))
-        assert name in {item.name for item in found}, phrase
+        matches = keywords("classes").find(" ".join(phrase))
+        assert name in {match.name for match in matches}, phrase
 
 
 def test_keywords_have_all_classes_of_the_catalogues() -> None:
@@ -438,8 +438,8 @@ def sample(*rows: dict[str, Any]) -> LayerSample:
 
 
 def column(name: str, *values: object) -> Column:
-    (found,) = columns_of(sample(*({name: value} for value in values)))
-    return found
+    (result,) = columns_of(sample(*({name: value} for value in values)))
+    return result
 
 
 def test_only_fields_of_plain_values_become_columns() -> None:
@@ -447,8 +447,8 @@ def test_only_fields_of_plain_values_become_columns() -> None:
         {"a": 1, "b": {"lon": 1}, "c": "x", "d": None, "e": b"wkb"},
         {"a": None, "b": None, "c": "", "d": None, "e": None},
     )
-    found = columns_of(rows)
-    assert [(item.name, dict(item.counts), item.missing) for item in found] == [
+    columns = columns_of(rows)
+    assert [(item.name, dict(item.counts), item.missing) for item in columns] == [
         ("a", {1: 1}, 1),
         ("c", {"x": 1}, 1),
         ("d", {}, 2),
@@ -477,8 +477,8 @@ def test_identifiers_and_filters_are_distinguished(
     values: tuple[object, ...], kinds: list[str]
 ) -> None:
     counts = Counter(value for value in values if value is not None)
-    found = Column("x", counts, len(values) - counts.total())
-    assert [kind for kind in ("unique", "few") if getattr(found, kind)] == kinds
+    field = Column("x", counts, len(values) - counts.total())
+    assert [kind for kind in ("unique", "few") if getattr(field, kind)] == kinds
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
-"""Names that were public go on for a while, with a warning, and then go."""
+"""Old public names keep working with a warning until a stated version."""
 
 from __future__ import annotations
 
+import importlib
 import re
 
 import pytest
@@ -10,28 +11,39 @@ from packaging.version import Version
 import semsig_gis
 
 RENAMED: dict[str, tuple[str, str]] = vars(semsig_gis)["_RENAMED"]
+MOVED: dict[str, str] = vars(semsig_gis)["_MOVED"]
+MOVED_END: str = vars(semsig_gis)["_MOVED_END"]
+MESSAGES = {
+    **{old: f"is called {new} now; version {end}" for old, (new, end) in RENAMED.items()},
+    **{
+        name: f"is imported from semsig_gis.{package} now; version {MOVED_END}"
+        for name, package in MOVED.items()
+    },
+}
 
 
-@pytest.mark.parametrize("old", RENAMED)
-def test_an_old_name_gives_what_the_new_one_does_with_a_warning(old: str) -> None:
-    new, end = RENAMED[old]
-    said = f"semsig_gis.{old} is called {new} now; version {end} removes the old name."
-    with pytest.warns(DeprecationWarning, match=f"^{re.escape(said)}$") as warned:
+@pytest.mark.parametrize("old", MESSAGES)
+def test_old_name_returns_the_same_object_with_a_warning(old: str) -> None:
+    message = f"semsig_gis.{old} {MESSAGES[old]} removes the old name."
+    with pytest.warns(DeprecationWarning, match=f"^{re.escape(message)}$") as warnings:
         value = getattr(semsig_gis, old)
-    assert warned[0].filename == __file__
-    assert value is getattr(semsig_gis, new)
+    assert warnings[0].filename == __file__
+    if old in RENAMED:
+        assert value is getattr(semsig_gis, RENAMED[old][0])
+    else:
+        assert value is getattr(importlib.import_module(f"semsig_gis.{MOVED[old]}"), old)
 
 
-def test_an_import_by_an_old_name_is_warned_of_where_it_stands() -> None:
-    with pytest.warns(DeprecationWarning, match="draft_catalog") as warned:
+def test_warning_points_at_the_line_of_the_import() -> None:
+    with pytest.warns(DeprecationWarning, match="draft_catalog") as warnings:
         exec("from semsig_gis import suggest_catalog", {"__name__": "theirs"})  # noqa: S102
-    assert warned[0].filename == "<string>"
+    assert warnings[0].filename == "<string>"
 
 
 def test_old_names_are_not_listed() -> None:
-    assert set(RENAMED).isdisjoint(dir(semsig_gis))
+    assert set(MESSAGES).isdisjoint(dir(semsig_gis))
 
 
-@pytest.mark.parametrize("old", RENAMED)
-def test_no_old_name_outlives_its_version(old: str) -> None:
-    assert Version(semsig_gis.__version__) < Version(RENAMED[old][1])
+@pytest.mark.parametrize("end", [MOVED_END, *(end for _, end in RENAMED.values())])
+def test_old_names_are_removed_in_their_version(end: str) -> None:
+    assert Version(semsig_gis.__version__) < Version(end)

@@ -161,7 +161,13 @@ class OpenExperiment:
         scores: dict[str, dict[int, list[dict[str, Any]]]] = {
             name: {top: [] for top in self.spec.top} for name in names
         }
-        step = self._memo_queries if len(names) > 1 else len(queries)
+        step = len(queries)
+        if len(names) > 1:
+            # As many queries at once as have shared distances that fit into memory.
+            database = self.database
+            distinct = len(database.type_sequences) + len(database.angle_sequences)
+            query_bytes = 4 * (_MEASURES * distinct + _STAGES * len(database))
+            step = max(1, min(step, MEMO_BYTES // max(query_bytes, 1)))
         for start in range(0, len(queries), step):
             memo = DistanceMemo() if len(names) > 1 else None
             for name in names:
@@ -178,13 +184,6 @@ class OpenExperiment:
             scored = scored_tables(self.database, queries, outcomes)
             tables = [table.assign(top=top) for top, table in scored.items()]
             yield name, pd.concat(tables, ignore_index=True)
-
-    @property
-    def _memo_queries(self) -> int:
-        """Number of queries with shared distances that fit into memory."""
-        distinct = len(self.database.type_sequences) + len(self.database.angle_sequences)
-        query_bytes = 4 * (_MEASURES * distinct + _STAGES * len(self.database))
-        return max(1, min(BATCH_QUERIES, MEMO_BYTES // max(query_bytes, 1)))
 
     def evaluations(self, folder: Path) -> dict[str, Evaluation]:
         """Return all evaluations by the names of their cases; all batches must be in the folder."""

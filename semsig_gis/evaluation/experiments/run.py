@@ -131,7 +131,9 @@ def run_experiments(
     Examples
     --------
     >>> import tempfile
-    >>> from semsig_gis import ExperimentSpec, parse_method, save_database
+    >>> from semsig_gis import save_database
+    >>> from semsig_gis.evaluation import ExperimentSpec
+    >>> from semsig_gis.localization import parse_method
     >>> none, paper = {"none": ()}, {"paper": parse_method("edit+edit:5%")}
     >>> spec = ExperimentSpec(database="city.parquet", methods=paper, distortions=none, queries=5)
     >>> with tempfile.TemporaryDirectory() as folder:

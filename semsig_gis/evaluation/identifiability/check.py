@@ -194,6 +194,7 @@ def check_identifiability(
         "length": database.lengths[cells],
         "type_group": -database.type_group_sizes[cells],
     }
+    bins = calibration_bins(pd.DataFrame({"chance": stated, "right": success}))
     # The rank correlation with a success that is drawn with the stated probability.
     ranks = _ranks(stated)
     spread = ranks.std() * math.sqrt(stated.mean() * (1.0 - stated.mean()))
@@ -206,7 +207,7 @@ def check_identifiability(
             name: _correlation(_ranks(score), _ranks(success)) for name, score in scores.items()
         },
         attainable=shared / spread if spread > 0 else math.nan,
-        bins=_bins(stated, success),
+        bins=tuple(ChanceBin(*row) for row in bins[bins["n"] > 0].to_dict("split")["data"]),
     )
 
 
@@ -219,9 +220,3 @@ def _correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> flo
     if not (np.ptp(first) and np.ptp(second)):
         return math.nan
     return float(np.corrcoef(first, second)[0, 1])
-
-
-def _bins(stated: NDArray[np.float64], success: NDArray[np.float64]) -> tuple[ChanceBin, ...]:
-    """Return the tenths that have queries."""
-    bins = calibration_bins(pd.DataFrame({"chance": stated, "right": success}))
-    return tuple(ChanceBin(*row) for row in bins[bins["n"] > 0].to_dict("split")["data"])

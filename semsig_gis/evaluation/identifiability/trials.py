@@ -289,7 +289,7 @@ def try_without_classes(
             trials = try_cells(
                 build_index(without, noise),
                 rows[cells[repeated]],
-                queries=[_without_code(queries[trial], code) for trial in repeated.tolist()],
+                queries=[queries[trial].select(queries[trial].codes != code) for trial in repeated],
                 columns=columns,
                 looks=numbers[repeated],
                 omitted_class=(number, np.flatnonzero(rows >= 0)),
@@ -300,11 +300,6 @@ def try_without_classes(
         if progress is not None:
             progress((number + 1) * len(cells), len(codes) * len(cells))
     return near, bits
-
-
-def _without_code(query: Signature, code: int) -> Signature:
-    """Return the detections of a query that are not of a class."""
-    return query if query.codes is None else query.select(query.codes != code)
 
 
 def _without_class(noise: Noise, name: str, classes: int) -> Noise:

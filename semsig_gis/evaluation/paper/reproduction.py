@@ -208,7 +208,7 @@ class Reproduction(Displayed):
 
     Examples
     --------
-    >>> from semsig_gis import database_summary
+    >>> from semsig_gis.database import database_summary
     >>> facts = database_summary(demo_database)
     >>> rest = {"variants": {}, "experiments": {}, "seconds": {}, "settings": {"queries": 300}}
     >>> Reproduction(database=demo_database, summary=facts, **rest).missing

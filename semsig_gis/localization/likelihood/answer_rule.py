@@ -1,7 +1,7 @@
-"""When to answer with a place at all, and how that is calibrated.
+"""The rule by which a place is given as an answer or not, and its calibration.
 
-A place is the answer if the chance that the true one lies near reaches a threshold, which is
-calibrated on queries whose true place is known.
+A place is the answer if the chance that the true place is near reaches a threshold. It is
+calibrated on queries with a known true place.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.posterior import Posterior
 
 STARTS = 4
-"""Shares of answers from which looser thresholds are tried in turn."""
-STEPS = 100
+"""Starting points of the thresholds that are tried, from strict to loose."""
+STEPS = 100  # thresholds that are tried at most
 
 
 def _is_number(value: object) -> TypeGuard[float]:
@@ -49,9 +49,9 @@ class AnswerRule:
     radius : float, default 50
         Metres that count as right.
     precision, confidence : float, default 0.98 and 0.95
-        Share of the answers that shall be right, and how sure it was to be that they are.
+        Share of the answers that must be right, and the confidence with which this was shown.
     queries, answered, wrong : int, default 0
-        What it was calibrated on: queries, those that were answered, and wrong answers.
+        Queries, answers and wrong answers of the calibration.
 
     Examples
     --------
@@ -84,27 +84,27 @@ class AnswerRule:
 
     @property
     def coverage(self) -> float:
-        """Share of the queries it was calibrated on that were answered; NaN without any."""
+        """Share of the queries of the calibration that were answered; NaN without any."""
         return self.answered / self.queries if self.queries else math.nan
 
     def answers(self, mass: float) -> bool:
-        """Tell whether to answer, given the chance that the place is near the best one."""
+        """Whether to answer, by the chance that the place is near the best one."""
         return bool(mass >= self.threshold)
 
     def decide(self, posterior: Posterior) -> Decision:
-        """Return the best place, its chance, and whether to give it as the answer."""
+        """Return the best place, its chance, and whether it is the answer."""
         cell, mass = posterior.best_place(self.radius)
         x, y = posterior.database.xy[cell].tolist()
         return Decision(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
 
 
 DEFAULT_RULE: AnswerRule = AnswerRule(threshold=0.9)
-"""Answer where the place is within 50 m of the best one with a chance of 0.9 by the model."""
+"""Answer if the place is within 50 m of the best one with a chance of 0.9 by the model."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """A cell (row number) with its viewpoint in metres, and whether it is given as the answer.
+    """A cell (row number) with its viewpoint in metres, and whether it is the answer.
 
     `mass` is the chance that the place is near it; `given` is False for "cannot tell".
     """
@@ -124,19 +124,19 @@ def calibrate(
     confidence: float = 0.95,
     radius: float = 50.0,
 ) -> AnswerRule:
-    """Choose the threshold that answers most queries and is right often enough.
+    """Choose the threshold that answers the most queries with the required precision.
 
     Parameters
     ----------
     masses, correct : array_like, shape (q,)
-        For each query the chance that the place is near the best one, and whether it was.
+        For each query, the chance that the place is near the best one, and whether it was.
     precision, confidence, radius : float
         As of `AnswerRule`; the confidence is over queries like these.
 
     Returns
     -------
     AnswerRule
-        The rule; its threshold is infinite where the queries do not prove any to be good enough.
+        The rule; its threshold is infinite if the queries do not show any to be good enough.
 
     Raises
     ------
@@ -145,11 +145,11 @@ def calibrate(
 
     Notes
     -----
-    A threshold is proven when answers that are wrong as often as allowed would have shown so few
-    errors with a chance of at most ``1 - confidence`` (Clopper and Pearson). So that the best of
-    many thresholds does not profit from luck, they are tried from strict to loose until one fails,
-    from four starting points that share the allowed chance (Angelopoulos et al., "Learn then test",
-    2021, fixed-sequence testing with several starts). Without errors, 98 % at 95 % need 217
+    A threshold passes if answers that are wrong as often as allowed would have had at most this
+    number of errors with a chance of at most ``1 - confidence`` (Clopper and Pearson). Thresholds
+    are tried from strict to loose until one fails, from four starting points that share the allowed
+    chance, so that the best of many does not profit from luck (Angelopoulos et al., "Learn then
+    test", 2021, fixed-sequence testing with several starts). Without errors, 98 % at 95 % need 217
     answers.
 
     Examples
@@ -177,6 +177,7 @@ def calibrate(
     ends = ends[ends + 1 >= fewest]
     if len(ends):
         ends = ends[np.unique(np.linspace(0, len(ends) - 1, STEPS).astype(int))]
+    # From each start, the loosest threshold before the first that fails.
     best = -1
     for start in range(STARTS):
         for end in ends[start * len(ends) // (2 * STARTS) :].tolist():

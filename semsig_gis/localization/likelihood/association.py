@@ -1,10 +1,10 @@
 """Which detection is which object: chances and sums over all one-to-one associations.
 
-A detection is one of the objects or clutter, an object is detected once or missed. Each pair has a
-weight, how much likelier the two are one thing than a miss and clutter. The likelihood sums over
-all associations, as `likelihood.photo` has it. The index adds up over the detections one by one, so
-that one lamp may explain three; its best cells are ranked again by this sum. An alignment that
-keeps the order would lose one query in twenty, as bearing noise swaps neighbours.
+A detection is one of the objects or clutter; an object is detected once or missed. The weight of a
+pair is how much likelier the two are one thing than a miss and clutter. The likelihood sums over
+all associations (see `likelihood.photo`). The index adds up over the detections one by one, so that
+one lamp may explain three; its best cells are ranked again by this sum. An alignment that keeps the
+order would lose one query in twenty, because bearing noise swaps neighbours.
 
 The sum is the Bethe approximation that belief propagation settles on (Williams and Lau,
 "Approximate evaluation of marginal association probabilities with belief propagation", 2014): exact
@@ -49,7 +49,7 @@ ROOT = math.sqrt(2.0 * math.pi)
 
 
 def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
-    """Return the logarithm of the chance of each turn, one step wide, all in degrees."""
+    """Return the log of the chance of each turn, which is one `step` wide; all are in degrees."""
     if math.isinf(north_sigma):
         return np.full(turns.shape, math.log(step / 360.0))
     scale = math.log(step / (north_sigma * math.sqrt(2.0 * math.pi)))
@@ -58,7 +58,7 @@ def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> ND
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pairs:
-    """The pairs of an object and a detection that may be one thing, for several problems.
+    """Pairs of an object and a detection that may be one thing, for several problems.
 
     The pairs of problem i are ``starts[i]:starts[i + 1]``. `objects` and `detections` are row
     numbers that run on over all problems. `away` is the bearing of the detection less that of the
@@ -79,7 +79,7 @@ def near_pairs(
     *,
     reach: float = 180.0,
 ) -> Pairs:
-    """Return the pairs of each problem whose bearings differ by at most `reach` degrees.
+    """Return the pairs of each problem with bearings at most `reach` degrees apart.
 
     Problem i has the objects ``object_starts[i]:object_starts[i + 1]``, and detections likewise.
     Pairs are ordered by problem and object.
@@ -98,10 +98,10 @@ def near_pairs(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Detections:
-    """What some photos show, one photo after the other.
+    """The detections of some photos, one photo after the other.
 
-    The detections of photo i are ``starts[i]:starts[i + 1]``; the arrays are those of all photos
-    joined, by detection last.
+    The detections of photo i are ``starts[i]:starts[i + 1]``; the arrays are joined over all
+    photos, with the detection as the last axis.
     """
 
     photos: tuple[PhotoTable, ...]
@@ -114,7 +114,7 @@ class Detections:
 
     @classmethod
     def of(cls, views: Sequence[Signature], table: NoiseTable) -> Detections:
-        """Return the photos of views with bearings, beside the classes of a table."""
+        """Return the detections of views with bearings, for the classes of a table."""
         parts = [part for view in views for part in View.of(view).split()]
         photos = tuple(PhotoTable.of(part, table) for part in parts)
         names = ("bearings", "ranges", "range_errors", "scores", "disc")
@@ -125,13 +125,13 @@ class Detections:
         return cls(photos=photos, starts=np.cumsum([0, *map(len, parts)]), **joined)
 
     @cached_property
-    def givers(self) -> NDArray[np.int64]:
+    def photo_rows(self) -> NDArray[np.int64]:
         """The photo of each detection."""
         return np.repeat(np.arange(len(self.photos)), np.diff(self.starts))
 
     @cached_property
     def turns(self) -> NDArray[np.float64]:
-        """How much of a full turn each photo sees."""
+        """The share of a full turn that each photo shows."""
         return np.array([photo.width for photo in self.photos])
 
     def inside(
@@ -140,9 +140,9 @@ class Detections:
         bearings: NDArray[np.float64],
         spreads: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return how much of the wrapped normal of some objects lies in the sectors of their photo.
+        """Return the share of the wrapped normal of some objects in the sectors of their photo.
 
-        Object i, of photo ``owners[i]``, has its bearing and spread in degrees. The second array is
+        Object i, of photo ``owners[i]``, has a bearing and a spread in degrees. The second array is
         the mean square of the deviations inside, in squares of the spread.
         """
         sectors = np.concatenate([photo.sectors for photo in self.photos])
@@ -165,10 +165,10 @@ class Detections:
 def _normal(
     deviations: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the normal distribution up to some deviations, and there its density times them."""
+    """Return the normal distribution function, and its density times the deviation."""
     mass = (deviations > 0).astype(np.float64)
     near = np.abs(deviations) < FARTHEST
-    mass[near] = [0.5 * math.erfc(-one * math.sqrt(0.5)) for one in deviations[near].tolist()]
+    mass[near] = [0.5 * math.erfc(-value * math.sqrt(0.5)) for value in deviations[near].tolist()]
     bent = np.zeros(deviations.shape)
     bent[near] = deviations[near] * np.exp(-0.5 * deviations[near] ** 2) / ROOT
     return mass, bent
@@ -176,12 +176,12 @@ def _normal(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Association:
-    """Which detection is which object, by chances.
+    """The chances that detections are objects.
 
-    By pair, `chances` that it is one thing. By object, its chance of detection `detection` at its
-    distance, and `inside` and `squares` as in `Detections.inside`. By detection, `clutter` is the
-    share of clutter in what is none of the objects; the rest came into range with the observer.
-    `loglik` is the log-likelihood of each photo.
+    By pair, `chances` that it is one thing. By object, its chance of `detection` at its distance,
+    and `inside` and `squares` as in `Detections.inside`. By detection, `clutter` is the share of
+    clutter in the detections that are none of the objects; the others are objects that are in range
+    of the observer but not of the place. `loglik` is the log-likelihood of each photo.
     """
 
     chances: NDArray[np.float64]
@@ -195,15 +195,15 @@ class Association:
 def associate(
     table: NoiseTable,
     views: VisibleObjects,
-    seen: Detections,
+    photos: Detections,
     pairs: Pairs,
     *,
     lengths: NDArray[np.int64],
 ) -> Association:
     """Return the chance that each pair is one thing, and the log-likelihood of each photo.
 
-    `views` is what there is to see in each photo, of classes that the table has; `lengths`, by
-    photo, is how many objects, by which the table is looked up.
+    `views` are the objects that each photo may show, of classes of the table; `lengths`, by photo,
+    is the number of objects by which the table is looked up.
     """
     rows, kinds = table.length_rows(lengths), table.row_of[views.codes]
     owners = np.repeat(np.arange(len(views)), views.lengths)
@@ -211,39 +211,42 @@ def associate(
     units = distance_units_of(distances, table.reach)
     spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
     spreads = np.minimum(spreads, HALF_TURN)
-    inside, squares = seen.inside(owners, views.bearings, spreads)
+    # By object: the chances of its detection and of a miss.
+    inside, squares = photos.inside(owners, views.bearings, spreads)
     near = table.detected[rows[owners], kinds]
     detection = near * table.remaining[kinds, units]
-    unseen = 1.0 - detection * inside
-    used, row = np.unique(rows, return_inverse=True)
-    named = table.named[used] @ seen.scores
-    # As many objects come into range as leave it, in any direction.
-    leaving = near * table.leaving[kinds, units]
-    gone = np.zeros((len(views), len(table.codes)))
-    np.add.at(gone, (owners, kinds), leaving)
-    names = named[row[seen.givers], :, np.arange(len(seen.givers))]
-    come = (gone[seen.givers] * names).sum(axis=1)
-    clutter = table.clutter @ seen.scores
-    floor = (clutter + come) * seen.disc / FULL_TURN
-    one, other = pairs.objects, pairs.detections
-    weights = (detection / unseen)[one] * _bearing_densities(pairs.away, spreads[one])
-    weights *= named[row[owners[one]], kinds[one], other] / floor[other]
-    ranged = np.flatnonzero(~np.isnan(seen.ranges[other]))
+    missed = 1.0 - detection * inside
+    # By detection: the density of clutter, and of objects that come into range in any direction,
+    # as many as leave it.
+    used_rows, row = np.unique(rows, return_inverse=True)
+    named = table.named[used_rows] @ photos.scores
+    leaving = np.zeros((len(views), len(table.codes)))
+    np.add.at(leaving, (owners, kinds), near * table.leaving[kinds, units])
+    names = named[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]
+    arriving = (leaving[photos.photo_rows] * names).sum(axis=1)
+    clutter = table.clutter @ photos.scores
+    floor = (clutter + arriving) * photos.disc / FULL_TURN
+    # By pair: the odds of detection, times the densities of bearing, name and range over the floor.
+    objects, detections = pairs.objects, pairs.detections
+    weights = (detection / missed)[objects] * _bearing_densities(pairs.away, spreads[objects])
+    weights *= named[row[owners[objects]], kinds[objects], detections] / floor[detections]
+    ranged = np.flatnonzero(~np.isnan(photos.ranges[detections]))
     if len(ranged):
-        weights[ranged] *= _range_densities(
-            table, seen, kinds[one[ranged]], distances[one[ranged]], other[ranged]
-        )
+        rows_with_range, metres = detections[ranged], distances[objects[ranged]]
+        spread = range_spreads(table, photos, kinds[objects[ranged]], metres, rows_with_range)
+        away = np.log(photos.ranges[rows_with_range] / metres) / spread
+        weights[ranged] *= np.exp(-0.5 * away**2) / (spread * ROOT)
     chances, log_sums = associate_pairs(pairs, weights)
     return Association(
         chances=chances,
         detection=detection,
         inside=inside,
         squares=squares,
-        clutter=clutter / (clutter + come),
+        clutter=clutter / (clutter + arriving),
         loglik=log_sums
-        + np.bincount(owners, np.log(unseen), len(views))
-        + np.bincount(seen.givers, np.log(floor), len(views))
-        - seen.turns * (table.clutter.sum() + gone.sum(axis=1)),
+        + np.bincount(owners, np.log(missed), len(views))
+        + np.bincount(photos.photo_rows, np.log(floor), len(views))
+        - photos.turns * (table.clutter.sum() + leaving.sum(axis=1)),
     )
 
 
@@ -255,7 +258,7 @@ def at_distances(table: NoiseTable, views: VisibleObjects) -> NDArray[np.float64
 def _bearing_densities(
     away: NDArray[np.float64], spread: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the density of the wrapped normal, a degree."""
+    """Return the density of the wrapped normal per degree."""
     density = np.exp(-0.5 * (away / spread) ** 2)
     wide = spread > WIDE
     laps = (away[wide, None] + LAPS) / spread[wide, None]
@@ -265,28 +268,15 @@ def _bearing_densities(
 
 def range_spreads(
     table: NoiseTable,
-    seen: Detections,
+    photos: Detections,
     kinds: NDArray[np.int64],
     distances: NDArray[np.float64],
     detections: NDArray[np.int64],
 ) -> NDArray[np.float64]:
     """Return the deviation of the logarithm of the range of pairs, by class and distance."""
-    own = seen.range_errors[detections]
+    own = photos.range_errors[detections]
     errors = np.where(np.isnan(own), table.range_sigma[kinds], own)
     return np.hypot(errors, table.position_sigma / distances)
-
-
-def _range_densities(
-    table: NoiseTable,
-    seen: Detections,
-    kinds: NDArray[np.int64],
-    distances: NDArray[np.float64],
-    detections: NDArray[np.int64],
-) -> NDArray[np.float64]:
-    """Return the density of the logarithms of the ranges of pairs."""
-    spread = range_spreads(table, seen, kinds, distances, detections)
-    away = np.log(seen.ranges[detections] / distances) / spread
-    return np.asarray(np.exp(-0.5 * away**2) / (spread * ROOT))
 
 
 def associate_pairs(
@@ -314,20 +304,23 @@ def associate_pairs(
 
 
 RERANKED = 500
-"""How many cells are re-ranked unless said otherwise."""
-FIRST = 100  # cells that are re-ranked whatever comes out; then as many again, twice as many, ...
-# Places in the others, of which a sample is looked at, and where time is short.
+"""Default number of cells that are re-ranked."""
+FIRST_RERANKED = 100  # always re-ranked; then as many again, twice as many, ...
+# Points in the other cells at which a sample of these is scored: usually, and for a quick answer.
 SAMPLE, QUICK_SAMPLE = 2304, 768
-# Cells that are looked at from aside before, the first of them whatever comes out.
-ASIDE, FIRST_ASIDE, SAMPLE_ASIDE = 8192, 2048, 1024
-HOPELESS = math.log(1e-3)  # of the chance, that the last of them hold, from which the rest are not
-NEGLIGIBLE = 30.0  # nats below the best that was re-ranked, at which cells hold nothing together
-POOL, WINDOWS = 16, 8  # times a sample, that it is taken from; parts of it, by likelihood
-# Turns around the likeliest one of the scan, which knows it to less than six degrees.
-TURNS = np.arange(-7.5, 7.6, 3.0)
+# Cells that are scored off their centres first, to choose the others: at most, at least, and the
+# sample of the rest.
+OFF_CENTRE, FIRST_OFF_CENTRE, SAMPLE_OFF_CENTRE = 8192, 2048, 1024
+# Re-ranking ends when the last batch of cells holds less than this share of the chance.
+LOG_LEAST_SHARE = math.log(1e-3)
+NEGLIGIBLE = 30.0  # nats below the best re-ranked cell at which all cells together are negligible
+POOL = 16  # the sample is drawn from this multiple of its size
+WINDOWS = 8  # ranges of the likelihood, each with a shift of its own
+# Degrees around the likeliest turn of the scan, which is exact to less than six degrees.
+NEAR_TURNS = np.arange(-7.5, 7.6, 3.0)
 
 
-def align_cells(
+def score_associations(
     database: SignatureDatabase,
     photo: Signature,
     noise: Noise,
@@ -337,13 +330,13 @@ def align_cells(
 ) -> NDArray[np.float64]:
     """Return the log-likelihood of a photo in some cells, summed over one-to-one associations.
 
-    As `photo_loglik`: the shape is (c,), or (c, r) if `turns`, the degrees to turn the photo by for
-    each cell, are given.
+    `turns`, shape (c, r), are the degrees to turn the photo by in each cell; the shape is that of
+    `turns`, or (c,) without them.
     """
     tables, weights = database_tables(database, noise)
     ways = np.zeros((len(cells), 1)) if turns is None else turns
-    asked = PhotoTable.of(View.of(photo), tables[0])
-    loglik = photo_loglik(asked, visible_objects_in(database, cells), tables, weights, turns=ways)
+    table = PhotoTable.of(View.of(photo), tables[0])
+    loglik = photo_loglik(table, visible_objects_in(database, cells), tables, weights, turns=ways)
     return loglik[:, 0] if turns is None else loglik
 
 
@@ -360,12 +353,12 @@ def rerank(
 ) -> CellScores:
     """Replace the scores of the best cells by their one-to-one likelihoods.
 
-    Up to `count` cells are re-ranked, until some hundred hold next to nothing of the chance.
-    Of the others, a `sample` is looked at, too, and each is moved by as much as those of the sample
-    with scores like its own, so that all masses fit each other. `log_prior` helps to choose the
-    cells and is not part of the result. Without bearings the scores are returned as they are.
-    Where queries are from anywhere, places `aside` of the middles are looked at, too: four in each
-    of some thousand cells by the plain sum, to choose the cells, and then nine in each.
+    Up to `count` cells are re-ranked, until a batch of them has a negligible share of the chance. A
+    `sample` of the others is scored as well, and each other cell is shifted by as much as the cells
+    of the sample with similar scores, so that all chances are comparable. `log_prior` helps to
+    choose the cells and is not part of the result. Without bearings, the scores are returned as
+    they are. For queries from anywhere in a cell, points `off_centre` are scored: four in each of
+    some thousand cells by the plain sum, to choose the cells, and then nine in each chosen cell.
     """
     if count < 1:
         raise InputError(f"the number of cells to re-rank is {count}; give a whole number from 1.")
@@ -375,22 +368,22 @@ def rerank(
     loglik = scores.loglik.astype(np.float64)
     if off_centre and len(index.observer_offsets[1]) > 1:
         scorer = index.off_centre_scorer(view, north_sigma=north_sigma)
-        loglik, _, _ = _replaced(
-            lambda some: (scorer(some), []),
+        loglik, _, _ = _replace_best(
+            lambda cells: (scorer(cells), []),
             loglik,
             log_prior,
-            count=ASIDE,
-            first=FIRST_ASIDE,
-            sample=SAMPLE_ASIDE,
+            count=OFF_CENTRE,
+            first=FIRST_OFF_CENTRE,
+            sample=SAMPLE_OFF_CENTRE,
         )
-    loglik, cells, turns = _replaced(
+    loglik, cells, turns = _replace_best(
         partial(
-            _aligned, index, view, scores=scores, north_sigma=north_sigma, off_centre=off_centre
+            _score_cells, index, view, scores=scores, north_sigma=north_sigma, off_centre=off_centre
         ),
         loglik,
         log_prior,
         count=count,
-        first=FIRST,
+        first=FIRST_RERANKED,
         sample=sample // (len(index.observer_offsets[1]) if off_centre else 1),
     )
     headings = []
@@ -403,7 +396,7 @@ def rerank(
     return CellScores(loglik=loglik, headings=tuple(headings))
 
 
-def _replaced(
+def _replace_best(
     rank: Callable[[NDArray[np.int64]], _Ranks],
     old: NDArray[np.float64],
     log_prior: NDArray[np.float64] | None,
@@ -414,8 +407,8 @@ def _replaced(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], list[NDArray[np.float64]]]:
     """Return better log-likelihoods of all cells, the best cells, and their turns.
 
-    `rank` gives them for some cells, with the turns: for the `first` ones, then more and more up to
-    `count`. By a `sample` of the others, these are moved.
+    `rank` returns log-likelihoods and turns of cells: it is called for the `first` cells, then for
+    more and more up to `count`. The others are shifted by a `sample` of them.
     """
     from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
 
@@ -424,25 +417,25 @@ def _replaced(
     cells = promising_cells(total.astype(np.float32), count)
     cells = cells[np.argsort(-total[cells], kind="stable")][:count]
     cells = cells[total[cells] > -np.inf]
-    parts, done = [rank(cells[:first])], min(first, len(cells))
-    while done < len(cells):
+    parts, size = [rank(cells[:first])], min(first, len(cells))
+    while size < len(cells):
         logs = np.concatenate([part for part, _ in parts])
         if log_prior is not None:
-            logs += log_prior[cells[:done]]
+            logs += log_prior[cells[:size]]
         last = logs[-len(parts[-1][0]) :]
-        if np.logaddexp.reduce(last) < np.logaddexp.reduce(logs) + HOPELESS:
+        if np.logaddexp.reduce(last) < np.logaddexp.reduce(logs) + LOG_LEAST_SHARE:
             break
-        parts.append(rank(cells[done : 2 * done]))
-        done = min(2 * done, len(cells))
-    cells, new = cells[:done], np.concatenate([part for part, _ in parts])
+        parts.append(rank(cells[size : 2 * size]))
+        size = min(2 * size, len(cells))
+    cells, new = cells[:size], np.concatenate([part for part, _ in parts])
     turns = [np.concatenate(each) for each in zip(*(turn for _, turn in parts), strict=True)]
     loglik = old.copy()
     if len(cells) < len(old):
-        # The best that was re-ranked may be far below what the others seem to be.
+        # The best re-ranked cell may be far below the first scores of the others.
         best = (new if log_prior is None else new + log_prior[cells]).max()
         rest = total > min(best, total.max()) - NEGLIGIBLE
         rest[cells] = False
-        _shift(loglik, lambda some: rank(some)[0], total, np.flatnonzero(rest), sample)
+        _shift(loglik, lambda cells: rank(cells)[0], total, np.flatnonzero(rest), sample)
     loglik[cells] = new
     return loglik, cells, turns
 
@@ -454,10 +447,10 @@ def _shift(
     tail: NDArray[np.int64],
     size: int,
 ) -> None:
-    """Move the log-likelihood of all cells as far as it changes for some of the `tail`.
+    """Shift the log-likelihood of all cells as much as it changes for a sample of the `tail`.
 
-    `rank` gives the new likelihood of some cells, `total` is that of all with the prior; so many
-    are tried.
+    `rank` returns the new likelihood of cells, `total` is the old one of all cells with the prior;
+    `size` is that of the sample.
     """
     if not len(tail):
         return
@@ -465,6 +458,7 @@ def _shift(
     if len(tail) > POOL * size:
         random = np.random.default_rng(0)
         pool = random.choice(tail, POOL * size, replace=False, shuffle=False)
+    # More of the likely cells than of the others, and the change of the chance by window.
     pool = pool[np.argsort(-total[pool], kind="stable")]
     ranks = np.unique(np.geomspace(1, len(pool), size).astype(np.int64)) - 1
     sample = pool[ranks]
@@ -479,7 +473,7 @@ def _shift(
     loglik += move
 
 
-def _aligned(
+def _score_cells(
     index: LikelihoodIndex,
     view: View,
     cells: NDArray[np.int64],
@@ -488,35 +482,35 @@ def _aligned(
     north_sigma: float,
     off_centre: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Return the log-likelihood in some cells, and the likeliest turns of the photos in each."""
+    """Return the log-likelihood of some cells, and the likeliest turns of the photos in each."""
     from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba loads slowly
 
-    models, places = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
-    seen = (
-        visible_objects_off_centre(index.database, cells, places)
+    models, points = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
+    views = (
+        visible_objects_off_centre(index.database, cells, points)
         if off_centre
         else visible_objects_in(index.database, cells)
     )
-    total, likeliest = np.zeros((len(cells), len(places))), []
+    total, likeliest = np.zeros((len(cells), len(points))), []
     for photo, heading in zip(view.split(), scores.headings, strict=True):
-        turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + TURNS
-        asked = PhotoTable.of(photo, index.table)
-        everywhere = np.repeat(turns, len(places), axis=0)
-        chances = np.zeros(everywhere.shape)
+        turns = np.zeros((len(cells), 1)) if heading is None else heading[cells, None] + NEAR_TURNS
+        table = PhotoTable.of(photo, index.table)
+        point_turns = np.repeat(turns, len(points), axis=0)
+        chances = np.zeros(point_turns.shape)
         if heading is not None:
-            step, sigma = TURNS[1] - TURNS[0], own_sigma(photo, north_sigma)
-            chances = turn_logs(everywhere, step, sigma)
+            step, sigma = NEAR_TURNS[1] - NEAR_TURNS[0], own_sigma(photo, north_sigma)
+            chances = turn_logs(point_turns, step, sigma)
         logliks = chances + photo_loglik(
-            asked,
-            seen,
+            table,
+            views,
             *models,
-            turns=everywhere,
+            turns=point_turns,
             log_prior=chances,
             # A place that does not fit one photo may fit the others.
-            group=len(places) if len(scores.headings) == 1 else 1,
+            group=len(points) if len(scores.headings) == 1 else 1,
         )
-        logliks = logliks.reshape(len(cells), len(places), -1)
+        logliks = logliks.reshape(len(cells), len(points), -1)
         best = np.logaddexp.reduce(logliks, axis=1).argmax(axis=1)
         likeliest.append(turns[np.arange(len(cells)), best])
         total += np.logaddexp.reduce(logliks, axis=2)
-    return np.logaddexp.reduce(total, axis=1) - math.log(len(places)), likeliest
+    return np.logaddexp.reduce(total, axis=1) - math.log(len(points)), likeliest

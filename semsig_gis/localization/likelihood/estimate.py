@@ -1,4 +1,4 @@
-"""The mean place of an answer, and how far off it may be."""
+"""The mean place of an answer, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import Displayed, signed_degrees
-from semsig_gis.localization.likelihood.association import align_cells
+from semsig_gis.localization.likelihood.association import score_associations
 from semsig_gis.localization.likelihood.index import own_sigma
 from semsig_gis.localization.likelihood.posterior import Refinement
 from semsig_gis.observation import View
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.model import Noise
 
 MOST_CELLS = 200
-"""Likeliest cells near the answer that are averaged; the others hold next to nothing."""
+"""Likeliest cells near the answer that are averaged; the others are negligible."""
 ELLIPSE_STEPS = 72
-TURN = 2.0  # degrees between the headings that are tried
+HEADING_STEP = 2.0  # degrees between the headings that are tried
 
 
 @dataclass(frozen=True, eq=False, repr=False, slots=True, kw_only=True)
@@ -32,8 +32,8 @@ class PlaceEstimate(Displayed):
     """A mean place in metres and a heading, each with its uncertainty.
 
     `heading` is in degrees to add to the bearings of the query, in [-180, 180), or None if they are
-    known. `covariance`, shape (3, 3), is of x, y (metres) and heading (degrees). `refined` tells
-    whether the place comes from between the viewpoints rather than from whole cells.
+    known. `covariance`, shape (3, 3), is of x, y (metres) and heading (degrees). `refined` is
+    whether the place was searched between the viewpoints, not only by whole cells.
     """
 
     x: float
@@ -53,7 +53,7 @@ class PlaceEstimate(Displayed):
 
     @property
     def sigma(self) -> float:
-        """Standard deviation of the place in metres, the root of the mean of both ways."""
+        """Standard deviation of the place in metres: the root mean square of x and y."""
         return math.sqrt(float(self.covariance[0, 0] + self.covariance[1, 1]) / 2.0)
 
     @property
@@ -74,7 +74,7 @@ class PlaceEstimate(Displayed):
         return longer, shorter, bearing
 
     def outline(self, share: float = 0.9) -> NDArray[np.float64]:
-        """Return points on that ellipse in metres, shape (n, 2), the last of them the first."""
+        """Return points on that ellipse in metres, shape (n, 2); the last is the first again."""
         longer, shorter, bearing = self.ellipse(share)
         turn, angle = math.radians(bearing), np.linspace(0.0, 2.0 * np.pi, ELLIPSE_STEPS + 1)
         along, across = longer * np.cos(angle), shorter * np.sin(angle)
@@ -110,15 +110,15 @@ def cell_estimate(
 ) -> PlaceEstimate:
     """Return the mean place within `radius` metres of a cell, from the chances of the cells.
 
-    For a place in two streets at once the mean lies between them, as it has the least mean squared
-    error. The covariance has ``step ** 2 / 12`` each way for the place in a cell. `north_sigma`
-    is in degrees. Headings are tried every two degrees of the turn, by cell, if the query may be
-    `turned`.
+    If the place may be in one of two streets, the mean is between them: it has the least mean
+    squared error. The covariance includes ``step ** 2 / 12`` in each direction for the place in a
+    cell. `north_sigma` is in degrees. If the query may be `turned`, headings are tried every two
+    degrees in each cell.
     """
     database, chances = posterior.database, posterior.chances
-    # The cells are ordered by column: those of the next columns are one run.
-    aside = math.ceil(radius / database.grid.step)
-    ends = database.columns[cell] + np.array([-aside, aside + 1])
+    # The cells are ordered by column: all cells of the columns around are one slice.
+    reach = math.ceil(radius / database.grid.step)
+    ends = database.columns[cell] + np.array([-reach, reach + 1])
     near = np.arange(*np.searchsorted(database.columns, ends))
     away = database.xy[near] - database.xy[cell]
     inside = near[(np.hypot(away[:, 0], away[:, 1]) <= radius) & (chances[near] > 0)]
@@ -129,14 +129,14 @@ def cell_estimate(
     north_sigma = own_sigma(photo, north_sigma)
     turned = turned and north_sigma > 0 and view.bearings is not None and len(view) > 0
     if turned:
-        turns = np.arange(-180.0, 180.0, TURN)
+        turns = np.arange(-180.0, 180.0, HEADING_STEP)
         each = np.broadcast_to(turns, (len(inside), len(turns)))
-        logs = align_cells(database, photo, noise, inside, turns=each)
+        logs = score_associations(database, photo, noise, inside, turns=each)
         logs -= 0.5 * (turns / north_sigma) ** 2
         shares = np.exp(logs - np.logaddexp.reduce(logs, axis=1)[:, None])
         headings = np.degrees(np.angle(shares @ np.exp(1j * np.radians(turns))))
         off = signed_degrees(turns - headings[:, None])
-        heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + TURN**2 / 12.0)
+        heading_sigmas = np.sqrt((shares * off**2).sum(axis=1) + HEADING_STEP**2 / 12.0)
     parts = Refinement(
         places=database.xy[inside],
         sizes=np.full(len(inside), database.grid.step),
@@ -154,7 +154,7 @@ def refined_estimate(
 ) -> PlaceEstimate | None:
     """Return the mean place within `radius` metres of another, around the best part of a cell.
 
-    It is None if no part is in the circle. `turned` tells whether the heading was looked for, too.
+    It is None if no part is in the circle. `turned` is whether the heading was searched as well.
     """
     away = refinement.places - np.asarray(xy)
     inside = np.hypot(away[:, 0], away[:, 1]) <= radius

@@ -1,6 +1,6 @@
-"""Why a place: which detections are which street objects, which were missed, which look false.
+"""Explain a place: which detections are which street objects, and which are missed or false.
 
-What stands outside the sectors of all photos is neither.
+Objects outside the sectors of all photos are neither.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from semsig_gis.observation import North
 
 UNKNOWN_NAME = "unknown"
-LEAST_CHANCE = 0.01  # of two things being one, to be set beside each other
-LEAST_SEEN = 0.5  # of an object's bearing in a sector, that it is in it
+LEAST_PAIR_CHANCE = 0.01  # that a detection is an object, to list them in one row
+LEAST_INSIDE = 0.5  # chance that the bearing of an object is in a sector, to count it as inside
 VERDICTS = ("matched", "misnamed", "missed", "false")
 OUTSIDE = "outside"
-NUMBERS = ("query", "photo", "object")  # of rows
+ROW_NUMBERS = ("query", "photo", "object")
 COLUMNS = [
     *("verdict", "chance", "query", "photo", "query_class", "query_bearing", "query_range"),
     *("object", "source", "source_id", "object_class", "object_bearing", "distance"),
@@ -47,16 +47,16 @@ COLUMNS = [
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Explanation(Displayed):
-    """What a query and a place have in common, and what not.
+    """Which objects a query and a place have in common, and which not.
 
-    `rows` has one for each object of the query, then one for each street object that none of them
-    is likely to be; `table` is the table of them. `verdict` is ``"matched"`` (more likely an object
-    than not), ``"misnamed"`` (the same, but of another class), ``"false"``, ``"missed"`` or, for
-    street objects in the sectors of no photo, ``"outside"``; `chance` is that it holds. `query`,
-    `photo` and `object` are row numbers, `distance` and `query_range`, as far as it was told, are
-    in metres, `bearing_error` in degrees clockwise from object to detection, and `place` that of
-    the street object. What does not apply is None. `place` and `xy` are in metres in `crs`,
-    `headings` are the degrees added to the bearings of each photo.
+    `rows` has a row for each object of the query, then one for each street object that is probably
+    none of them; `table` is a table of these rows. `verdict` is ``"matched"`` (more likely an
+    object than not), ``"misnamed"`` (the same, but of another class), ``"false"``, ``"missed"`` or,
+    for street objects in the sectors of no photo, ``"outside"``; `chance` is the probability of
+    the verdict. `query`, `photo` and `object` are row numbers, `distance` and `query_range`, if
+    given, are in metres, `bearing_error` is in degrees clockwise from object to detection, and
+    `place` that of the street object. Values that do not apply are None. `place` and `xy` are in
+    metres in `crs`, `headings` are the degrees added to the bearings of each photo.
     """
 
     rows: tuple[dict[str, Any], ...]
@@ -79,42 +79,41 @@ class Explanation(Displayed):
 
     @cached_property
     def table(self) -> gpd.GeoDataFrame:
-        """The rows with the street object as geometry; what does not apply is missing."""
+        """The rows with the street object as geometry; values that do not apply are missing."""
         import geopandas as gpd  # noqa: PLC0415 - it loads slowly
         import pandas as pd  # noqa: PLC0415
         import shapely  # noqa: PLC0415
 
         places = [row["place"] for row in self.rows]
         points = [None if place is None else shapely.Point(place) for place in places]
-        table = pd.DataFrame(self.rows, columns=COLUMNS).astype(dict.fromkeys(NUMBERS, "Int64"))
+        table = pd.DataFrame(self.rows, columns=COLUMNS).astype(dict.fromkeys(ROW_NUMBERS, "Int64"))
         return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
 
     def ends(self, reach: float) -> NDArray[np.float64]:
-        """Return where the line to each row ends, shape (n, 2): at its range, or at `reach`.
+        """Return the end of the line to each row, shape (n, 2): at its range, or at `reach`.
 
-        It goes where a detection was seen, and else where the street object stands.
+        It has the bearing of the detection or, without one, that of the street object.
         """
-        seen = [row["query_bearing"] for row in self.rows]
-        stands = [row["object_bearing"] for row in self.rows]
-        bearings = [there if at is None else at for at, there in zip(seen, stands, strict=True)]
-        metres = [
-            next(one for one in (row["query_range"], row["distance"], reach) if one is not None)
-            for row in self.rows
-        ]
+
+        def first_value(row: dict[str, Any], *names: str) -> float:
+            return next((row[name] for name in names if row[name] is not None), reach)
+
+        bearings = [first_value(row, "query_bearing", "object_bearing") for row in self.rows]
+        metres = [first_value(row, "query_range", "distance") for row in self.rows]
         angles = np.radians(np.array(bearings, dtype=np.float64))
         away = np.stack([np.sin(angles), np.cos(angles)], axis=1)
         return np.asarray(np.array(self.xy) + np.array(metres)[:, None] * away)
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many rows there are of each verdict, without what stands outside the sectors."""
+        """The number of rows by verdict, without objects outside the sectors."""
         counts = Counter(row["verdict"] for row in self.rows)
         return {verdict: counts[verdict] for verdict in VERDICTS}
 
     def to_dict(self, north: North = GRID_NORTH) -> dict[str, Any]:
-        """Return plain values for JSON; what does not apply in a row is None.
+        """Return plain values for JSON; values that do not apply are None.
 
-        The bearings of the table count from grid north, those of the values from `north`.
+        Bearings count from `north`, not from grid north as in the table.
         """
         rows = [{name: row[name] for name in COLUMNS} for row in self.rows]
         for row in rows:
@@ -142,13 +141,13 @@ def explain(
     heading: float | Sequence[float] = 0.0,
     footprints: Footprints | None = None,
 ) -> Explanation:
-    """Say which objects of a query are which street objects, if it was seen from a place.
+    """Explain which objects of a query are which street objects, if it was seen from a place.
 
     The query, perhaps a `View`, needs bearings; its types may be unknown. `xy` and `radius` are in
     metres, `heading` is in degrees to add to the bearings, one for all or one for each photo, and
-    what `footprints` hide is not seen. Chances are those of all one-to-one associations together,
-    each model of a mixture counting as much as the query speaks for it here. An object of a class
-    that the city does not have is false; a query without any other raises `InputError`.
+    objects behind `footprints` are not visible. Chances are sums over all one-to-one associations;
+    each model of a mixture is weighted by the likelihood of the query at this place. An object of a
+    class that the city does not have is false; a query without any other raises `InputError`.
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
@@ -166,10 +165,11 @@ def explain_cell(
     database: SignatureDatabase,
     heading: float | Sequence[float] = 0.0,
 ) -> Explanation:
-    """Say which objects of a query are which objects of a cell, using only the database.
+    """Explain which objects of a query are which objects of a cell, using only the database.
 
-    As `explain`, but a database does not know which objects a cell sees: the columns ``object``,
-    ``source`` and ``source_id`` are missing, and places of objects are good to some decimetres.
+    It is like `explain`, but a database does not contain which street objects a cell sees: the
+    columns ``object``, ``source`` and ``source_id`` are missing, and places of objects are exact to
+    some decimetres.
     """
     x, y = database.xy[cell].tolist()
     view = visible_objects_in(database, np.array([cell]))
@@ -178,22 +178,22 @@ def explain_cell(
     return scene.explanation(query, noise, heading)
 
 
-ENTRIES = ("objects", "codes", "bearings", "distances")
+OBJECT_FIELDS = ("objects", "codes", "bearings", "distances")
 
 
 @dataclass(frozen=True, slots=True)
 class _Chances:
-    """Chances that objects, in rows, are detections; of being missed, and of being in a sector."""
+    """Chances of pairs by object (rows) and detection; of a miss and of being in a sector."""
 
     chances: NDArray[np.float64]
     missed: NDArray[np.float64]
-    seen: NDArray[np.float64]
+    inside: NDArray[np.float64]
     loglik: float
 
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """What is seen from a place, of the classes that the city has."""
+    """The objects visible from a place, and the classes of the city."""
 
     xy: tuple[float, float]
     view: VisibleObjects
@@ -206,39 +206,40 @@ class _Scene:
     def explanation(
         self, query: Signature, noise: Noise, heading: float | Sequence[float]
     ) -> Explanation:
-        """Return the verdicts on the objects of a query and those of the scene."""
+        """Return the verdicts on the objects of a query and of the scene."""
         view = View.of(query)
         turns = np.broadcast_to(heading, len(view.photos)).astype(np.float64)
-        # Kept in its order, in which the rows are told.
+        # `replace` keeps the order of the objects, which is that of the rows of the query.
         view = replace(
             view,
             bearings=wrap_degrees(query_bearings(query) + turns[view.photo_rows]),
             photos=tuple(map(Photo.turned, view.photos, turns.tolist())),
         )
-        found = self._associated(view, noise)
+        pairs = self._pair_chances(view, noise)
         partners: dict[int, int] = {}
         for number in range(len(view.photos)):
             own = np.flatnonzero(view.photo_rows == number)
-            places = _partners(found.chances[:, own])
+            places = _partners(pairs.chances[:, own])
             partners |= {int(own[place]): entry for place, entry in places.items()}
-        rows = self._detections(view, found.chances, partners)
-        for entry, (missed, seen) in enumerate(
-            zip(found.missed.tolist(), found.seen.tolist(), strict=True)
+        rows = self._detection_rows(view, pairs.chances, partners)
+        for entry, (missed, inside) in enumerate(
+            zip(pairs.missed.tolist(), pairs.inside.tolist(), strict=True)
         ):
             if entry not in partners.values():
-                verdict = ("missed", missed) if seen >= LEAST_SEEN else (OUTSIDE, 1.0 - seen)
-                facts = dict(zip(("verdict", "chance"), verdict, strict=True))
-                rows.append(facts | self._object(entry))
+                is_inside = inside >= LEAST_INSIDE
+                verdict = "missed" if is_inside else OUTSIDE
+                chance = missed if is_inside else 1.0 - inside
+                rows.append({"verdict": verdict, "chance": chance, **self._object(entry)})
         blank = dict.fromkeys([*COLUMNS, "place"])
         return Explanation(
             rows=tuple(blank | row for row in rows),
             xy=self.xy,
             headings=tuple(turns.tolist()),
-            loglik=found.loglik,
+            loglik=pairs.loglik,
             crs=self.crs,
         )
 
-    def _associated(self, query: View, noise: Noise) -> _Chances:
+    def _pair_chances(self, query: View, noise: Noise) -> _Chances:
         """Return the chance that each object is each detection."""
         tables, weights = noise_tables(
             noise,
@@ -247,38 +248,39 @@ class _Scene:
             longest=LONGEST_TABLE,
             radius=self.radius,
         )
-        known = np.flatnonzero(query.among(self.codes))
-        tables[0].query_rows(query.select(known))  # refuses a query without any
-        # Every photo sees the same objects; its detections come one photo after the other.
+        rows = np.flatnonzero(query.among(self.codes))
+        tables[0].query_rows(query.select(rows))  # raises without any known class
+        # Every photo may show the same objects; its detections come one photo after the other.
         photos, size = len(query.photos), len(self.view.codes)
-        known = known[np.argsort(query.photo_rows[known], kind="stable")]
-        seen = Detections.of([query.select(known)], tables[0])
+        rows = rows[np.argsort(query.photo_rows[rows], kind="stable")]
+        detections = Detections.of([query.select(rows)], tables[0])
         views = replace(
             self.view,
             offsets=np.arange(photos + 1) * size,
-            **{name: np.tile(getattr(self.view, name), photos) for name in ENTRIES},
+            **{name: np.tile(getattr(self.view, name), photos) for name in OBJECT_FIELDS},
         )
-        pairs = near_pairs(views.offsets, views.bearings, seen.starts, seen.bearings)
+        pairs = near_pairs(views.offsets, views.bearings, detections.starts, detections.bearings)
         logliks, inside = np.log(weights), np.zeros((photos, size))
-        each = np.zeros((len(tables), size, len(query)))
+        by_model = np.zeros((len(tables), size, len(query)))
         lengths = np.full(photos, size)
         for number, (table, weight) in enumerate(zip(tables, weights.tolist(), strict=True)):
-            found = associate(table, views, seen, pairs, lengths=lengths)
-            each[number, pairs.objects % max(size, 1), known[pairs.detections]] = found.chances
-            logliks[number] += found.loglik.sum()
-            inside += weight * found.inside.reshape(photos, size)
+            association = associate(table, views, detections, pairs, lengths=lengths)
+            objects = pairs.objects % max(size, 1)
+            by_model[number, objects, rows[pairs.detections]] = association.chances
+            logliks[number] += association.loglik.sum()
+            inside += weight * association.inside.reshape(photos, size)
+        # The mean over the models, each weighted by its likelihood.
         total = float(np.logaddexp.reduce(logliks))
-        chances = np.tensordot(np.exp(logliks - total), each, axes=1)
+        chances = np.tensordot(np.exp(logliks - total), by_model, axes=1)
         missed = np.ones(size)
         for number in range(photos):
             missed *= 1.0 - chances[:, query.photo_rows == number].sum(axis=1)
-        seen_at_all = inside.max(axis=0)
-        return _Chances(chances, np.maximum(missed, 0.0), seen_at_all, total)
+        return _Chances(chances, np.maximum(missed, 0.0), inside.max(axis=0), total)
 
-    def _detections(
+    def _detection_rows(
         self, query: View, chances: NDArray[np.float64], partners: dict[int, int]
     ) -> list[dict[str, Any]]:
-        """Return one row for each object of the query."""
+        """Return a row for each object of the query."""
         bearings = query_bearings(query)
         codes = query.class_scores().argmax(axis=1)
         ranges = np.full(len(query), np.nan) if query.ranges is None else query.ranges
@@ -307,7 +309,7 @@ class _Scene:
         return rows
 
     def _object(self, entry: int) -> dict[str, Any]:
-        """Return what the table says of a street object."""
+        """Return the columns of a street object."""
         view = self.view
         bearing, distance = float(view.bearings[entry]), float(view.distances[entry])
         facts: dict[str, Any] = {
@@ -334,12 +336,12 @@ class _Scene:
 
 
 def _partners(chances: NDArray[np.float64]) -> dict[int, int]:
-    """Return the object that each detection most likely is, no object twice."""
+    """Return the likeliest object of each real detection; each object at most once."""
     real = chances.sum(axis=0) > 0.5  # noqa: PLR2004 - more likely than not
     partners: dict[int, int] = {}
     for place in np.argsort(-chances, axis=None, kind="stable").tolist():
         entry, number = divmod(place, chances.shape[1])
-        if chances[entry, number] <= LEAST_CHANCE:
+        if chances[entry, number] <= LEAST_PAIR_CHANCE:
             break
         if real[number] and number not in partners and entry not in partners.values():
             partners[number] = entry

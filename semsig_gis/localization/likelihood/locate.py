@@ -1,8 +1,8 @@
-"""Where a query was seen from: chances, a place with its region, or "cannot tell".
+"""Locate a query: chances of all cells, a place with its region, or "cannot tell".
 
-The steps of the likelihood method in one call: score every cell by the index, re-rank the best
-by one-to-one associations, turn the scores into chances, decide whether to answer, and, where the
-street objects are known, look for the place between the viewpoints and explain it.
+The likelihood method in one call: score every cell by the index, re-rank the best cells by
+one-to-one associations, turn the scores into chances, decide whether to answer, and, if the street
+objects are available, search the place between the viewpoints and explain it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_e
 from semsig_gis.localization.likelihood.explain import explain, explain_cell
 from semsig_gis.localization.likelihood.index import CellScores
 from semsig_gis.localization.likelihood.posterior import (
-    KEPT,
+    DIVIDED_PARTS,
     Posterior,
     posterior,
     prior_ratio,
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 DISAGREEMENT = 0.01
 """Ratio of a prior (see `posterior.prior_ratio`) at or below which an answer warns of it."""
-LARGE_POWER = 4  # of ten, from which on a number is written as a power
+LARGE_POWER = 4  # of ten; larger numbers are written as powers
 TINY = np.finfo(np.float64).tiny
 
 
@@ -68,22 +68,22 @@ class Location(Answer):
     Parameters
     ----------
     query, cells, crs, taxonomy, licenses
-        What was searched for, how many cells were searched, and what their database says of its
-        CRS, classes and sources.
+        The query, the number of cells that were searched, and the CRS, classes and licences of
+        their database.
     noise : str
         Name of the noise model.
     columns : mapping of str to ndarray
-        Of the likeliest cells, which are the rows of `candidates`, likeliest first: ``rank`` (from
-        1), ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the
+        The columns of `candidates`, the likeliest cells, likeliest first: ``rank`` (from 1),
+        ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the
         database), ``types`` (symbols), ``length`` (objects), ``loglik`` (natural logarithm of the
-        likelihood), ``chance`` and, if north was not known exactly, ``heading`` (degrees to
-        add to the bearings of the query).
+        likelihood), ``chance`` and, if north was not known exactly, ``heading`` (degrees to add to
+        the bearings of the query).
     answer : Decision
         The cell around which the chance is largest, that chance, and whether it is enough.
     estimate : PlaceEstimate
         The place around that cell and the heading, each with its uncertainty.
     rule : AnswerRule
-        What the decision rests on.
+        The rule of the decision.
     region : ndarray of int64
         Row numbers of the fewest cells that contain 90 % of the chance, likeliest first.
     posterior : Posterior
@@ -91,12 +91,12 @@ class Location(Answer):
     loglik : ndarray of float, shape (n,)
         Natural logarithm of the likelihood of every cell.
     explanations : tuple of Explanation
-        Of the first candidates, in their order: which detections are which street objects.
+        Explanations of the first candidates, in their order.
     known : mapping of str
-        What was known of the place before, in plain values.
+        The prior of the place, in plain values.
     prior_ratio : float or None
-        How much likelier the query is with what was known than with all cells alike; None if
-        nothing was known.
+        Ratio of the likelihoods of the query with the prior and with a uniform one; None without
+        a prior.
 
     Examples
     --------
@@ -156,17 +156,17 @@ class Location(Answer):
         return cells
 
     def explore(self) -> MapFrame:
-        """Show where it may have been seen on a map in a notebook (see `location_map`)."""
+        """Show the answer on a map in a notebook (see `location_map`)."""
         return map_with("location_map", self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the chances of all cells as plain values that JSON can hold.
+        """Return everything except the chances of all cells as plain values for JSON.
 
-        ``place`` is what `PlaceEstimate.to_dict` gives with its ``cell_id``, ``lon``, ``lat``,
-        ``chance`` and ``within_m``. ``threshold`` is None where nothing is answered. ``candidates``
-        has the names of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, of the first
-        ones, ``explanation``. Its bearings count from ``north``, as those of the query do;
-        ``prior`` holds `known` and ``ratio``; None if nothing was known.
+        ``place`` has the keys of `PlaceEstimate.to_dict` and ``cell_id``, ``lon``, ``lat``,
+        ``chance`` and ``within_m``. ``threshold`` is None if no chance is enough. ``candidates``
+        have the keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the first of them,
+        ``explanation``, with bearings from ``north`` like those of the query. ``prior`` has the
+        keys of `known` and ``ratio``; it is None without a prior.
         """
         lon, lat = to_degrees(self.crs).transform(self.estimate.x, self.estimate.y)
         candidates = self._candidate_records()
@@ -202,12 +202,11 @@ class Location(Answer):
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class LikelihoodLocator:
-    """An index, and how queries to it are answered; `locate` describes the fields.
+    """An index with the settings of its answers; `locate` describes the fields.
 
-    A place is also refined if `refined` is None and there are a store and bearings. A `quick`
-    answer looks at cells only from their centres, looks closely at fewer of them, and gives no
-    heading of the place. An `incremental` index, of `index`, is for a
-    view that grows from query to query.
+    If `refined` is None, a place is refined if there are a store and bearings. A `quick` answer
+    scores cells only at their centres, re-ranks fewer of them, and has no heading of the place. An
+    `incremental` index, which wraps `index`, is for a view that grows from query to query.
     """
 
     index: LikelihoodIndex
@@ -238,13 +237,13 @@ class LikelihoodLocator:
         scores: CellScores | None = None,
         scanned: CellScores | None = None,
     ) -> Location:
-        """Find where a query was seen from, by its `scores` or `scanned` if known already."""
+        """Locate a query, from its `scores` or the result `scanned` of `scan` if they are known."""
         scores = scores or self.scores(query, self.log_prior, scanned=scanned)
         chances = posterior(self.index.database, scores.loglik, log_prior=self.log_prior)
         store, ratio = self._store_for([query]), None
         if self.log_prior is not None:
-            alone = self.scores(query, scanned=scanned)
-            ratio = prior_ratio(alone.loglik, self.log_prior)
+            without_prior = self.scores(query, scanned=scanned)
+            ratio = prior_ratio(without_prior.loglik, self.log_prior)
         top = top or self.top
         return self._location(query, scores, chances, top=top, store=store, ratio=ratio)
 
@@ -256,9 +255,9 @@ class LikelihoodLocator:
         scores: Sequence[CellScores] | None = None,
         scanned: CellScores | None = None,
     ) -> tuple[Location, ...]:
-        """Find where the views of a route were seen from; any of them may have no objects.
+        """Locate the views of a route; any of them may have no objects.
 
-        Their `scores`, and of the first what was `scanned`, are worked out unless they are known.
+        Their `scores`, and the result `scanned` of `scan` for the first, are computed if not given.
         """
         if scores is None:
             first = [self.scores(query, self.log_prior) for query in queries[:1]]
@@ -291,7 +290,7 @@ class LikelihoodLocator:
             seconds = time.perf_counter() - start
             answer, estimate = location.answer, location.estimate
             scores = -location.loglik.astype(np.float32)
-            first = [answer.cell] if self.refined else _places_like(location)
+            first = [answer.cell] if self.refined else _best_places(location)
             scores[first] = scores.min() - 1.0
             yield Ranking(
                 scores=scores,
@@ -304,16 +303,16 @@ class LikelihoodLocator:
                 seconds=seconds,
             )
 
-    def _known(self, query: Signature) -> Signature:
-        """Return a query in the grid, without what is false wherever it was seen from."""
+    def _usable_objects(self, query: Signature) -> Signature:
+        """Return a query in the grid, without objects of classes that no cell sees."""
         query = self.north.to_grid(query)
-        known = query.among(self.index.database.present_codes)
-        return query if known.all() else query.select(known)
+        usable = query.among(self.index.database.present_codes)
+        return query if usable.all() else query.select(usable)
 
     def scan(self, query: Signature) -> CellScores:
-        """Return the scores of all cells by the sum over detections, one by one."""
+        """Return the scores of all cells by the sum over detections one by one."""
         index = self.incremental or self.index
-        return index.scores(self._known(query), north_sigma=self.north_sigma)
+        return index.scores(self._usable_objects(query), north_sigma=self.north_sigma)
 
     def scores(
         self,
@@ -322,10 +321,10 @@ class LikelihoodLocator:
         *,
         scanned: CellScores | None = None,
     ) -> CellScores:
-        """Return the scores of all cells, of the best by one-to-one associations."""
+        """Return the scores of all cells; those of the best are by one-to-one associations."""
         return rerank(
             self.index,
-            self._known(query),
+            self._usable_objects(query),
             scanned or self.scan(query),
             north_sigma=self.north_sigma,
             log_prior=log_prior,
@@ -334,7 +333,7 @@ class LikelihoodLocator:
         )
 
     def _store_for(self, queries: Sequence[Signature]) -> ObjectStore | None:
-        """Return the street objects to refine places with, if they are to be refined."""
+        """Return the street objects if places are to be refined, else None."""
         blind = any(query.bearings is None and len(query) for query in queries)
         return self.store if self.refined or (self.refined is None and not blind) else None
 
@@ -348,11 +347,11 @@ class LikelihoodLocator:
         store: ObjectStore | None,
         ratio: float | None,
     ) -> Location:
-        """Return the answer to a query, from the chances of the cells; a store is to refine it."""
+        """Return the answer from the chances of the cells, refined if a store is given."""
         parts = None
-        known = self._known(query)
-        if store is not None and len(known):
-            parts = self._parts(known, scores, posterior, store)
+        usable = self._usable_objects(query)
+        if store is not None and len(usable):
+            parts = self._parts(usable, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
         answer = self.rule.decide(posterior)
         radius, sigma = self.rule.radius, self.north_sigma
@@ -363,7 +362,7 @@ class LikelihoodLocator:
             estimate = refined_estimate(parts, xy, radius=radius, turned=scores.heading is not None)
         if estimate is None:
             estimate = cell_estimate(
-                known,
+                usable,
                 noise,
                 posterior,
                 answer.cell,
@@ -372,7 +371,7 @@ class LikelihoodLocator:
                 turned=not self.quick,
             )
         columns = _columns(scores, posterior, min(top, len(scores.loglik)))
-        first = columns["cell"].tolist()[: self.explained if len(known) else 0]
+        first = columns["cell"].tolist()[: self.explained if len(usable) else 0]
         return Location(
             query=query,
             noise=noise.name,
@@ -403,32 +402,28 @@ class LikelihoodLocator:
     ) -> Refinement:
         """Return the chances of the parts of the likeliest cells."""
         database, chances = posterior.database, posterior.chances
-        cells = posterior.likeliest(KEPT[0])
+        cells = posterior.likeliest(DIVIDED_PARTS[0])
         cells = cells[chances[cells] > 0]
         return refine(
             query,
             database.xy[cells],
             place_noise(self.index.noise, database.grid.step),
-            objects=store.objects,
-            index=store.index,
+            store=store,
             step=database.grid.step,
             radius=database.spec.radius,
             north_sigma=self.north_sigma,
-            headings=[None if one is None else one[cells] for one in scores.headings],
-            # All that is known of the cells but for what this query tells.
+            headings=[None if turns is None else turns[cells] for turns in scores.headings],
+            # The chances of the cells without the likelihood of this query.
             log_prior=np.log(chances[cells]) - scores.loglik[cells],
-            footprints=store.buildings_around(
-                database.xy[cells], distance=database.reach + database.grid.step
-            ),
         )
 
     def _explanation(
         self, query: Signature, cell: int, scores: CellScores, parts: Refinement | None
     ) -> Explanation:
-        """Return what speaks for a cell: at the likeliest part of it, or at its middle."""
+        """Explain a query at a cell: at its likeliest part, or at its centre."""
         query = self.north.to_grid(query)
         database, noise = self.index.database, self.index.noise
-        headings = [0.0 if one is None else float(one[cell]) for one in scores.headings]
+        headings = [0.0 if turns is None else float(turns[cell]) for turns in scores.headings]
         if self.store is None:
             return explain_cell(query, cell, noise, database=database, heading=headings)
         x, y = database.xy[cell].tolist()
@@ -450,7 +445,7 @@ class LikelihoodLocator:
 
 
 class LocateOptions(TypedDict, total=False):
-    """How queries are answered; `locate` describes the options."""
+    """The settings of answers; `locate` describes them."""
 
     north_sigma: float
     log_prior: NDArray[np.float64] | None
@@ -464,26 +459,26 @@ class LocateOptions(TypedDict, total=False):
 
 
 def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOptions]) -> Location:
-    """Find where a query was seen from, by likelihood.
+    """Locate a query: find the place that it was seen from, by likelihood.
 
     Parameters
     ----------
     index : LikelihoodIndex
-        The cells and the noise model; for queries from anywhere, not from the middles of cells
-        alone, that is ``cell_noise(noise, step)``.
+        The cells and the noise model: for queries from anywhere, not only from the centres of
+        cells, it is ``cell_noise(noise, step)``.
     query : Signature
-        What was seen, perhaps nothing; types or bearings may be unknown. Objects of a class that
-        no cell sees are false detections, and the answer says so.
+        The observed objects, perhaps none; types or bearings may be unknown. Objects of a class
+        that no cell sees are false detections, and the answer has a note on them.
     **options : LocateOptions
         ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
-        default and infinite if it is not known; ``log_prior``, shape (n,), what else is known of
-        the place (see `likelihood.priors`). The ``rule`` says when to answer, from a chance of 0.9
-        by default, and ``top`` (10) how many cells to list. The ``store`` holds the street objects
-        behind the cells: with ``refined`` the place is looked for between the viewpoints, too, and
-        the chances of the cells are those of their parts together. ``explained`` (0) candidates
-        are explained; without a store, street objects have no identifiers. ``known`` is what the
-        answer repeats of the prior, in plain values. The ``north`` is what the bearings count
-        from, grid north by default.
+        default and infinite if it is not known; ``log_prior``, shape (n,), is a prior of the place
+        (see `likelihood.priors`). The ``rule`` is when to answer, from a chance of 0.9 by default,
+        and ``top`` (10) the number of cells to list. The ``store`` has the street objects of the
+        cells: with ``refined``, the place is searched between the viewpoints as well, and the
+        chance of a cell is the sum over its parts. ``explained`` (0) is the number of candidates
+        to explain; without a store, street objects have no identifiers. ``known`` describes the
+        prior in the answer, in plain values. The ``north`` is the direction from which bearings
+        count, grid north by default.
 
     Returns
     -------
@@ -493,8 +488,7 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     Raises
     ------
     InputError
-        If a number is out of its range, or what is asked for needs bearings, a store, or another
-        index.
+        If a number is out of its range, or bearings, a store or another index are required.
 
     Examples
     --------
@@ -522,18 +516,18 @@ def locate_route(
     legs: Sequence[Leg],
     **options: Unpack[LocateOptions],
 ) -> tuple[Location, ...]:
-    """Find where the views of a route were seen from, each given all of them.
+    """Locate the views of a route, each by all of them.
 
     Parameters
     ----------
     index : LikelihoodIndex
         As of `locate`.
     queries : sequence of Signature
-        The views. One may have no objects: that nothing was detected tells something, too.
+        The views. A view may be without objects, which is information as well.
     legs : sequence of Leg
-        The ways between them, one fewer; InputError if the numbers do not fit.
+        The legs between them, one fewer than views; otherwise InputError.
     **options : LocateOptions
-        As of `locate`, for each view; ``log_prior`` is of the place of the first view.
+        As of `locate`, for each view; ``log_prior`` is that of the first view.
 
     Returns
     -------
@@ -554,7 +548,7 @@ def locate_route(
 
 
 def _prior_notes(ratio: float | None) -> tuple[str, ...]:
-    """Return what to say of a prior that the view speaks against."""
+    """Return a note if the view contradicts the prior."""
     if ratio is None or ratio > DISAGREEMENT:
         return ()
     power = -math.log10(ratio)
@@ -581,18 +575,18 @@ def _columns(scores: CellScores, posterior: Posterior, count: int) -> dict[str, 
     return columns
 
 
-def _places_like(location: Location) -> NDArray[np.intp]:
-    """Return the cells that might have been the answer as well, and the answer."""
+def _best_places(location: Location) -> NDArray[np.intp]:
+    """Return the cells that are as good an answer as the answer, and the answer."""
     chances, answer = location.chances, location.answer
-    alike = np.flatnonzero(chances == chances[answer.cell])
-    masses = location.posterior.mass_within(location.rule.radius, alike)
-    return np.asarray(alike[np.round(masses, 9) == answer.mass])
+    equal = np.flatnonzero(chances == chances[answer.cell])
+    masses = location.posterior.mass_within(location.rule.radius, equal)
+    return np.asarray(equal[np.round(masses, 9) == answer.mass])
 
 
 def _with_parts(
     parts: Refinement, scores: CellScores, before: Posterior
 ) -> tuple[CellScores, Posterior]:
-    """Return the scores and chances of the cells, those of the parts in the place of older ones."""
+    """Return the scores and chances of the cells, replaced by those of the parts."""
     database = before.database
     owners = _owners(parts, database)
     cells, rows = np.unique(owners, return_inverse=True)

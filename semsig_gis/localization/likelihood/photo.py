@@ -1,18 +1,19 @@
-"""One photo as numbers, beside the noise tables it is compared by, and its likelihood in places.
+"""One photo as arrays for a noise table, and its likelihood at places.
 
 With objects i of a place (class ``t_i``, bearing ``b_i``, distance ``d_i``) and detections j of a
-photo that saw the sectors S (bearing ``a_j``, rough range ``r_j``, scores ``c_j``), the likelihood
-sums over all one-to-one associations A of objects and detections:
+photo that shows the sectors S (bearing ``a_j``, rough range ``r_j``, scores ``c_j``), the
+likelihood sums over all one-to-one associations A of objects and detections:
 
     L = prod_i (1 - w_i p_i) * exp(-clutter |S|) * prod_j lambda_j
         * sum_A prod_(i,j in A) p_i / (1 - w_i p_i) C_ij N(a_j - b_i) R(r_j; d_i) / lambda_j
 
-with ``p_i`` the chance of detection at its distance, ``w_i`` that its bearing comes out in S,
-``C_ij`` the chance of the name that it got, R a log-normal density, 1 where no range is given,
-and ``lambda_j`` the density of false detections: uniform over the turn and, for a range, the disc.
+with ``p_i`` the chance of detection at its distance, ``w_i`` the chance that its bearing is in S,
+``C_ij`` the chance of its name, R a log-normal density (1 without a range), and ``lambda_j`` the
+density of false detections: uniform over the turn and, for a range, the disc.
 
-At the edge of range, an observer elsewhere in a cell misses objects that are seen from its centre,
-and sees as many others of the same class: ``p_i`` falls there, and ``lambda_j`` rises by as much.
+At the edge of range, an observer off the centre of a cell misses objects that are seen from the
+centre, and sees as many others of the same class: ``p_i`` falls there, and ``lambda_j`` rises by
+the same amount.
 """
 
 from __future__ import annotations
@@ -49,18 +50,18 @@ if TYPE_CHECKING:
     from semsig_gis.observation import View
 
 PLACES_A_THREAD = 32  # the fewest places that are worth a thread
-FIRST = 128  # likely places whose best likelihood bounds those of the others
-LOST = 3e-3  # share of a sum that all terms together may lose
+FIRST_PLACES = 128  # likely places that are scored first; their best score bounds the others
+LOST_SHARE = 3e-3  # of a sum, that negligible terms together may have
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PhotoTable:
-    """The n detections of one photo beside noise tables of k classes.
+    """The n detections of one photo, for noise tables of k classes.
 
-    `ranges` and `range_errors` are NaN where nothing is known. `scores`, shape (k, n), is what is
-    said of each class. `disc` is the density of the logarithm of the range of a false detection, 1
-    without a range. `sectors` has shape (s, 2), none for the full turn, of which `width` is the
-    share that was seen.
+    `ranges` and `range_errors` are NaN if unknown. `scores`, shape (k, n), are the scores of the
+    classes. `disc` is the density of the logarithm of the range of a false detection, 1 without a
+    range. `sectors`, shape (s, 2), are empty for a full turn; `width` is the share of a full turn
+    that the photo shows.
     """
 
     bearings: NDArray[np.float64]
@@ -73,7 +74,7 @@ class PhotoTable:
 
     @classmethod
     def of(cls, photo: View, table: NoiseTable) -> PhotoTable:
-        """Return the table of a view of one photo, whose objects may all be of classes known."""
+        """Return the table of a view of one photo; InputError if a class is not in `table`."""
         if photo.bearings is None:
             raise InputError(
                 "the query has no bearings, which the search between cells needs; give them."
@@ -81,11 +82,11 @@ class PhotoTable:
         size = len(photo)
         unknown = np.full(size, math.nan)
         ranges = unknown if photo.ranges is None else photo.ranges
-        known = ~np.isnan(ranges)
-        disc = np.where(known, 2.0 * (np.where(known, ranges, 1.0) / table.reach) ** 2, 1.0)
+        ranged = ~np.isnan(ranges)
+        disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / table.reach) ** 2, 1.0)
         if photo.scores is None:
             if size:
-                table.query_rows(photo)  # refuses classes that are not known
+                table.query_rows(photo)  # raises for unknown classes
             codes = np.zeros(size, np.uint8) if photo.codes is None else photo.codes
             scores = (table.codes[:, None] == codes) | (codes == WILDCARD)
         else:
@@ -106,8 +107,7 @@ class PhotoTable:
 
     def range_sigma(self, table: NoiseTable) -> NDArray[np.float64]:
         """Return the relative error of each range by class, shape (k, n)."""
-        known = ~np.isnan(self.range_errors)
-        return np.where(known, self.range_errors, table.range_sigma[:, None])
+        return np.where(~np.isnan(self.range_errors), self.range_errors, table.range_sigma[:, None])
 
     def arrays(self, tables: Sequence[NoiseTable]) -> PhotoArrays:
         """Return the photo and its names by some tables, as the kernel takes them."""
@@ -124,11 +124,11 @@ class PhotoTable:
         )
 
     def density(self, table: NoiseTable) -> NDArray[np.float64]:
-        """Return the density of false detections like each, by the degree, shape (n,)."""
+        """Return the density per degree of false detections with the name of each, shape (n,)."""
         return np.asarray(table.clutter @ self.scores * self.disc / FULL_TURN)
 
     def named(self, table: NoiseTable) -> NDArray[np.float64]:
-        """Return the chance of what is said of each detection, by length and class, (l, k, n)."""
+        """Return the chance of the scores of each detection, by length and class, (l, k, n)."""
         wrong = table.misnamed[:, :, None]
         return np.asarray((1.0 - wrong) * self.scores + wrong * (table.others @ self.scores))
 
@@ -149,7 +149,7 @@ def photo_loglik(
     `weights` are the chances of the tables, `turns` the degrees to turn the photo by at each place.
     If only sums over each `group` of successive places are needed, with a `log_prior` of places and
     turns, or only the sum over the `whole`, in which likely places come first, then terms that are
-    negligible in the sum (`LOST`) are not computed: they get an upper bound.
+    negligible in the sum (`LOST_SHARE`) are not computed: they get an upper bound.
     """
     from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba takes 250 ms
 
@@ -169,7 +169,7 @@ def photo_loglik(
     arrays, models = photo.arrays(tables), _noise_models(tables, weights)
     logliks = np.empty((len(tables), *turns.shape))
     summed = len(tables) * turns.shape[1] * (len(turns) if whole else group)
-    margin = math.log(summed / LOST)
+    margin = math.log(summed / LOST_SHARE)
 
     def fill(part: NDArray[np.int64], reached: float) -> None:
         sum_associations(part, group, reached, margin, objects, arrays, models, grid, logliks)
@@ -177,7 +177,7 @@ def photo_loglik(
     groups, least = -(-len(turns) // group), max(PLACES_A_THREAD // group, 1)
     ahead, reached = 0, -math.inf
     if whole:
-        ahead = min(FIRST, groups)
+        ahead = min(FIRST_PLACES, groups)
         share_rows(lambda part: fill(part, -math.inf), ahead, least=least)
         reached = float((logliks[:, :ahead] + prior[:ahead]).max(initial=reached))
     share_rows(lambda part: fill(part + ahead, reached), groups - ahead, least=least)

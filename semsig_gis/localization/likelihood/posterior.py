@@ -1,8 +1,8 @@
 """The chance of every cell, and the place between the cells.
 
-A place is sought part by part of the likeliest cells: a part of side s counts with an uncertainty
-of ``s / 12 ** 0.5`` each way, the deviation of places anywhere in it, so that its likelihood stands
-for the mean over the part.
+The likeliest cells are divided into parts, and the likeliest parts again. A part of side s is
+scored with a position uncertainty of ``s / 12 ** 0.5`` in x and y, the deviation of a uniform
+distribution, so that its likelihood is about the mean over the part.
 """
 
 from __future__ import annotations
@@ -28,17 +28,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from semsig_gis.core import ObjectIndex, Signature
-    from semsig_gis.database import Footprints, SignatureDatabase
+    from semsig_gis.core import Signature
+    from semsig_gis.database import ObjectStore, SignatureDatabase
     from semsig_gis.localization.noise.model import Noise
-    from semsig_gis.objects import StreetObjects
 
 
-LEAST_LOG = -700.0  # whose exponential is a number
-ROUNDING = 1e-3  # of a sum of chances that were written as float32
-PLACES = 1000
-"""Likeliest cells among which the best place is looked for."""
-LEAST_POWER = -1100  # of two, below which there is no number
+LEAST_LOG = -700.0  # its exponential is above 0
+ROUNDING = 1e-3  # of a sum of chances in a file of float32
+LIKELIEST_CELLS = 1000
+"""Cells among which the best place is searched."""
+LEAST_POWER = -1100  # of two; smaller numbers are 0
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -75,20 +74,20 @@ class Posterior(Displayed):
         return np.where(self.chances > 0, np.frexp(self.chances)[1] - LEAST_POWER, 0)
 
     def _top(self, amount: float, chances: NDArray[np.float64] | None = None) -> NDArray[np.int64]:
-        """Return the cells that may be among the likeliest that make up an amount, in any order.
+        """Return cells that include the likeliest ones up to an amount, in any order.
 
-        It is a number of cells or, with the chances, a share of these. To sort all takes longer.
+        The amount is a number of cells or, with the chances, a share. Sorting all takes longer.
         """
-        held = np.cumsum(np.bincount(self._powers, chances)[::-1])
-        power = len(held) - 1 - int(np.searchsorted(held, amount))
+        amounts = np.cumsum(np.bincount(self._powers, chances)[::-1])
+        power = len(amounts) - 1 - int(np.searchsorted(amounts, amount))
         return np.flatnonzero(self._powers >= power)
 
     def likeliest(self, count: int) -> NDArray[np.int64]:
-        """Return the row numbers of so many cells, likeliest first, or all if there are fewer."""
+        """Return the row numbers of the `count` likeliest cells, likeliest first."""
         cells = self._top(count)
         if len(cells) > 2 * count:
             some = self.chances[cells]
-            # Of the negative, because equal zeros at the beginning would take ten times as long.
+            # Partition the negatives: many equal zeros at the start take ten times as long.
             least = -np.partition(-some, count - 1)[count - 1]
             above, equal = cells[some > least], cells[some == least]
             cells = np.concatenate([above, equal[: count - len(above)]])
@@ -103,14 +102,14 @@ class Posterior(Displayed):
     def credible_cells(self, share: float = 0.9) -> NDArray[np.int64]:
         """Return the row numbers of the fewest cells that contain a share of the chance.
 
-        The share is above 0 and at most 1, or raises `InputError`. Likeliest first, equal chances
-        in the order of the database; cells without any chance are never among them.
+        Likeliest first, equal chances in the order of the database, never cells of chance 0. Raises
+        `InputError` if the share is not above 0 and at most 1.
         """
         if not 0 < share <= 1:
             raise InputError(
                 f"a region of a share of {share} was asked for; give a number above 0, at most 1."
             )
-        # The small term keeps a sum of 0.9 - 1e-17 from asking for one cell more.
+        # A sum of 0.9 - 1e-17 must not add another cell.
         share *= 1.0 - 1e-12
         cells = self._top(share, self.chances)
         cells = _likeliest_first(self.chances, cells[self.chances[cells] > 0])
@@ -121,8 +120,8 @@ class Posterior(Displayed):
     ) -> NDArray[np.float64]:
         """Return the chance that the place is at most `radius` metres from a cell, shape (c,).
 
-        It is the sum over the viewpoints in the circle, for some cells (row numbers) or all. A
-        radius that is negative or not finite raises `InputError`.
+        It is the sum over the viewpoints in the circle, for some cells (row numbers) or all. Raises
+        `InputError` if the radius is negative or not finite.
         """
         if not (math.isfinite(radius) and radius >= 0):
             raise InputError(f"a radius of {radius} m was given; give metres, 0 or more.")
@@ -130,28 +129,28 @@ class Posterior(Displayed):
         centres = slice(None) if cells is None else cells
         columns = database.columns[centres].astype(np.int64)
         rows = database.rows[centres].astype(np.int64)
-        # The cells are ordered by column and row: in each column, the circle is one run of them.
+        # The cells are ordered by column and row: in each column, the circle is one slice.
         ids = database.cell_ids
         before = np.concatenate([[0.0], np.cumsum(self.chances)])
         # All cells are within the diagonal of the city.
         most = np.hypot(np.ptp(database.columns), np.ptp(database.rows)) + 1.0
         steps = min(radius / database.grid.step + 1e-9, float(most))
         total = np.zeros(len(columns))
-        for aside in range(-math.floor(steps), math.floor(steps) + 1):
-            up = math.floor(math.sqrt(steps**2 - aside**2))
-            low = np.searchsorted(ids, cell_ids(columns + aside, rows - up), side="left")
-            high = np.searchsorted(ids, cell_ids(columns + aside, rows + up), side="right")
+        for east in range(-math.floor(steps), math.floor(steps) + 1):
+            north = math.floor(math.sqrt(steps**2 - east**2))
+            low = np.searchsorted(ids, cell_ids(columns + east, rows - north), side="left")
+            high = np.searchsorted(ids, cell_ids(columns + east, rows + north), side="right")
             total += before[high] - before[low]
         return np.clip(total, 0.0, 1.0)
 
     def best_place(self, radius: float = 50.0) -> tuple[int, float]:
-        """Return the cell around which the place most probably lies, and the chance that it does.
+        """Return the cell that the place is most probably near, and the chance of that.
 
-        Of the thousand likeliest cells it is the one with most of the chance within `radius`
-        metres, of equals the likeliest.
+        It is the one of the thousand likeliest cells with the most chance within `radius` metres,
+        of equals the likeliest.
         """
-        cells = np.sort(self.likeliest(PLACES))
-        # In steps, so that rounding does not choose among equals.
+        cells = np.sort(self.likeliest(LIKELIEST_CELLS))
+        # Rounded, so that equal sums stay equal.
         mass = np.round(self.mass_within(radius, cells), 9)
         best = np.lexsort((-self.chances[cells], -mass))[0]
         return int(cells[best]), float(mass[best])
@@ -170,7 +169,7 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     Returns
     -------
     Posterior
-        The chances, to the precision of the file.
+        The chances, with the precision of the file.
 
     Raises
     ------
@@ -213,8 +212,8 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
 
 def _likeliest_first(chances: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return some cells by falling chance, equal ones by row."""
-    # One number for each, the row behind all but the last digits of the chance: plain numbers are
-    # sorted ten times faster than pairs.
+    # One integer per cell, the leading bits of the chance and then the row: integers are sorted ten
+    # times faster than pairs.
     bits = int(cells.max(initial=0)).bit_length()
     numbers = ~chances[cells].view(np.int64) >> bits << bits | cells
     numbers.sort()
@@ -231,9 +230,9 @@ def posterior(
     *,
     log_prior: NDArray[np.float64] | None = None,
 ) -> Posterior:
-    """Return chances that are proportional to likelihood times prior, both as logarithms by cell.
+    """Return chances proportional to likelihood times prior, both given as logarithms by cell.
 
-    Both are up to a constant; without `log_prior` (see `likelihood.priors`) all cells are alike.
+    Both are up to a constant; without `log_prior` (see `likelihood.priors`) the prior is uniform.
     Raises `InputError` if a number is NaN or plus infinity, or no cell is possible.
     """
     parts = [loglik] if log_prior is None else [loglik, log_prior]
@@ -256,24 +255,24 @@ def posterior(
 
 
 def prior_ratio(loglik: NDArray[np.floating], log_prior: NDArray[np.float64]) -> float:
-    """Return how much likelier a query is under a prior than with all cells alike.
+    """Return the ratio of the likelihoods of a query under a prior and a uniform prior.
 
     Both are logarithms by cell, shape (n,), up to a constant: with chances p of the prior and
-    likelihoods l, it is ``sum(p * l) / mean(l)``. Where the prior is right, it is below r for at
-    most a share r of the queries, as its inverse is 1 in the mean (Markov's inequality).
+    likelihoods l, it is ``sum(p * l) / mean(l)``. If the prior is right, it is below r for at most
+    a share r of the queries, because its inverse has a mean of 1 (Markov's inequality).
     """
     both = np.logaddexp.reduce(loglik + log_prior) - np.logaddexp.reduce(log_prior)
-    alike = np.logaddexp.reduce(loglik.astype(np.float64)) - math.log(len(loglik))
-    return math.exp(max(float(both - alike), LEAST_LOG))
+    uniform = np.logaddexp.reduce(loglik.astype(np.float64)) - math.log(len(loglik))
+    return math.exp(max(float(both - uniform), LEAST_LOG))
 
 
-KEPT = (1000, 400, 200, 100)
-"""How many parts are divided, level by level: cells, their quarters, and so on."""
-LEAST_CHANCE = 1e-6  # of a part, against the likeliest, to be divided
-TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, level by level
+DIVIDED_PARTS = (1000, 400, 200, 100)
+"""The most parts that are divided at each level: cells, their quarters, and so on."""
+LEAST_PART_CHANCE = 1e-6  # of a part, relative to the likeliest, to be divided
+LEVEL_TURNS = (7.5, 6.0, 4.5, 3.0)  # degrees to each side that are tried, by level
 TURNS_A_SIDE = 2
 NEAR = 25.0  # metres from the best place that are averaged over
-BEST = 300  # likeliest parts among which the best place is looked for
+BEST_PARTS = 300  # likeliest parts among which the best place is searched
 CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
 
@@ -281,10 +280,10 @@ CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 class Refinement:
     """The chances of places on and off the grid.
 
-    By square part of a cell: `places`, shape (p, 2), its middle in metres; `sizes`, the length of
-    its sides; `loglik`, the mean over the part; `headings`, the mean degrees to add to the bearings
-    of the query (0 if north is known), with `heading_sigmas`; and `chances`, which sum to one. The
-    best place is averaged over `near` metres around it.
+    By square part of a cell: `places`, shape (p, 2), are centres and `sizes` sides in metres;
+    `loglik` is the mean over the part; `headings` are the mean degrees to add to the bearings of
+    the query (0 if north is known), with `heading_sigmas`; `chances` sum to one. The best place is
+    the mean over `near` metres around it.
     """
 
     places: NDArray[np.float64]
@@ -329,8 +328,8 @@ class Refinement:
 
     @cached_property
     def _inside(self) -> NDArray[np.bool_]:
-        """Which parts are near the one around which most of the chance lies."""
-        order = np.argsort(-self.chances, kind="stable")[:BEST]
+        """The parts near the part with the most chance around it."""
+        order = np.argsort(-self.chances, kind="stable")[:BEST_PARTS]
         away = self.places[order, None] - self.places[None]
         inside = np.hypot(away[..., 0], away[..., 1]) <= self.near
         return np.asarray(inside[np.round(inside @ self.chances, 9).argmax()])
@@ -341,35 +340,34 @@ def refine(
     cells: NDArray[np.float64],
     noise: Noise,
     *,
-    objects: StreetObjects,
-    index: ObjectIndex,
+    store: ObjectStore,
     step: float = 10.0,
     radius: float = 30.0,
     north_sigma: float = 0.0,
     headings: Sequence[NDArray[np.floating] | None] | None = None,
     log_prior: NDArray[np.float64] | None = None,
-    footprints: Footprints | None = None,
 ) -> Refinement:
-    """Look for the place of a query within some cells; chances are likelihood times area.
+    """Search the place of a query within some cells; chances are likelihood times area.
 
-    The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the middles in
-    metres of the likeliest cells, likeliest first; some hundred will do. `noise` is for a known
-    place. `step` and `radius` are in metres, `north_sigma`, of photos that do not tell their own,
-    in degrees; where it is not 0, `headings`, by photo the likeliest one in each cell, are needed.
-    Those of the parts are of the first photo. `log_prior` is what else is known of the
-    cells.
+    The query needs bearings; its types may be unknown. `cells`, shape (c, 2), are the centres in
+    metres of the likeliest cells, likeliest first; some hundred are enough. `noise` is for a known
+    place. `step` and `radius` are in metres; `north_sigma`, in degrees, is for photos without their
+    own. If it is not 0, `headings` are required: by photo, the likeliest one in each cell. Those of
+    the result are of the first photo. `log_prior` is the prior of the cells.
     """
     check_north(north_sigma)
     photos = View.of(query).split()
-    looked_for = [own_sigma(photo, north_sigma) for photo in photos]
-    before = (None,) * len(photos) if headings is None else headings
+    north_sigmas = [own_sigma(photo, north_sigma) for photo in photos]
+    first_headings = (None,) * len(photos) if headings is None else headings
     if len(cells) == 0 or any(
-        sigma > 0 and heading is None for sigma, heading in zip(looked_for, before, strict=True)
+        sigma > 0 and heading is None
+        for sigma, heading in zip(north_sigmas, first_headings, strict=True)
     ):
         raise InputError(
             f"{len(cells)} cells and {'no' if headings is None else 'some'} headings were given; "
             "give at least one cell, and headings where north is not known."
         )
+    objects = store.objects
     tables, weights = noise_tables(
         noise,
         taxonomy=objects.taxonomy,
@@ -377,38 +375,38 @@ def refine(
         longest=LONGEST_TABLE,
         radius=radius,
     )
-    asked = [PhotoTable.of(photo, tables[0]) for photo in photos]
-    size = float(step)
-    parts = np.asarray(cells[: KEPT[0]], dtype=np.float64)
-    prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[: KEPT[0]]
+    photo_tables = [PhotoTable.of(photo, tables[0]) for photo in photos]
+    size, most = float(step), DIVIDED_PARTS[0]
+    footprints = store.buildings_around(cells, distance=tables[0].reach + size)
+    parts = np.asarray(cells[:most], dtype=np.float64)
+    prior = np.zeros(len(parts)) if log_prior is None else np.asarray(log_prior)[:most]
     turned = np.stack(
         [
-            np.zeros(len(parts)) if heading is None else np.asarray(heading)[: KEPT[0]]
-            for heading in before
+            np.zeros(len(parts)) if heading is None else np.asarray(heading)[:most]
+            for heading in first_headings
         ]
     )
     finished: list[tuple[NDArray[np.float64], ...]] = []
-    for level, turn in enumerate(TURNS):
+    for level, turn in enumerate(LEVEL_TURNS):
+        # Quarters of the parts, with a place anywhere in them.
         parts = (parts[:, None] + CORNERS * (size / 4.0)).reshape(-1, 2)
         prior, turned = np.repeat(prior, 4), np.repeat(turned, 4, axis=1)
         size /= 2.0
         views = visible_objects_at(
-            objects, parts, index=index, radius=radius, footprints=footprints
+            objects, parts, index=store.index, radius=radius, footprints=footprints
         )
         wide = [
             replace(table, position_sigma=math.hypot(table.position_sigma, size / math.sqrt(12.0)))
             for table in tables
         ]
         loglik, sigmas = np.zeros(len(parts)), np.zeros(len(parts))
-        for number in reversed(range(len(photos))):  # what is told of headings is the first one's
-            sigma = looked_for[number]
+        for number in reversed(range(len(photos))):  # `sigmas` are at last those of the first
+            sigma = north_sigmas[number]
             steps = np.linspace(-turn, turn, 2 * TURNS_A_SIDE + 1) if sigma > 0 else np.zeros(1)
             turns = turned[number][:, None] + steps
-            chances = np.zeros(turns.shape)
-            if sigma > 0:
-                chances = turn_logs(turns, steps[1] - steps[0], sigma)
+            chances = turn_logs(turns, steps[1] - steps[0], sigma) if sigma > 0 else 0.0 * turns
             by_turn = chances + photo_loglik(
-                asked[number],
+                photo_tables[number],
                 views,
                 wide,
                 weights,
@@ -417,16 +415,18 @@ def refine(
                 # A place that does not fit one photo may fit the others.
                 whole=len(photos) == 1,
             )
+            # The sum over the turns, and their mean and deviation.
             own = np.logaddexp.reduce(by_turn, axis=1)
             shares = np.exp(by_turn - own[:, None])
             turned[number] = (shares * turns).sum(axis=1)
             sigmas = np.sqrt((shares * (turns - turned[number][:, None]) ** 2).sum(axis=1))
             loglik += own
+        # The likeliest parts are divided at the next level; the others are finished.
         total = loglik + prior
         divided = np.zeros(len(parts), np.bool_)
-        if level + 1 < len(TURNS):
-            best = np.argsort(-total, kind="stable")[: KEPT[level + 1]]
-            divided[best] = total[best] > total[best[0]] + math.log(LEAST_CHANCE)
+        if level + 1 < len(LEVEL_TURNS):
+            best = np.argsort(-total, kind="stable")[: DIVIDED_PARTS[level + 1]]
+            divided[best] = total[best] > total[best[0]] + math.log(LEAST_PART_CHANCE)
         columns = parts, np.full(len(parts), size), loglik, prior, turned[0], sigmas
         finished.append(tuple(column[~divided] for column in columns))
         parts, prior, turned = parts[divided], prior[divided], turned[:, divided]

@@ -1,7 +1,7 @@
-"""What is known of the place before a query is looked at: log-priors by cell, shape (n,).
+"""Priors of the place of a query: log-priors by cell, shape (n,).
 
-A prior is one number per cell, the logarithm of a chance up to a constant; minus infinity excludes
-a cell. Priors that do not depend on each other are added.
+A prior is the logarithm of a chance by cell, up to a constant; minus infinity excludes a cell.
+Independent priors are added.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
 
 LEAST_SIGMA_M = 0.01
-FARTHEST = 3.0  # standard deviations of a position, beyond the range of sight, from every cell
+FARTHEST_SIGMAS = 3.0  # of a position from the nearest cell, beyond the visibility range
 
 METRES, NORTH_EAST, EAST_NORTH = "X,Y", "LAT,LON", "LON,LAT"
 _COORDINATE = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(m|°?\s*[NSEW])?", re.IGNORECASE)
@@ -35,7 +35,7 @@ _COORDINATE = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(m|°?\s*[NSEW])?", re.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownPosition:
-    """A position that is known before a query is looked at, in both systems.
+    """A position that is known without the query, in metres and in degrees.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class KnownPosition:
     sigma : float
         Standard deviation each way in metres.
     read_as : {"X,Y", "LAT,LON", "LON,LAT"}
-        What the numbers were taken for.
+        How the numbers were read.
 
     Examples
     --------
@@ -69,17 +69,17 @@ class KnownPosition:
         """Read a position with its deviation, such as ``60.171,24.947,200``.
 
         The numbers are x and y in the CRS of the database, or degrees in either order, whichever
-        is in the city; ``60.171N,24.947E,200`` and ``386000m,6672000m,200`` say it. InputError if
-        they cannot be read, or not one of these is in the city.
+        is in the city; ``60.171N,24.947E,200`` and ``386000m,6672000m,200`` are unambiguous.
+        InputError if they cannot be read, or not exactly one reading is in the city.
         """
         parts = text.split(",")
-        found = [_COORDINATE.fullmatch(part.strip()) for part in parts[:2]]
-        letters = "".join((one[2] or "?")[-1].upper() for one in found if one)
+        matches = [_COORDINATE.fullmatch(part.strip()) for part in parts[:2]]
+        letters = "".join((match[2] or "?")[-1].upper() for match in matches if match)
         readings, sigma = [], math.nan
         if len(parts) == 3 and len(letters) == 2:  # noqa: PLR2004 - two coordinates and sigma
             with contextlib.suppress(ValueError):
                 sigma = float(parts[2].strip().removesuffix("m"))
-                values = [float(one[1]) for one in found if one]
+                values = [float(match[1]) for match in matches if match]
                 readings = _readings(values, letters, database.crs)
         if not readings:
             raise InputError(
@@ -112,18 +112,18 @@ class KnownPosition:
 def _readings(
     values: list[float], letters: str, crs: CRS
 ) -> list[tuple[str, tuple[float, float, float, float]]]:
-    """Return the places that two numbers may mean, with x, y, longitude and latitude of each."""
+    """Return the possible readings of two numbers: form, x, y, longitude and latitude."""
     first, second = values
     readings = []
     if letters in {"??", "MM"}:
         readings.append((METRES, (first, second, *to_degrees(crs).transform(first, second))))
-    for form, one, other in ((NORTH_EAST, second, first), (EAST_NORTH, first, second)):
+    for form, lon, lat in ((NORTH_EAST, second, first), (EAST_NORTH, first, second)):
         east, north = list(letters)[:: -1 if form == NORTH_EAST else 1]
         if east in "?EW" and north in "?NS" and (east == "?") == (north == "?"):
-            lon, lat = (-one if east == "W" else one), (-other if north == "S" else other)
+            place = (-lon if east == "W" else lon), (-lat if north == "S" else lat)
             if abs(lat) <= 90 and abs(lon) <= 180:  # noqa: PLR2004 - degrees
-                x, y = to_degrees(crs).transform(lon, lat, direction="INVERSE")
-                readings.append((form, (x, y, lon, lat)))
+                xy = to_degrees(crs).transform(*place, direction="INVERSE")
+                readings.append((form, (*xy, *place)))
     return readings
 
 
@@ -134,13 +134,13 @@ def _check_sigma(sigma: float) -> None:
 
 
 def _is_near(database: SignatureDatabase, position: tuple[float, float], sigma: float) -> bool:
-    """Tell whether a position may be that of a cell."""
+    """Whether a position may be in the city: near enough to a cell."""
     away = np.hypot(*(database.xy - np.asarray(position, dtype=np.float64)).T).min()
-    return bool(away <= FARTHEST * sigma + database.reach)
+    return bool(away <= FARTHEST_SIGMAS * sigma + database.reach)
 
 
 def _extent(database: SignatureDatabase) -> str:
-    """Return where the cells lie, in words, in both systems."""
+    """Return a phrase with the extent of the cells, in metres and in degrees."""
     (west, south), (east, north) = database.xy.min(axis=0), database.xy.max(axis=0)
     bounds = to_degrees(database.crs).transform_bounds(west, south, east, north)
     low_lon, low_lat, high_lon, high_lat = bounds
@@ -165,16 +165,16 @@ def area_prior(
     database : SignatureDatabase
         The cells.
     area : shapely.Geometry
-        A polygon or several.
+        A polygon or multipolygon.
     crs : pyproj.CRS or str, optional
         Coordinate reference system of the area; that of the database by default.
     outside : float, default 0
-        Chance, 0 to below 1, that the place lies outside all the same.
+        Chance, 0 to below 1, that the place is outside the area.
 
     Returns
     -------
     ndarray of float64, shape (n,)
-        Log-prior by cell; every cell inside is as likely as every other, and so outside.
+        Log-prior by cell; all cells inside are equally likely, and all cells outside.
 
     Raises
     ------
@@ -263,14 +263,14 @@ def position_prior(
         )
     away = ((database.xy - np.asarray(position, dtype=np.float64)) ** 2).sum(axis=1)
     logs = -0.5 * away / sigma**2
-    # From the nearest cell on, so that a position far outside excludes nothing by rounding.
+    # Normalised as logarithms, so that a position far outside excludes no cell by underflow.
     return np.asarray(logs - np.logaddexp.reduce(logs))
 
 
 def raster_prior(
     database: SignatureDatabase, path: str | Path, *, band: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the prior of a raster, such as how many people pass or how many photos were taken.
+    """Return the prior of a raster, such as the number of people or photos.
 
     Parameters
     ----------
@@ -278,11 +278,10 @@ def raster_prior(
         The cells.
     path : str or Path
         Any raster that GDAL reads, in any coordinate reference system. Its values, 0 or more, are
-        taken as a density: a cell weighs as much as the mean over it. A value of 0 excludes a
-        cell. Where the raster has no data or ends, nothing is known, and a cell weighs as little
-        as the least of the others that has any weight.
+        a density: the weight of a cell is the mean over the cell. A value of 0 excludes a cell.
+        Cells without data or beyond the raster get the least weight above 0 of the other cells.
     band : int, optional
-        Which band to read, from 1; needed only where there are several.
+        Band to read, from 1; required only if there are several.
 
     Returns
     -------
@@ -294,10 +293,10 @@ def raster_prior(
     SourceError
         If the file cannot be read as a raster.
     CrsError
-        If the raster does not say its coordinate reference system.
+        If the raster has no coordinate reference system.
     InputError
-        If the raster covers no cell, a value is negative or infinite, all are 0, or the band is
-        not there or not named.
+        If the raster covers no cell, a value is negative or infinite, all are 0, or the band does
+        not exist or is not given.
 
     Examples
     --------
@@ -340,7 +339,7 @@ def raster_prior(
 
 
 def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.float64]:
-    """Return the prior of a weight for each cell, such as how many people pass it.
+    """Return the prior of a weight for each cell, such as the number of people who pass.
 
     Parameters
     ----------
@@ -357,7 +356,7 @@ def weight_prior(database: SignatureDatabase, weights: ArrayLike) -> NDArray[np.
     Raises
     ------
     InputError
-        If there is not one weight a cell, one is negative or not finite, or all are 0.
+        If there is not one weight per cell, a weight is negative or not finite, or all are 0.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Noise for a map that is some years old: objects have gone, come and moved since it was made."""
+"""Noise for an old map: since then, objects were removed, added and moved."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import Displayed, InputError
-from semsig_gis.localization.noise.fit import LEAST, MOST, drawn_rates
+from semsig_gis.localization.noise.fit import LEAST, MOST, shrunk_rates
 from semsig_gis.objects import ClassChange
 from semsig_gis.sources import data_folder
 from semsig_gis.storage import parse_toml, read_values
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from semsig_gis.localization.noise.model import Noise, NoiseSpec
 
 MOST_YEARS = 100.0
-NEAR_MOVE = 5.0  # metres; an object that moved farther has gone here and come there
-MEDIAN = math.sqrt(2.0 * math.log(2.0))  # of a distance, in deviations each way
+NEAR_MOVE = 5.0  # metres; an object that moved farther counts as removed and added
+MEDIAN = math.sqrt(2.0 * math.log(2.0))  # of a distance, in standard deviations of x and y
 
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class Drift(Displayed):
-    """What changed in the street objects of a city in some years.
+    """The changes of the street objects of a city in some years.
 
     Parameters
     ----------
     years : float
-        How many years, above 0 and up to 100.
+        Number of years, above 0 and up to 100.
     classes : tuple of ClassChange
-        The counts of each class, as `UpdateReport.classes` has them.
+        The counts of each class, as in `UpdateReport.classes`.
 
     Raises
     ------
@@ -68,8 +68,7 @@ class Drift(Displayed):
                     f"drift of class {item.class_name!r} has counts {counts}; give whole numbers."
                 )
             metres = item.moved_m
-            known = isinstance(metres, (int, float)) and 0 <= metres < math.inf
-            if item.moved and not known:
+            if item.moved and not (isinstance(metres, (int, float)) and 0 <= metres < math.inf):
                 raise InputError(
                     f"drift of class {item.class_name!r} has moved_m = {metres!r}; give metres."
                 )
@@ -94,12 +93,12 @@ class Drift(Displayed):
 
 @functools.cache
 def named_drift() -> Drift:
-    """Return the drift that is shipped, of Monaco in OpenStreetMap.
+    """Return the built-in drift, of Monaco in OpenStreetMap.
 
     Returns
     -------
     Drift
-        What ``drift.toml`` of the data sources says.
+        The drift in ``drift.toml`` of the data sources.
 
     Examples
     --------
@@ -111,13 +110,14 @@ def named_drift() -> Drift:
 
 
 def open_drift(path: str | Path) -> Drift:
-    r"""Read a drift: what ``semsig update --years N --json`` prints, or TOML of that form.
+    r"""Read a drift: the output of ``semsig update --years N --json``, or TOML of that form.
 
     Parameters
     ----------
     path : str or Path
         A JSON file, or a TOML file with the suffix ``.toml``, with ``years`` and a list
-        ``classes``; of a class are needed ``class_name`` and ``before``, other counts are 0.
+        ``classes``; a class requires ``class_name`` and ``before``, and its other counts are 0 by
+        default.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def open_drift(path: str | Path) -> Drift:
 
 
 def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
-    """Return the drift of plain values."""
+    """Return the drift of the plain values of a file."""
     if not isinstance(values, Mapping) or not isinstance(values.get("classes"), list):
         raise InputError(
             f"{where} has no list of classes; give what `semsig update --json` prints."
@@ -158,8 +158,8 @@ def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
     plain = dict.fromkeys(names - {"class_name", "before", "moved_m"}, 0) | {"moved_m": None}
     classes = []
     for item in values["classes"]:
-        known = isinstance(item, Mapping) and {"class_name", "before"} <= set(item) <= names
-        if not known or not isinstance(item["class_name"], str):
+        complete = isinstance(item, Mapping) and {"class_name", "before"} <= set(item) <= names
+        if not complete or not isinstance(item["class_name"], str):
             raise InputError(
                 f"{where} has a class {item!r}; give class_name, before and any of "
                 f"{', '.join(sorted(plain))}."
@@ -170,23 +170,23 @@ def _drift(values: Any, where: str) -> Drift:  # noqa: ANN401 - as a file has it
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Ageing:
-    """How each class of a database, `names`, changes in some years.
+    """The changes of the classes of a database, `names`, in some years.
 
-    `seen` is the mean number of objects in a signature. `gone` and `moved` are the shares that
-    are gone, or have moved a little, by `variances` in square metres each way; `come` is
-    the number of new objects per signature.
+    `counts` are the mean numbers of objects in a signature. `removals` and `moves` are the shares
+    of objects that are removed or move a little, by `variances` in square metres in x and y;
+    `additions` are the numbers of new objects per signature.
     """
 
     names: list[str]
-    seen: NDArray[np.float64]
-    gone: NDArray[np.float64]
-    come: NDArray[np.float64]
-    moved: NDArray[np.float64]
+    counts: NDArray[np.float64]
+    removals: NDArray[np.float64]
+    additions: NDArray[np.float64]
+    moves: NDArray[np.float64]
     variances: NDArray[np.float64]
 
     @classmethod
     def of(cls, drift: Drift, years: float, database: SignatureDatabase) -> _Ageing:
-        """Return the changes in some years; classes of few objects are drawn to the mean."""
+        """Return the changes in some years; rates of small classes are shrunk towards the mean."""
         codes = database.present_codes
         names = [database.taxonomy.by_code(code).name for code in codes.tolist()]
         counts: dict[str, Counter[str]] = {name: Counter() for name in names}
@@ -196,34 +196,34 @@ class _Ageing:
             leap, near = (item.moved, 0) if far else (0, item.moved)
             counts.setdefault(item.class_name, Counter()).update(
                 before=item.before,
-                gone=item.removed + item.lost + leap,
-                come=item.added + item.gained + leap,
-                moved=near,
+                removals=item.removed + item.lost + leap,
+                additions=item.added + item.gained + leap,
+                moves=near,
             )
             if near:
                 variances[item.class_name] = ((item.moved_m or 0.0) / MEDIAN) ** 2
         before = np.array([own["before"] for own in counts.values()], np.float64)
 
-        def rates(what: str) -> NDArray[np.float64]:
-            hits = np.array([own[what] for own in counts.values()], np.float64)
-            return drawn_rates(hits, before)[: len(names)]
+        def rates(change: str) -> NDArray[np.float64]:
+            hits = np.array([own[change] for own in counts.values()], np.float64)
+            return shrunk_rates(hits, before)[: len(names)]
 
         spans = years / drift.years
-        gone, moved = (1.0 - (1.0 - rates(what)) ** spans for what in ("gone", "moved"))
-        seen = np.bincount(database.codes, minlength=256)[codes] / len(database)
+        removals, moves = (1.0 - (1.0 - rates(name)) ** spans for name in ("removals", "moves"))
+        means = np.bincount(database.codes, minlength=256)[codes] / len(database)
         return cls(
             names=names,
-            seen=seen,
-            gone=gone,
-            come=rates("come") * spans * seen,
-            moved=moved,
+            counts=means,
+            removals=removals,
+            additions=rates("additions") * spans * means,
+            moves=moves,
             variances=np.array([variances[name] for name in names]),
         )
 
     @property
     def variance(self) -> float:
-        """Mean variance of the place of an object in each direction, in square metres."""
-        return float(np.average(self.moved * self.variances, weights=self.seen))
+        """Mean variance of x and of y of an object, in square metres."""
+        return float(np.average(self.moves * self.variances, weights=self.counts))
 
     def detection(self, spec: NoiseSpec) -> NDArray[np.float64]:
         """Return the chance of detection of each class by a model."""
@@ -231,14 +231,14 @@ class _Ageing:
         return np.array([special.get(name, spec.detection) for name in self.names], np.float64)
 
     def clutter(self, spec: NoiseSpec) -> NDArray[np.float64]:
-        """Return the false objects of each class per signature, by a model."""
+        """Return the number of false objects of each class per signature, by a model."""
         shares = spec.clutter_shares or dict.fromkeys(self.names, 1.0 / len(self.names))
         return spec.clutter * np.array([shares.get(name, 0.0) for name in self.names], np.float64)
 
     def spec(
         self, spec: NoiseSpec, detection: NDArray[np.float64], clutter: NDArray[np.float64]
     ) -> NoiseSpec:
-        """Return a model with other chances and false objects."""
+        """Return a model with the given chances of detection and numbers of false objects."""
         total = float(clutter.sum())
         shares = clutter / total if total else clutter
         by_class = dict(zip(self.names, detection.tolist(), strict=True))
@@ -253,7 +253,7 @@ class _Ageing:
 def aged_noise(
     noise: Noise, years: float, *, database: SignatureDatabase, drift: Drift | None = None
 ) -> Noise:
-    """Return a noise model for queries that are younger than the map of a database.
+    """Return a noise model for queries that are newer than the map of a database.
 
     Parameters
     ----------
@@ -262,15 +262,15 @@ def aged_noise(
     years : float
         Age of the map, 0 to 100; 0 leaves the model as it is.
     database : SignatureDatabase
-        The cells, for the classes that there are and how many objects a cell sees.
+        The cells, for the classes and the mean number of objects by class.
     drift : Drift, optional
-        How fast such objects change; `named_drift` by default.
+        The rates of change of objects; `named_drift` by default.
 
     Returns
     -------
     NoiseSpec or NoiseMixture
-        The model: what has gone is missed, what has come is false, and what has moved a little
-        makes the place uncertain.
+        The model: removed objects are missed, added objects are false, and small moves make the
+        place uncertain.
 
     Raises
     ------
@@ -279,12 +279,12 @@ def aged_noise(
 
     Notes
     -----
-    Of n objects of a class, h of which changed, the rate is ``(h + 8 * overall) / (n + 8)``, as in
-    `learn_noise`. With the rates g of the gone, c of the come and m of the moved in the years of
-    the drift, after k times as many the detection is multiplied by ``(1 - g) ** k``, the false
-    objects rise by ``c * k`` times those that a cell sees in the mean, and the variance of the
-    place by that of the moves times ``1 - (1 - m) ** k``. Moves of more than 5 m (the median of
-    the class) count as gone and come.
+    If h of n objects of a class changed, the rate is ``(h + 8 * overall) / (n + 8)``, as in
+    `learn_noise`. With the rates r of removals, a of additions and m of moves in the years of the
+    drift, after k times as many years the detection is multiplied by ``(1 - r) ** k``, the number
+    of false objects rises by ``a * k`` times the mean number of objects of a cell, and the variance
+    of the place by that of the moves times ``1 - (1 - m) ** k``. Moves of more than 5 m (the median
+    of the class) count as removals and additions.
 
     Examples
     --------
@@ -299,9 +299,9 @@ def aged_noise(
     ageing = _Ageing.of(drift or named_drift(), years, database)
 
     def older(spec: NoiseSpec) -> NoiseSpec:
-        detection = ageing.detection(spec) * (1.0 - ageing.gone)
+        detection = ageing.detection(spec) * (1.0 - ageing.removals)
         sigma = math.sqrt(spec.position_sigma**2 + ageing.variance)
-        changed = ageing.spec(spec, detection, ageing.clutter(spec) + ageing.come)
+        changed = ageing.spec(spec, detection, ageing.clutter(spec) + ageing.additions)
         return replace(changed, position_sigma=sigma)
 
     return replace(noise.changed(older), name=f"{years:g}-year-old map with {noise.name}")
@@ -310,21 +310,21 @@ def aged_noise(
 def fresh_noise(
     spec: NoiseSpec, years: float, *, database: SignatureDatabase, drift: Drift | None = None
 ) -> NoiseSpec:
-    """Return what is left of a model that was learnt against an old map, without its age.
+    """Return the model for a map of today from one that was learnt with an old map.
 
-    It is the inverse of `aged_noise` for misses and false objects: what the age explains of them is
-    not the detector's.
+    It is the inverse of `aged_noise` for misses and false objects: those that are due to the age of
+    the map are not due to the detector.
 
     Parameters
     ----------
     spec : NoiseSpec
-        The model that was learnt.
+        The learnt model.
     years : float
         Age of the map, as of `aged_noise`.
     database : SignatureDatabase
         The cells.
     drift : Drift, optional
-        How fast such objects change; `named_drift` by default.
+        The rates of change of objects; `named_drift` by default.
 
     Returns
     -------
@@ -347,14 +347,14 @@ def fresh_noise(
     if years == 0:
         return spec
     ageing = _Ageing.of(drift or named_drift(), years, database)
-    stays = np.maximum(1.0 - ageing.gone, LEAST)
-    detection = np.minimum(ageing.detection(spec) / stays, MOST)
-    clutter = np.maximum(ageing.clutter(spec) - ageing.come, LEAST / len(ageing.names))
-    overall = float(np.average(detection, weights=ageing.seen))
+    remaining = np.maximum(1.0 - ageing.removals, LEAST)
+    detection = np.minimum(ageing.detection(spec) / remaining, MOST)
+    clutter = np.maximum(ageing.clutter(spec) - ageing.additions, LEAST / len(ageing.names))
+    overall = float(np.average(detection, weights=ageing.counts))
     return replace(ageing.spec(spec, detection, clutter), detection=overall)
 
 
 def check_map_age(years: float) -> None:
-    """Refuse an age of a map, in years, that is out of its range."""
+    """Raise InputError if the age of a map, in years, is out of its range."""
     if not 0 <= years <= MOST_YEARS:
         raise InputError(f"the age of the map is {years:g} years; give years from 0 to 100.")

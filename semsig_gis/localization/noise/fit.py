@@ -1,8 +1,8 @@
 """Fit a noise model to detections: one round of expectation-maximisation.
 
-The E step works out the chances of all one-to-one associations under the present model, the M step
-takes the model that the expected counts speak for. What lies outside the sectors of a photo is
-neither missed nor false; at a sector's edge an object counts as far as its bearing may have been
+The E step computes the chances of all one-to-one associations under the current model; the M step
+estimates the model from the expected counts. Objects outside the sectors of a photo are neither
+missed nor false; at the edge of a sector, an object counts with the chance that its bearing was
 inside.
 """
 
@@ -45,32 +45,32 @@ if TYPE_CHECKING:
 
 
 ALL = "all"
-"""What stands for all classes together."""
-PRIOR_SAMPLES = 8.0  # that the overall value counts for, against those of a class
-REACH = 75.0  # degrees beyond which a detection is never taken for an object
+"""Name of all classes together."""
+PRIOR_SAMPLES = 8.0  # weight of the overall value, in samples of a class
+PAIR_DEGREES = 75.0  # largest difference of bearings of a detection and an object
 LEAST, MOST = 1e-3, 1.0 - 1e-3
 LEAST_SIGMA, MOST_SIGMA = 0.05, 60.0
 LEAST_ERROR, MOST_ERROR = 0.01, 3.0  # of ranges
 LEAST_INFORMATION = 0.05
 PERCENTS = (90, 95)  # of the intervals
 KNOTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
-"""Where the chance of detection is learnt, if it falls: shares of the range of a class."""
-FADES = -3.0  # standard deviations of the trend with distance, below which detection falls
+"""Distances at which a falling chance of detection is learnt: shares of the range of a class."""
+FALLING_TREND = -3.0  # standard deviations; a lower trend means that detection falls
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Evidence:
-    """What was there and what was detected, photo by photo.
+    """The visible objects and the detections, photo by photo.
 
-    `names` are those of the k classes that occur, in the order of their codes in `start`, a usual
-    detector as the first model. `views` is what there was to see in each photo, `seen` what was
-    detected, and `pairs` are objects and detections that may be one thing.
+    `names` are the k classes that occur, in the order of their codes in `start`, the first model.
+    `views` are the objects visible in each photo, `detections` the detections, and `pairs` the
+    objects and detections that may be one thing.
     """
 
     names: list[str]
     start: NoiseTable
     views: VisibleObjects
-    seen: Detections
+    detections: Detections
     pairs: Pairs
 
     @cached_property
@@ -94,12 +94,12 @@ class Evidence:
         return self.kinds[self.pairs.objects]
 
     def by_kind(self, amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Add up what each pair has by the class of its object, shape (k,)."""
+        """Sum amounts of pairs by the class of the object, shape (k,)."""
         return np.asarray(np.bincount(self.pair_kinds, amounts, len(self.names)), np.float64)
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:
-        """How near each object is to each of `KNOTS`; rows sum to one."""
+        """The share of each object in each of `KNOTS`, by linear interpolation; rows sum to one."""
         place = self.distances / self.start.ranges[self.kinds]
         hats = [np.interp(place, KNOTS, row) for row in np.eye(len(KNOTS))]
         return np.stack(hats, axis=1)
@@ -109,12 +109,12 @@ class Evidence:
 class Counts:
     """The expected counts, given the detections and a model.
 
-    By pair, `chances` that it is one thing, and `right` that it is named as what it is, too;
-    `turns` and `ranges`, of shape (2, pairs), are squares of the errors of bearings, in square
-    degrees, and of logarithms of ranges, and how many errors they count for. By object and knot,
-    `hits` were detected of `trials`. `false`, by detection and class, is the chance that it is
-    clutter. `named`, shape (k, k), counts detected objects by class and label; `log_likelihood` is
-    of all detections.
+    By pair, `chances` that it is one thing, and `right` that its name is also right; `turns` and
+    `ranges`, shape (2, pairs), are the squared errors of bearings, in square degrees, and of
+    logarithms of ranges, and the number of errors that each counts for. By object and knot, `hits`
+    of `trials` were detected. `false`, by detection and class, is the chance of clutter. `named`,
+    shape (k, k), counts detected objects by class and label; `log_likelihood` is that of all
+    detections.
     """
 
     chances: NDArray[np.float64]
@@ -136,35 +136,36 @@ def gather_evidence(
     radius: float = 30.0,
     position_sigma: float = 0.0,
 ) -> Evidence:
-    """Join what there was to see in each photo of some samples with what was detected.
+    """Join the visible objects and the detections of each photo of some samples.
 
-    What was detected has bearings and types or scores. Raises `InputError` if there was nothing to
-    see at all, or nothing was detected.
+    Detections have bearings and types or scores. Raises `InputError` if there is no visible object
+    or no detection at all.
     """
-    named = [np.flatnonzero(View.of(one).class_scores().any(axis=0)) for one in detected]
+    names = [np.flatnonzero(View.of(view).class_scores().any(axis=0)) for view in detected]
     count = sum(map(len, detected))
     if len(views.codes) == 0 or count == 0:
         raise InputError(
             f"the {len(detected)} samples have {len(views.codes)} objects to see and {count} "
             "detections; give samples with some of both."
         )
-    codes = np.unique(np.concatenate([views.codes, *named])).astype(np.uint8)
+    codes = np.unique(np.concatenate([views.codes, *names])).astype(np.uint8)
     codes = codes[codes != WILDCARD]
     start = _starting_model(codes, taxonomy.ranges(radius), position_sigma)
-    seen = Detections.of(detected, start)
+    detections = Detections.of(detected, start)
+    starts, bearings = detections.starts, detections.bearings
     return Evidence(
         names=[taxonomy.by_code(code).name for code in codes.tolist()],
         start=start,
         views=views,
-        seen=seen,
-        pairs=near_pairs(views.offsets, views.bearings, seen.starts, seen.bearings, reach=REACH),
+        detections=detections,
+        pairs=near_pairs(views.offsets, views.bearings, starts, bearings, reach=PAIR_DEGREES),
     )
 
 
 def _starting_model(
     codes: NDArray[np.uint8], ranges: NDArray[np.float64], position_sigma: float
 ) -> NoiseTable:
-    """Return a typical detector, with the known deviation of places in metres."""
+    """Return a typical detector, with the given deviation of places in metres."""
     count = len(codes)
     return NoiseTable(
         codes=codes,
@@ -186,46 +187,45 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
 
     The model must be the same for signatures of all lengths.
     """
-    pairs, seen = evidence.pairs, evidence.seen
+    pairs, detections = evidence.pairs, evidence.detections
+    size, count = len(evidence.names), len(detections.bearings)
     lengths = np.zeros(len(evidence.views), np.int64)
-    found = associate(model, evidence.views, seen, pairs, lengths=lengths)
-    chances, kind = found.chances, evidence.pair_kinds
-    # What is said of a detection may be the name of several classes.
-    said = (model.named[0] @ seen.scores)[kind, pairs.detections]
-    own = model.named[0].diagonal()[kind] * seen.scores[kind, pairs.detections]
-    by_detection = np.bincount(
-        kind * len(seen.bearings) + pairs.detections,
-        chances / said,
-        len(evidence.names) * len(seen.bearings),
-    ).reshape(len(evidence.names), -1)
-    true = np.bincount(pairs.detections, chances, len(seen.bearings))
-    clutter = seen.scores * model.clutter[:, None]
-    false = np.clip(1.0 - true, 0.0, 1.0) * found.clutter * clutter / clutter.sum(axis=0)
-    hits, trials = _detections(evidence, found, model)
+    association = associate(model, evidence.views, detections, pairs, lengths=lengths)
+    chances, kind = association.chances, evidence.pair_kinds
+    # The scores of a detection may be those of several classes.
+    naming = (model.named[0] @ detections.scores)[kind, pairs.detections]
+    own = model.named[0].diagonal()[kind] * detections.scores[kind, pairs.detections]
+    cells = kind * count + pairs.detections
+    by_detection = np.bincount(cells, chances / naming, size * count).reshape(size, -1)
+    true = np.bincount(pairs.detections, chances, count)
+    clutter = detections.scores * model.clutter[:, None]
+    false = np.clip(1.0 - true, 0.0, 1.0) * association.clutter * clutter / clutter.sum(axis=0)
+    hits, trials = _detected_objects(evidence, association, model)
     return Counts(
         chances=chances,
-        right=chances * own / said,
-        turns=_turns(evidence, found, model),
-        ranges=_ranges(evidence, found, model),
+        right=chances * own / naming,
+        turns=_bearing_errors(evidence, association, model),
+        ranges=_range_errors(evidence, association, model),
         hits=hits,
         trials=trials,
         false=false.T,
-        named=model.named[0] * (by_detection @ seen.scores.T),
-        log_likelihood=float(found.loglik.sum()),
+        named=model.named[0] * (by_detection @ detections.scores.T),
+        log_likelihood=float(association.loglik.sum()),
     )
 
 
-def _detections(
-    evidence: Evidence, found: Association, model: NoiseTable
+def _detected_objects(
+    evidence: Evidence, association: Association, model: NoiseTable
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return how often each object was detected of how often it was in sight, by knot."""
+    """Return the expected hits and trials of the detection of each object, by knot."""
     kinds, near = evidence.kinds, model.detected[0, evidence.kinds]
     units = distance_units_of(evidence.distances, model.reach)
-    hits = np.bincount(evidence.pairs.objects, found.chances, len(kinds))
+    hits = np.bincount(evidence.pairs.objects, association.chances, len(kinds))
     hits = np.clip(hits, 0.0, 1.0)
-    # Of what was not detected, so much was in range and in the sectors.
-    sight = found.inside * model.inside[kinds, units] * (1.0 - near * model.fading[kinds, units])
-    misses = (1.0 - hits) * sight / (1.0 - found.detection * found.inside)
+    # The chance that an object that was not detected was in range and in the sectors.
+    missed = 1.0 - near * model.fading[kinds, units]
+    visible = association.inside * model.inside[kinds, units] * missed
+    misses = (1.0 - hits) * visible / (1.0 - association.detection * association.inside)
     shares = near[:, None] * fading_at_knots(model)[kinds]
     of_hits, of_misses = (evidence.knots * part for part in (shares, 1.0 - shares))
     hit = hits[:, None] * of_hits / of_hits.sum(axis=1, keepdims=True)
@@ -233,87 +233,92 @@ def _detections(
 
 
 def fading_at_knots(model: NoiseTable) -> NDArray[np.float64]:
-    """Return what is left of the detection of each class at each knot, shape (k, knots)."""
+    """Return the remaining share of the detection of each class at each knot, shape (k, knots)."""
     units = np.rint(model.ranges[:, None] * KNOTS * (DISTANCE_UNITS / model.reach))
     return np.take_along_axis(model.fading, units.astype(np.int64), axis=1)
 
 
-def _turns(evidence: Evidence, found: Association, model: NoiseTable) -> NDArray[np.float64]:
-    """Return the squares of the bearing noise of pairs, and for how many draws they count."""
-    one, kind = evidence.pairs.objects, evidence.pair_kinds
-    # Of a difference, the place and the bearing noise have their shares by their variances.
-    place = np.degrees(model.position_sigma / evidence.distances[one])
+def _bearing_errors(
+    evidence: Evidence, association: Association, model: NoiseTable
+) -> NDArray[np.float64]:
+    """Return the squared bearing noise of pairs, and the number of errors they count for."""
+    objects, kind = evidence.pairs.objects, evidence.pair_kinds
+    # A difference is due to the place and to the bearing noise, in proportion to their variances.
+    place = np.degrees(model.position_sigma / evidence.distances[objects])
     own = model.sigma[kind] ** 2
     share = own / (own + place**2)
     squares = (evidence.pairs.away * share) ** 2 + place**2 * share
-    # At a sector's edge, large errors went out of sight.
-    whole = share * found.squares[one] + 1.0 - share
-    return np.stack([squares, whole]) * found.chances
+    # At the edge of a sector, objects with large errors are outside.
+    whole = share * association.squares[objects] + 1.0 - share
+    return np.stack([squares, whole]) * association.chances
 
 
-def _ranges(evidence: Evidence, found: Association, model: NoiseTable) -> NDArray[np.float64]:
-    """Return the squares of the errors of the logarithms of ranges, and for how many they count."""
-    one, other = evidence.pairs.objects, evidence.pairs.detections
-    seen, distances = evidence.seen, evidence.distances[one]
-    told = ~np.isnan(seen.ranges[other]) & np.isnan(seen.range_errors[other])
+def _range_errors(
+    evidence: Evidence, association: Association, model: NoiseTable
+) -> NDArray[np.float64]:
+    """Return the squared errors of the logarithms of ranges, and the number they count for."""
+    objects, rows = evidence.pairs.objects, evidence.pairs.detections
+    detections, distances = evidence.detections, evidence.distances[objects]
+    # Ranges with errors of their own say nothing about the error of the model.
+    usable = ~np.isnan(detections.ranges[rows]) & np.isnan(detections.range_errors[rows])
     place = model.position_sigma / distances
     own = model.range_sigma[evidence.pair_kinds] ** 2
     share = own / (own + place**2)
-    away = np.log(np.where(told, seen.ranges[other], 1.0) / distances)
+    away = np.log(np.where(usable, detections.ranges[rows], 1.0) / distances)
     squares = (away * share) ** 2 + place**2 * share
-    return np.stack([squares, np.ones(len(one))]) * (found.chances * told)
+    return np.stack([squares, np.ones(len(objects))]) * (association.chances * usable)
 
 
 def next_model(
     evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool = False
 ) -> NoiseTable:
-    """Return the model that the counts speak for, classes drawn to the whole: the M step.
+    """Return the model of the counts, class rates shrunk towards the overall rate: the M step.
 
-    Detection falls with distance if `fading` says so.
+    With `fading`, detection falls with distance.
     """
     size = len(evidence.names)
     detected = counts.named.sum(axis=1)
     wrong = counts.named * (1.0 - np.eye(size))
-    misnamed = np.clip(drawn_rates(wrong.sum(axis=1), detected), LEAST, MOST)
+    misnamed = np.clip(shrunk_rates(wrong.sum(axis=1), detected), LEAST, MOST)
     spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
     false = counts.false.sum(axis=0)
     shares = (false + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
-    seen = np.clip(_seen_by_knot(evidence, counts, fading=fading), LEAST, MOST)
+    rates = np.clip(_rates_by_knot(evidence, counts, fading=fading), LEAST, MOST)
     metres = np.arange(DISTANCE_UNITS + 1) * (model.reach / DISTANCE_UNITS)
     faded = [
         np.interp(metres, KNOTS * limit, row / row[0])
-        for limit, row in zip(model.ranges.tolist(), seen, strict=True)
+        for limit, row in zip(model.ranges.tolist(), rates, strict=True)
     ]
     turns, ranges = (
         [evidence.by_kind(row) for row in part] for part in (counts.turns, counts.ranges)
     )
     return replace(
         model,
-        missed=1.0 - seen[None, :, 0],
+        missed=1.0 - rates[None, :, 0],
         misnamed=misnamed[None] if size > 1 else np.zeros((1, 1)),
         others=spread / np.maximum(spread.sum(axis=1, keepdims=True), 1e-12),
-        clutter=np.maximum(false.sum() / evidence.seen.turns.sum() * shares, LEAST / size),
-        sigma=np.clip(np.sqrt(drawn_rates(*turns)), LEAST_SIGMA, MOST_SIGMA),
-        range_sigma=np.clip(np.sqrt(drawn_rates(*ranges)), LEAST_ERROR, MOST_ERROR)
+        clutter=np.maximum(false.sum() / evidence.detections.turns.sum() * shares, LEAST / size),
+        sigma=np.clip(np.sqrt(shrunk_rates(*turns)), LEAST_SIGMA, MOST_SIGMA),
+        range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges)), LEAST_ERROR, MOST_ERROR)
         if ranges[1].any()
         else model.range_sigma,
         fading=np.stack(faded) if fading else model.fading,
     )
 
 
-def _seen_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArray[np.float64]:
+def _rates_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArray[np.float64]:
     """Return the chance of detection by class and knot, shape (k, knots)."""
     hits, trials = _by_knot(evidence, counts)
     if not fading:
-        rates = drawn_rates(hits.sum(axis=1), trials.sum(axis=1))
+        rates = shrunk_rates(hits.sum(axis=1), trials.sum(axis=1))
         return np.broadcast_to(rates[:, None], hits.shape)
-    # A class falls as all do, so far as its own samples do not speak against it.
+    # The shape of all classes together, scaled to the class, is its prior.
     overall = falling(hits.sum(axis=0), trials.sum(axis=0))
     expected = trials @ overall
     mean = PRIOR_SAMPLES * hits.sum() / trials.sum()
     level = (hits.sum(axis=1) + mean) / (expected + mean)
-    drawn = np.clip(level[:, None] * overall, LEAST, MOST)
-    rows = zip(hits + PRIOR_SAMPLES * drawn, trials + PRIOR_SAMPLES, strict=True)
+    prior = np.clip(level[:, None] * overall, LEAST, MOST)
+    rows = zip(hits + PRIOR_SAMPLES * prior, trials + PRIOR_SAMPLES, strict=True)
     return np.stack([falling(*row) for row in rows])
 
 
@@ -329,7 +334,7 @@ def _by_knot(evidence: Evidence, counts: Counts) -> tuple[NDArray[np.float64], N
 
 
 def falling(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the likeliest rates that never rise from one group to the next."""
+    """Return the likeliest rates that do not rise, by pooling adjacent violators."""
     groups: list[tuple[float, float, int]] = []
     for hit, trial in zip(hits.tolist(), trials.tolist(), strict=True):
         groups.append((hit, trial, 1))
@@ -341,11 +346,11 @@ def falling(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[n
     )
 
 
-def fades(evidence: Evidence, counts: Counts) -> bool:
-    """Tell whether the samples speak for a chance of detection that falls with distance.
+def detection_falls(evidence: Evidence, counts: Counts) -> bool:
+    """Whether the chance of detection falls significantly with distance.
 
-    The counts are those of a model in which it does not. Where the true places are known roughly,
-    distances are so, too, and nothing is said.
+    The counts are from a model in which it does not. It is False if the true places are uncertain,
+    because the distances are then uncertain as well.
     """
     if evidence.start.position_sigma > 0:
         return False
@@ -354,11 +359,11 @@ def fades(evidence: Evidence, counts: Counts) -> bool:
     places = KNOTS - (trials @ KNOTS / np.maximum(trials.sum(axis=1), 1e-9))[:, None]
     trend = ((hits - trials * rates[:, None]) * places).sum()
     variance = (trials * (rates * (1.0 - rates))[:, None] * places**2).sum()
-    return bool(trend < FADES * math.sqrt(variance))
+    return bool(trend < FALLING_TREND * math.sqrt(variance))
 
 
-def drawn_rates(hits: NDArray[np.number], trials: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rate of each class; the overall rate counts for `PRIOR_SAMPLES` trials of each."""
+def shrunk_rates(hits: NDArray[np.number], trials: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rates of classes, each with `PRIOR_SAMPLES` trials at the overall rate added."""
     overall = hits.sum() / max(trials.sum(), 1e-9)
     return np.asarray((hits + PRIOR_SAMPLES * overall) / (trials + PRIOR_SAMPLES))
 
@@ -366,7 +371,7 @@ def drawn_rates(hits: NDArray[np.number], trials: NDArray[np.float64]) -> NDArra
 def model_change(old: NoiseTable, new: NoiseTable) -> float:
     """Return the largest difference between two models of the same classes.
 
-    Differences are of log-odds of detection, and of logarithms of chances, rates and deviations.
+    It is in log-odds of detection, and in logarithms of chances, rates and deviations.
     """
     moves = [
         np.log(new.odds) - np.log(old.odds),
@@ -381,7 +386,7 @@ def model_change(old: NoiseTable, new: NoiseTable) -> float:
 
 
 def _others(size: int) -> NDArray[np.float64]:
-    """Return rows that give each other class the same chance."""
+    """Return rows with the same chance for each other class."""
     return np.asarray((1.0 - np.eye(size)) / max(size - 1, 1))
 
 
@@ -391,32 +396,34 @@ def estimated_rates(
     """Return the rates by class and overall with their intervals, as in `NoiseEstimate.rates`.
 
     Intervals are Wilson's for chances, the equivalent for Poisson rates, and symmetric in the
-    logarithm for deviations. For uncertain association, the effective number of samples follows
+    logarithm for deviations. As the associations are uncertain, the effective number of samples is
     from the information matrix: the sum over the photos of the outer products of their expected
-    scores (Fisher's identity). Where many objects stand close together, the clutter comes out some
-    per cent too large.
+    scores (Fisher's identity). Where many objects are close together, the estimate of the clutter
+    is some per cent too large.
     """
     quantities = _quantities(evidence, counts, model, fading=fading)
-    scores = np.stack([one.scores for one in quantities], axis=1)
+    scores = np.stack([quantity.scores for quantity in quantities], axis=1)
     single = _deviations(scores.reshape(len(scores), -1)).reshape(scores.shape[1:])
     pooled = _deviations(scores.sum(axis=2))
     rows = []
-    for number, one in enumerate(quantities):
-        everywhere = {"distance": one.distance}
-        rows.append(_row(one, ALL, one.hits.sum(), one.total, pooled[number]) | everywhere)
+    for number, quantity in enumerate(quantities):
+        hits, total, trials = quantity.hits, quantity.total, quantity.trials
+        overall = _row(quantity, ALL, hits.sum(), total, pooled[number])
+        rows.append(overall | {"distance": quantity.distance})
         for kind, name in enumerate(evidence.names):
-            own = _row(one, name, one.hits[kind], one.trials[kind], single[number, kind])
-            distance = one.distances[kind]
-            rows.append({**own, "value": float(one.values[kind]), "distance": float(distance)})
+            own = _row(quantity, name, hits[kind], trials[kind], single[number, kind])
+            distance = float(quantity.distances[kind])
+            rows.append({**own, "value": float(quantity.values[kind]), "distance": distance})
     return pd.DataFrame(rows)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Quantity:
-    """What is counted, of how many by class and in all, what the model has, and the scores.
+    """A learnt quantity by class: hits, trials, value in the model, and scores by photo.
 
-    Scores have the shape (photos, k): chances are taken as log-odds, rates and deviations as
-    logarithms. `distances` are metres, NaN where it is for all of them.
+    `scores`, shape (photos, k), are those of log-odds for chances, of logarithms for rates and
+    deviations. `total` is the number of trials of all classes, and `distances` are in metres, NaN
+    for a quantity that is for all distances.
     """
 
     name: str
@@ -429,7 +436,7 @@ class _Quantity:
 
     @property
     def distance(self) -> float:
-        """Its distance if that is the same for all classes, otherwise NaN."""
+        """The distance if it is the same for all classes, otherwise NaN."""
         first = float(self.distances[0])
         return first if (self.distances == first).all() else math.nan
 
@@ -437,15 +444,15 @@ class _Quantity:
 def _quantities(
     evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool
 ) -> list[_Quantity]:
-    """Return all that is learnt."""
+    """Return all learnt quantities."""
     size, photos = len(evidence.names), len(evidence.views)
     sample = evidence.owners[evidence.pairs.objects]
 
     def by_photo(
         owner: NDArray[np.int64], group: NDArray[np.int64], amount: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        counted = np.bincount(owner * size + group, amount, photos * size)
-        return np.asarray(counted.reshape(photos, size))
+        sums = np.bincount(owner * size + group, amount, photos * size)
+        return np.asarray(sums.reshape(photos, size))
 
     def quantity(
         name: str,
@@ -469,7 +476,7 @@ def _quantities(
             distances=np.full(size, np.nan) if distances is None else distances,
         )
 
-    found, rows = [], (evidence.owners, evidence.kinds)
+    quantities, rows = [], (evidence.owners, evidence.kinds)
     chances = model.detected[0][:, None] * fading_at_knots(model)
     for number, knot in enumerate(KNOTS if fading else KNOTS[:1]):
         parts = slice(number, number + 1) if fading else slice(None)
@@ -478,14 +485,14 @@ def _quantities(
         )
         metres = knot * model.ranges if fading else None
         name = "fading" if number else "detection"
-        found.append(quantity(name, hits, trials, chances[:, number], distances=metres))
+        quantities.append(quantity(name, hits, trials, chances[:, number], distances=metres))
     pairs = sample, evidence.pair_kinds
     false = np.zeros((photos, size))
-    np.add.at(false, evidence.seen.givers, counts.false)
-    turns = float(evidence.seen.turns.sum())
-    exposed = np.repeat(evidence.seen.turns[:, None], size, axis=1)
+    np.add.at(false, evidence.detections.photo_rows, counts.false)
+    turns = float(evidence.detections.turns.sum())
+    exposed = np.repeat(evidence.detections.turns[:, None], size, axis=1)
     wrong = by_photo(*pairs, np.maximum(counts.chances - counts.right, 0.0))
-    found += [
+    quantities += [
         quantity("misnamed", wrong, by_photo(*pairs, counts.chances), model.misnamed[0]),
         quantity("clutter", false, exposed, model.clutter, total=turns),
     ]
@@ -494,14 +501,14 @@ def _quantities(
         deviations["range_sigma"] = counts.ranges, model.range_sigma
     for name, (errors, values) in deviations.items():
         squares, whole = (by_photo(*pairs, part) for part in errors)
-        found.append(quantity(name, squares, whole, values, logarithm=True))
-    return found
+        quantities.append(quantity(name, squares, whole, values, logarithm=True))
+    return quantities
 
 
 def _row(
     quantity: _Quantity, name: str, hits: float, trials: float, deviation: float
 ) -> dict[str, Any]:
-    """Return what the samples say of a rate: `deviation` is that of its log-odds or logarithm."""
+    """Return a rate with its intervals; `deviation` is that of its log-odds or logarithm."""
     rate = hits / trials if trials > 0 else 0.0
     if quantity.name in {"bearing_sigma", "range_sigma"}:
         own = math.sqrt(rate)
@@ -523,7 +530,7 @@ def _row(
 
 def _deviations(scores: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviation of each parameter, shape (p,), from scores (samples, p)."""
-    # Shrinking leaves a mean, which is no information; a little more makes it invertible.
+    # Shrinkage leaves a mean, which is no information; the small term makes the matrix invertible.
     scores = scores - scores.mean(axis=0)
     information = scores.T @ scores
     information[np.diag_indices_from(information)] += LEAST_INFORMATION

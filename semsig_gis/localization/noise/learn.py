@@ -1,4 +1,4 @@
-"""Learn a noise model from detections whose true place is known."""
+"""Learn a noise model from detections at known places."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from semsig_gis.localization.noise.fit import (
     ALL,
     KNOTS,
     LEAST,
+    detection_falls,
     estimated_rates,
     expected_counts,
-    fades,
     fading_at_knots,
     gather_evidence,
     model_change,
@@ -41,16 +41,16 @@ if TYPE_CHECKING:
     from semsig_gis.storage import Row
 
 MOST_ROUNDS = 500
-SETTLED = 1e-4  # largest change of a log-odds or logarithm
+CONVERGED = 1e-4  # largest change of a log-odds or logarithm in the last round
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sample:
-    """What was detected, perhaps nothing, at a known place.
+    """The detections, perhaps none, at a known place.
 
     The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
     `core.geometry.cell_ids`). The signature, which may be a `View`, must have types, all known, or
-    scores, and bearings; how far north is off in it counts as bearing noise.
+    scores, and bearings; an error of its north counts as bearing noise.
     """
 
     signature: Signature
@@ -91,17 +91,17 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy, radius: float = RADIUS
         A CSV file with the columns ``types`` (symbols such as ``DDB``), ``bearings`` (degrees,
         with blanks, commas or semicolons between them) and either ``x`` and ``y`` or
         ``cell_id``; or JSON lines with the same names (suffix ``.jsonl``, ``.ndjson`` or
-        ``.json``), where bearings may be a list. What was seen may be told in any other way that
-        `parse_view` reads. Other columns are left alone; a row without detections is a sample too.
+        ``.json``), where bearings may be a list. All other columns that `parse_view` reads are
+        accepted as well. Further columns are ignored; a row without detections is also a sample.
     taxonomy : Taxonomy
-        Classes that the symbols belong to.
+        Classes of the symbols.
     radius : float, default 30
-        Visibility range of the city in metres, of which near, middle and far are thirds.
+        Visibility range of the city in metres; near, middle and far are thirds of it.
 
     Returns
     -------
     list of Sample
-        One a row.
+        One per row.
 
     Raises
     ------
@@ -125,9 +125,9 @@ def read_samples(path: str | Path, *, taxonomy: Taxonomy, radius: float = RADIUS
 
 
 def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
-    told = {name for name in SEEN if row.get(name) is not None}
+    columns = {name for name in SEEN if row.get(name) is not None}
     for name in ("types", "bearings"):
-        if told <= {"types", "bearings"} - {name}:
+        if columns <= {"types", "bearings"} - {name}:
             raise InputError(f"it has no {name}")
     signature = parse_view(row, taxonomy=taxonomy, radius=radius)
     x, y, cell = (row_value(row, name) for name in ("x", "y", "cell_id"))
@@ -138,16 +138,16 @@ def _sample(row: Row, taxonomy: Taxonomy, radius: float) -> Sample:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class NoiseEstimate(Displayed):
-    """A noise model that was learnt, and how well it is known.
+    """A learnt noise model with its uncertainty.
 
-    `rates` has one row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects
-    a full turn, ``bearing_sigma`` in degrees and, with ranges, ``range_sigma``) and each class, and
-    ``"all"`` together: ``value`` as in the model, ``own``, what the samples of the class alone say,
-    with the intervals ``low_90`` to ``high_95``, and how many ``samples`` it rests on. Where
-    detection falls with distance, it is the chance at ``distance`` metres, with rows ``fading`` for
-    the chances farther away. `confusion` holds the expected number of
-    detected objects by true class (rows) and given class (columns). Nothing is in sight of the
-    places of `skipped` samples. `log_likelihood` is of all detections under the model.
+    `rates` has a row for each quantity (``detection``, ``misnamed``, ``clutter`` in false objects a
+    full turn, ``bearing_sigma`` in degrees and, with ranges, ``range_sigma``) and each class, and
+    for ``"all"`` together: ``value`` as in the model, ``own`` from only the samples of the class,
+    with the intervals ``low_90`` to ``high_95``, and the number of ``samples``. If detection falls
+    with distance, it is the chance at ``distance`` metres, with rows ``fading`` for the chances
+    farther away. `confusion` is the expected number of detected objects by true class (rows) and
+    given class (columns). No object is visible from the places of `skipped` samples.
+    `log_likelihood` is that of all detections under the model.
     """
 
     spec: NoiseSpec
@@ -192,23 +192,23 @@ def learn_noise(
     footprints: Footprints | None = None,
     name: str = "learned",
 ) -> NoiseEstimate:
-    """Estimate a noise model from detections whose true place is known.
+    """Estimate a noise model from detections at known places.
 
     Parameters
     ----------
     samples : sequence of Sample
-        The detections; some hundred signatures serve well.
+        The detections; some hundred signatures are enough.
     city : SignatureDatabase or StreetObjects
-        What there is to see. With a database a sample is looked up by its cell, and seen from
-        the middle of it; with street objects it is seen from where it was.
+        The visible objects. With a database, a sample is at the centre of its cell; with street
+        objects, it is at its own place.
     radius : float, default 30
-        Visibility range in metres, with street objects; a database has its own.
+        Visibility range in metres for street objects; a database has its own.
     position_sigma : float, default 0
-        Known standard deviation in metres, each way, of the true places given (with a database,
-        of the place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). What it turns
-        the bearings by is not counted as bearing noise.
+        Known standard deviation of the true places in metres, in x and y (with a database, of the
+        place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). The differences of
+        bearings that it causes are not counted as bearing noise.
     footprints : Footprints, optional
-        Buildings, with street objects; what they hide is not seen.
+        Buildings that hide objects, for street objects.
     name : str, default "learned"
         Name of the model.
 
@@ -220,15 +220,15 @@ def learn_noise(
     Raises
     ------
     InputError
-        If there are no samples, none can be used, or there is nothing to see or no detection.
+        If there are no samples, none can be used, or there is no visible object or no detection.
 
     Notes
     -----
-    A class with n samples and the rate r of its own is given
-    ``(n * r + 8 * overall) / (n + 8)``, that is, the overall rate counts for eight samples; the
-    squares of deviations likewise, and a row of the confusion is filled up with eight samples
-    that are misnamed as often as all are, each other class alike. See
-    `likelihood.noise.fit` for the intervals.
+    The rate of a class with n samples and its own rate r is
+    ``(n * r + 8 * overall) / (n + 8)``, so the overall rate counts for eight samples; the same
+    holds for squares of deviations. A row of the confusion has eight samples added that are
+    misnamed at the overall rate, each other class equally often. See `localization.noise.fit` for
+    the intervals.
 
     Examples
     --------
@@ -252,11 +252,11 @@ def learn_noise(
     evidence = gather_evidence(
         views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
     )
-    model, rounds = _fitted(evidence, evidence.start, fading=False)
+    model, rounds = _fit(evidence, evidence.start, fading=False)
     counts = expected_counts(evidence, model)
-    fading = fades(evidence, counts)
+    fading = detection_falls(evidence, counts)
     if fading:
-        model, more = _fitted(evidence, model, fading=True)
+        model, more = _fit(evidence, model, fading=True)
         counts, rounds = expected_counts(evidence, model), rounds + more
     rates = estimated_rates(evidence, counts, model, fading=fading)
     return NoiseEstimate(
@@ -265,17 +265,17 @@ def learn_noise(
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
         samples=len(used),
         objects=len(views.codes),
-        detections=len(evidence.seen.bearings),
+        detections=len(evidence.detections.bearings),
         skipped=len(samples) - len(used),
         rounds=rounds,
         log_likelihood=counts.log_likelihood,
     )
 
 
-def _fitted(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
-    """Return the model that rounds of the fit settle on, and how many there were."""
+def _fit(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
+    """Return the model after convergence, and the number of rounds."""
     rounds, change = 0, math.inf
-    while change >= SETTLED and rounds < MOST_ROUNDS:
+    while change >= CONVERGED and rounds < MOST_ROUNDS:
         counts = expected_counts(evidence, model)
         old, model = model, next_model(evidence, counts, model, fading=fading)
         change = model_change(old, model)
@@ -289,9 +289,9 @@ def _true_views(
     radius: float,
     footprints: Footprints | None,
 ) -> tuple[VisibleObjects, list[int]]:
-    """Return what there was to see in the photos of samples that can be used, and which these are.
+    """Return the visible objects in the photos of usable samples, and the rows of these samples.
 
-    A sample of several photos sees all there is in each of them.
+    All photos of a sample have the same visible objects.
     """
     if not samples:
         raise InputError(
@@ -312,7 +312,7 @@ def _true_views(
         index = ObjectIndex(city.xy)
         looks = np.repeat(xy, photos, axis=0)
         views = visible_objects_at(city, looks, index=index, radius=radius, footprints=footprints)
-        # Where nothing is seen is left out, as a cell that sees nothing is not in a database.
+        # Places without objects are left out, as cells without objects are not in a database.
         full = np.flatnonzero(views.lengths)
         used = np.unique(np.repeat(np.arange(len(samples)), photos)[full])
         views = replace(views, offsets=np.append(0, views.offsets[full + 1]))
@@ -340,7 +340,7 @@ def _spec(
     radius: float,
     fading: bool,
 ) -> NoiseSpec:
-    """Return the model as a specification; `radius` is the range of classes that have none."""
+    """Return the model as a specification; `radius` is the default range of a class."""
     pooled = rates[rates["class"] == ALL].drop_duplicates("quantity")
     overall = pooled.set_index("quantity")["value"].to_dict()
 

@@ -1,7 +1,7 @@
 """Noise models: how a detector fails, as the likelihood method assumes.
 
-A detector misses objects, gives some another class, invents some, and is a few degrees out.
-`NoiseSpec` says how often; `NoiseMixture` says that it is one of several models, unknown which.
+A detector misses objects, gives a wrong class to some, reports false objects, and has errors of a
+few degrees. `NoiseSpec` has the rates; `NoiseMixture` is one of several models, unknown which.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ BY_CLASS = (
     *("bearing_sigma_by_class", "range_sigma_by_class"),
 )
 ALL = "all"
-"""What stands for all classes that have no name of their own."""
+"""Name of all classes without an entry of their own."""
 ROUNDING = 1e-6  # of sums of shares, and of squares of metres
 
 
@@ -53,9 +53,9 @@ class NoiseSpec(Displayed):
         chance; 0 to 1.
     confusion : mapping of str to mapping of str to float, optional
         For some or all classes the chance of each class that a detected object is given, the
-        right one among them; each row sums to one. It goes before `misnamed`.
+        right one included; each row sums to one. It takes precedence over `misnamed`.
     clutter : float, default 1.0
-        Expected number of false objects in a signature, 0 or more, all round alike.
+        Expected number of false objects in a signature, 0 or more, equal in all directions.
     clutter_shares : mapping of str to float, optional
         Share of each class in the false objects; sums to one. Equal shares by default.
     bearing_sigma : float, default 5.0
@@ -63,19 +63,19 @@ class NoiseSpec(Displayed):
     detection_by_class, misnamed_by_class, bearing_sigma_by_class : mapping of str to float
         The same for single classes, by the name of the class; optional.
     position_sigma : float, default 0.0
-        Standard deviation in metres of where in its cell the observer stands, each way; it turns
-        the bearings of near objects more than those of far ones.
+        Standard deviation in metres of the place of the observer, in x and in y; it turns the
+        bearings of near objects more than those of far objects.
     missed_each, misnamed_each : float, default 0.0
-        Expected number of further objects that are missed or misnamed in every signature, few or
-        many: an object among L survives m draws with chance ``(1 - 1/L) ** m`` (the source's
+        Expected number of further objects that are missed or misnamed in every signature, short
+        or long: an object among L survives m draws with chance ``(1 - 1/L) ** m`` (the source's
         distortion, section 4.2).
     range_sigma : float, default 0.25
         Relative error of a rough distance: the standard deviation of its logarithm, above 0 and up
-        to 3. `range_sigma_by_class` has it for single classes.
+        to 3. `range_sigma_by_class` is the same for single classes.
     fading : mapping of str to sequence of (float, float), optional
         How the chance of detection falls with the distance, for classes by name, or ``all``
-        others: pairs of metres, ascending, and of the share of `detection` that is left there, 0 to
-        1; straight lines between, and the last share beyond.
+        others: pairs of metres, ascending, and the remaining share of `detection` there, 0 to 1;
+        linear between them, and the last share beyond.
     name : str, default "custom"
         Name to print.
 
@@ -144,16 +144,16 @@ class NoiseSpec(Displayed):
 
     @property
     def specs(self) -> tuple[NoiseSpec, ...]:
-        """The model itself, the only one, as in a mixture of one."""
+        """The model itself, as in a mixture of one."""
         return (self,)
 
     @property
     def weights(self) -> tuple[float, ...]:
-        """Its chance, which is one."""
+        """The chance of the only model, 1."""
         return (1.0,)
 
     def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseSpec:
-        """Return the model after a change, which a mixture makes in each of its models."""
+        """Return the model after a change; a mixture changes each of its models."""
         return change(self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -164,10 +164,9 @@ class NoiseSpec(Displayed):
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class NoiseMixture(Displayed):
-    """Noise that is known only to follow one of several models.
+    """Noise of one of several models, unknown which.
 
-    The likelihood of a cell is the weighted sum over the models: the level is as unknown as the
-    place.
+    The likelihood of a cell is the weighted sum over the models.
 
     Parameters
     ----------
@@ -197,8 +196,8 @@ class NoiseMixture(Displayed):
                 f"{len(self.specs)} noise models and {len(self.weights)} weights were given; "
                 "give at least one model and one weight for each."
             )
-        named = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
-        _check_shares("weights of the mixture", named)
+        weights = {f"{number}": weight for number, weight in enumerate(self.weights, start=1)}
+        _check_shares("weights of the mixture", weights)
         if not all(weight > 0 for weight in self.weights):
             raise InputError(
                 f"weights of the mixture are {self.weights}; leave out models without weight."
@@ -231,7 +230,7 @@ Noise = NoiseSpec | NoiseMixture
 def noise_from_dict(values: Mapping[str, Any]) -> Noise:
     """Read a noise model from plain values, the inverse of ``to_dict``.
 
-    Values are the fields of `NoiseSpec`, each optional, or those of a mixture of plain models.
+    Values are the fields of `NoiseSpec`, all optional, or of a mixture of plain models.
     """
     if not isinstance(values, Mapping):
         raise InputError(f"a noise model is {values!r}; give a table of its fields.")
@@ -273,8 +272,8 @@ def cell_noise(noise: Noise, step: float) -> Noise:
     Returns
     -------
     NoiseSpec or NoiseMixture
-        The model with ``step / 12 ** 0.5`` metres more of uncertainty of the place, each way, in
-        quadrature.
+        The model with a position uncertainty in x and y that is larger by ``step / 12 ** 0.5``
+        metres, added in quadrature.
 
     Examples
     --------
@@ -292,7 +291,7 @@ def cell_noise(noise: Noise, step: float) -> Noise:
 def place_noise(noise: Noise, step: float) -> Noise:
     """Return the noise model for a known place, the inverse of `cell_noise`.
 
-    Raises `InputError` if the model has too little uncertainty of the place to take away.
+    Raises `InputError` if the position uncertainty of the model is too small to subtract from.
     """
 
     def narrowed(spec: NoiseSpec) -> NoiseSpec:
@@ -314,8 +313,8 @@ def named_noise(name: str) -> Noise:
     Parameters
     ----------
     name : {"light", "medium", "strong", "generic", "by-hand"}
-        A level of the source's distortion, ``"generic"`` where the level is not known, or
-        ``"by-hand"`` for a person, who marks or names some of the objects in sight: nine, six or
+        A level of the source's distortion, ``"generic"`` if the level is not known, or
+        ``"by-hand"`` for a person, who marks or names some of the visible objects: nine, six or
         three in ten.
 
     Returns
@@ -344,13 +343,13 @@ def named_noise(name: str) -> Noise:
 
 @dataclass(frozen=True, slots=True)
 class _Number:
-    """A kind of number, in words and as a test, which NaN and infinity fail."""
+    """A kind of number: its description, and a test that NaN and infinity fail."""
 
     words: str
     fits: Callable[[float], bool]
 
     def check(self, label: str, value: object) -> None:
-        """Refuse anything else."""
+        """Raise InputError for any other value."""
         number = value if isinstance(value, (int, float)) else math.nan
         if isinstance(value, bool) or not self.fits(number):
             raise InputError(f"{label} of the noise is {value!r:.40}; give {self.words}.")
@@ -378,7 +377,7 @@ _NUMBERS = MappingProxyType(
 
 
 def _check_fading(name: str, points: object) -> None:
-    """Refuse an invalid table of shares by distance."""
+    """Raise InputError for an invalid table of shares by distance."""
     try:
         table = np.array(points, dtype=np.float64)
     except (TypeError, ValueError):
@@ -395,7 +394,7 @@ def _check_fading(name: str, points: object) -> None:
 
 
 def _check_shares(label: str, shares: Mapping[str, float]) -> None:
-    """Refuse shares that are not chances or do not sum to one."""
+    """Raise InputError for shares that are not chances or do not sum to one."""
     for name, value in shares.items():
         _CHANCE.check(f"{label}, {name!r},", value)
     total = math.fsum(shares.values())
@@ -404,7 +403,7 @@ def _check_shares(label: str, shares: Mapping[str, float]) -> None:
 
 
 def _table(label: str, value: object) -> Mapping[str, Any]:
-    """Return a mapping by class, or refuse what is not one."""
+    """Return a mapping by class; raise InputError for any other value."""
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         raise InputError(
             f"{label} of the noise is {value!r}; give a table by the names of the classes."
@@ -413,7 +412,7 @@ def _table(label: str, value: object) -> Mapping[str, Any]:
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401
-    """Return mappings of any kind as dictionaries."""
+    """Return a copy with all mappings as dictionaries and all sequences as lists."""
     if isinstance(value, Mapping):
         return {name: _plain(part) for name, part in value.items()}
     if isinstance(value, (list, tuple)):
@@ -428,13 +427,13 @@ def _level(name: str, occurrences: int) -> NoiseSpec:
     return replace(sure, clutter=each, missed_each=each, misnamed_each=each)
 
 
-def _alike(name: str, specs: tuple[NoiseSpec, ...]) -> NoiseMixture:
+def _equal_mixture(name: str, specs: tuple[NoiseSpec, ...]) -> NoiseMixture:
     """Return a mixture of models that are equally likely."""
     return NoiseMixture(specs=specs, weights=(1 / len(specs),) * len(specs), name=name)
 
 
 _LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
-# A person leaves out much or little, hardly errs about the rest, and makes nothing up.
+# A person leaves out many or few objects, rarely misnames the others, and invents almost none.
 _MARKED = tuple(
     NoiseSpec(
         detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:g} marked"
@@ -444,11 +443,11 @@ _MARKED = tuple(
 NOISES: Mapping[str, Noise] = MappingProxyType(
     {
         **{spec.name: spec for spec in _LEVELS},
-        "generic": _alike("generic", _LEVELS),
-        "by-hand": _alike("by-hand", _MARKED),
+        "generic": _equal_mixture("generic", _LEVELS),
+        "by-hand": _equal_mixture("by-hand", _MARKED),
     }
 )
-"""The noise models that have a name."""
+"""The noise models by name."""
 
 
 def open_noise(path: str | Path) -> Noise:

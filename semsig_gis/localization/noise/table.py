@@ -1,7 +1,4 @@
-"""A noise model as tables of numbers, for the classes and lengths of one database.
-
-By these tables a query is compared with what is seen from some places.
-"""
+"""A noise model as arrays, for the classes and signature lengths of one database."""
 
 from __future__ import annotations
 
@@ -24,27 +21,28 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.noise.model import Noise, NoiseSpec
 
-# No chance is quite nought or one: a model that excludes something is wrong one day, and then
-# excludes the true place.
-LEAST_CHANCE = 1e-3
-MOST_CHANCE = 0.95
+# No chance is exactly 0 or 1: a model that excludes an event is wrong one day, and then it excludes
+# the true place.
+LEAST_MISSED = 1e-3
+MOST_MISSED = 0.95
 LEAST_CLUTTER = 1e-3
 FULL_TURN = 360.0
 WIDEST_SIGMA = 180.0
-LONGEST_TABLE = 400  # lengths that have chances of their own; longer signatures take the last
+LONGEST_TABLE = 400  # longest signature with its own chances; longer ones use the same
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NoiseTable:
-    """One noise model for k classes, and signatures of every length up to a longest.
+    """One noise model for k classes and for signatures of every length up to a longest.
 
     By length and class, shape (longest + 1, k), `missed` is the chance that an object is missed and
-    `misnamed` that it is given another class, once detected. `others`, shape (k, k), says which:
-    rows sum to one, the diagonal is zero. `clutter` is in false objects per signature by class,
-    `sigma` the standard deviation of a bearing in degrees by class, `range_sigma` that of the
-    logarithm of a rough distance, and `position_sigma` that of the observer's place in metres.
-    `ranges` is from how far a class is seen, in metres, and `fading`, shape (k, 256), what is left
-    of its detection at each distance unit, of which 255 are `reach` metres.
+    `misnamed` that a detected object is given another class. `others`, shape (k, k), are the
+    shares of these: rows sum to one, the diagonal is zero. `clutter` is the number of false objects
+    per signature by class, `sigma` the standard deviation of a bearing in degrees by class,
+    `range_sigma` that of the logarithm of a rough distance, and `position_sigma` that of the place
+    of the observer in metres. `ranges` are the visibility ranges of the classes in metres, and
+    `fading`, shape (k, 256), the remaining share of detection by distance unit; 255 units are
+    `reach` metres.
     """
 
     codes: NDArray[np.uint8]
@@ -68,7 +66,7 @@ class NoiseTable:
     def inside(self) -> NDArray[np.float64]:
         """Chance that an object in range of the place is in range of the observer, shape (k, 256).
 
-        Who stands elsewhere in the cell sees other objects at the edge of range than its middle.
+        At the edge of range, an observer off the centre of a cell sees other objects.
         """
         if self.position_sigma == 0:
             return np.ones((len(self.codes), DISTANCE_UNITS + 1))
@@ -78,12 +76,12 @@ class NoiseTable:
 
     @cached_property
     def remaining(self) -> NDArray[np.float64]:
-        """What is left of the detection of an object by class and distance unit, shape (k, 256)."""
+        """Remaining share of the detection of an object by class and unit, shape (k, 256)."""
         return np.asarray(self.fading * self.inside)
 
     @cached_property
     def leaving(self) -> NDArray[np.float64]:
-        """What the observer does not see as it is out of range, shape (k, 256)."""
+        """Share of detection that is lost because the observer is out of range, shape (k, 256)."""
         return np.asarray(self.fading * (1.0 - self.inside))
 
     @cached_property
@@ -93,7 +91,7 @@ class NoiseTable:
 
     @cached_property
     def detected(self) -> NDArray[np.float64]:
-        """Chance of detection of what is near, shape (longest + 1, k)."""
+        """Chance of detection of a near object, shape (longest + 1, k)."""
         return 1.0 - self.missed
 
     @cached_property
@@ -111,7 +109,7 @@ class NoiseTable:
 
     @cached_property
     def naming(self) -> NDArray[np.float64]:
-        """`named`, and one for a class that is not known, over `density`, (..., k, k + 1)."""
+        """`named`, and 1 for an unknown class, over `density`, shape (..., k, k + 1)."""
         anything = np.ones((*self.missed.shape, 1))
         return np.asarray(np.concatenate([self.named, anything], axis=2) / self.density)
 
@@ -130,7 +128,7 @@ class NoiseTable:
         return np.asarray(np.minimum(np.hypot(self.sigma[:, None], turned), WIDEST_SIGMA))
 
     def length_rows(self, lengths: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the row of each signature length; lengths beyond the longest take the last."""
+        """Return the row of each signature length, the last one for longer signatures."""
         return np.minimum(lengths, len(self.missed) - 1)
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
@@ -154,11 +152,11 @@ def noise_tables(
 ) -> tuple[tuple[NoiseTable, ...], NDArray[np.float64]]:
     """Return one table for each model of a mixture, or for the only model, and the chance of each.
 
-    Only classes in `codes` count; those without a range of their own are seen from `radius` metres.
-    Raises `InputError` if the model names a class that the taxonomy
-    does not have, or gives a class no chance at all of being named as one that counts.
+    Only classes in `codes` are used; the default visibility range is `radius` metres. Raises
+    `InputError` if the model has a class that the taxonomy does not have, or gives a class no
+    chance of any name in `codes`.
     """
-    # What a model says of classes that do not count goes to a row after the last, and is dropped.
+    # Values of other classes go to a row after the last, which is dropped.
     rows = {item.name: len(codes) for item in taxonomy.classes}
     rows |= {taxonomy.by_code(code).name: row for row, code in enumerate(codes.tolist())}
     ranges = taxonomy.ranges(radius)
@@ -213,7 +211,7 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
 
 
 def query_bearings(query: Signature) -> NDArray[np.float64]:
-    """Return the bearings of a query, or refuse a query without."""
+    """Return the bearings of a query; raise InputError without any."""
     if query.bearings is None:
         raise InputError(
             "the query has no bearings, which the search between cells needs; give them."
@@ -229,7 +227,7 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
     ranges: NDArray[np.float64],
     reach: float,
 ) -> NoiseTable:
-    """Return the table of one model, given the row of each class that the taxonomy has."""
+    """Return the table of one model, given the row of each class of the taxonomy."""
     count = len(codes)
 
     def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
@@ -258,14 +256,14 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
     clutter = np.full(count, spec.clutter / count)
     if spec.clutter_shares:
         clutter = spec.clutter * by_class(0.0, spec.clutter_shares)
-    # A draw among L objects leaves each of them alone with chance 1 - 1/L.
+    # A draw among L objects does not hit a given one with chance 1 - 1/L.
     spared = 1.0 - 1.0 / np.maximum(np.arange(longest + 1), 1)
     detected = np.outer(spared**spec.missed_each, by_class(spec.detection, spec.detection_by_class))
     right = np.outer(spared**spec.misnamed_each, 1.0 - misnamed)
     return NoiseTable(
         codes=codes,
-        missed=np.clip(1.0 - detected, LEAST_CHANCE, MOST_CHANCE),
-        misnamed=np.clip(1.0 - right, LEAST_CHANCE, MOST_CHANCE) if count > 1 else 0.0 * right,
+        missed=np.clip(1.0 - detected, LEAST_MISSED, MOST_MISSED),
+        misnamed=np.clip(1.0 - right, LEAST_MISSED, MOST_MISSED) if count > 1 else 0.0 * right,
         others=others,
         clutter=np.maximum(clutter, LEAST_CLUTTER / count),
         sigma=by_class(spec.bearing_sigma, spec.bearing_sigma_by_class),
@@ -280,24 +278,24 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
 def _fading(
     spec: NoiseSpec, rows: Mapping[str, int], count: int, reach: float
 ) -> NDArray[np.float64]:
-    """Return what is left of the detection of each class by distance unit, shape (count, 256)."""
+    """Return the remaining share of detection by class and distance unit, shape (count, 256)."""
     metres = np.arange(DISTANCE_UNITS + 1) * (reach / DISTANCE_UNITS)
 
     def shares(points: Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        known, left = np.transpose(np.asarray(points, dtype=np.float64))
-        return np.asarray(np.interp(metres, known, left))
+        distances, values = np.transpose(np.asarray(points, dtype=np.float64))
+        return np.asarray(np.interp(metres, distances, values))
 
-    faded = np.ones((count + 1, len(metres)))
+    fading = np.ones((count + 1, len(metres)))
     if ALL in spec.fading:
-        faded[:] = shares(spec.fading[ALL])
+        fading[:] = shares(spec.fading[ALL])
     for name, points in spec.fading.items():
         if name != ALL:
-            faded[_row(name, rows)] = shares(points)
-    return faded[:count]
+            fading[_row(name, rows)] = shares(points)
+    return fading[:count]
 
 
 def _row(name: str, rows: Mapping[str, int]) -> int:
-    """Return the row of a class that a noise model names."""
+    """Return the row of a class in a noise model; raise InputError for an unknown class."""
     if name not in rows:
         raise InputError(
             f"the noise model names a class {name!r} that the database does not "

@@ -1,4 +1,4 @@
-"""What the parts of the likelihood method refuse, each in one sentence that says what to give."""
+"""Errors of the likelihood method for invalid arguments."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from semsig_gis.localization import (
     CellScores,
     NoiseSpec,
     Sample,
-    align_cells,
     area_prior,
     build_index,
     calibrate,
@@ -34,6 +33,7 @@ from semsig_gis.localization import (
     refine,
     rerank,
     route_posteriors,
+    score_associations,
     weight_prior,
 )
 from semsig_gis.observation import Leg
@@ -60,7 +60,7 @@ ELSEWHERE = Sample(signature=ONE, xy=(5e6, 5e6))
 
 
 def refined(query: Signature, cells: np.ndarray, **options: Any) -> None:  # noqa: ANN401
-    refine(query, cells, NOISE, objects=OBJECTS, index=STORE.index, **options)
+    refine(query, cells, NOISE, store=STORE, **options)
 
 
 def table(**fields: Any) -> Any:  # noqa: ANN401
@@ -75,7 +75,7 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
     (lambda: INDEX.scores(ONE, north_sigma=-1.0), "north is -1.0", "from 0.001"),
     (lambda: INDEX.scores(ONE, north_sigma=math.nan), "north is nan", "infinity"),
     (lambda: rerank(INDEX, ONE, CellScores(loglik=FLAT), count=0), "re-rank is 0", "from 1"),
-    (lambda: align_cells(DATABASE, TYPES, NOISE, np.arange(2)), "no bearings", "give them"),
+    (lambda: score_associations(DATABASE, TYPES, NOISE, np.arange(2)), "no bearings", "give them"),
     (lambda: explain_cell(TYPES, 0, NOISE, database=DATABASE), "no bearings", "give them"),
     (lambda: locate(INDEX, ONE, refined=True), "between the viewpoints", "object store"),
     (lambda: locate(INDEX, TYPES, refined=True, store=STORE), "no bearings", "give them"),
@@ -139,8 +139,6 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
 
 
 @pytest.mark.parametrize(("call", "fault", "remedy"), CASES)
-def test_what_cannot_be_used_is_refused(
-    call: Callable[[], object], fault: str, remedy: str
-) -> None:
+def test_invalid_arguments_are_refused(call: Callable[[], object], fault: str, remedy: str) -> None:
     with refused(InputError, fault, remedy):
         call()
