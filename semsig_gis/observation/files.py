@@ -137,30 +137,29 @@ def _route_reader(taxonomy: Taxonomy, north: North, radius: float) -> Callable[[
     def read(row: Row) -> _RouteLine:
         sigma, time = row_value(row, "sigma"), row_value(row, "time")
         sigma = None if sigma is None else float(sigma)
+        step = {
+            name: float(row_value(row, name))
+            for name in (*COORDINATE_KEYS, *POLAR_KEYS)
+            if row_value(row, name) is not None
+        }
+        leg = None
+        if step.keys() == set(COORDINATE_KEYS):
+            leg = Leg(**step, sigma=sigma or 0.0)
+        elif step.keys() == set(POLAR_KEYS):
+            leg = Leg.towards(step["bearing"] + north.turn, step["distance"], sigma=sigma or 0.0)
+        elif step:
+            raise InputError(
+                "its step from the line before needs dx and dy, or distance and bearing"
+            )
         return _RouteLine(
             name=row_value(row, "id"),
             view=parse_view(row, taxonomy=taxonomy, radius=radius),
-            leg=_leg(row, north, sigma or 0.0),
+            leg=leg,
             sigma=sigma,
             time=None if time is None else parse_time(time),
         )
 
     return read
-
-
-def _leg(row: Row, north: North, sigma: float) -> Leg | None:
-    values = {
-        name: float(row_value(row, name))
-        for name in (*COORDINATE_KEYS, *POLAR_KEYS)
-        if row_value(row, name) is not None
-    }
-    if not values:
-        return None
-    if values.keys() == set(COORDINATE_KEYS):
-        return Leg(dx=values["dx"], dy=values["dy"], sigma=sigma)
-    if values.keys() == set(POLAR_KEYS):
-        return Leg.towards(values["bearing"] + north.turn, values["distance"], sigma=sigma)
-    raise InputError("its step from the line before needs dx and dy, or distance and bearing")
 
 
 def _route(rows: list[tuple[int, _RouteLine]], source: str, track: Track | None) -> Route:

@@ -122,8 +122,18 @@ def parse_view(row: Row, *, taxonomy: Taxonomy, radius: float = RADIUS_M) -> Vie
             f"{' and '.join(lists + photos + columns)} were given; describe what was seen "
             "in one of these ways."
         )
-    if photos and not columns:
-        return _photos_view(values, taxonomy, radius)
+    if photos and not columns:  # one row for each photo
+        shared = {name: values[name] for name in LOOK if name in values}
+        rows = mappings(values["photos"], "photos")
+        for photo in rows:
+            require_seen(photo)
+        views = [parse_view(shared | photo, taxonomy=taxonomy, radius=radius) for photo in rows]
+        if not views or (len(views) > 1 and any(view.bearings is None for view in views)):
+            raise InputError(
+                "there are no photos, or objects in them have no bearing; give at least one photo, "
+                "and a bearing for each object."
+            )
+        return views[0] if len(views) == 1 else View.joined(views).turned(0.0)
     if lists:
         if "see" in values:
             detections = _sentence_detections(str(values["see"]))
@@ -157,23 +167,6 @@ def require_seen(row: Row) -> None:
             "it needs types, bearings or both, or detections, see or photos, which may be empty "
             "where nothing was seen"
         )
-
-
-def _photos_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
-    """Return the view of several photos, one row for each."""
-    shared = {name: values[name] for name in LOOK if name in values}
-    photos = mappings(values["photos"], "photos")
-    for photo in photos:
-        require_seen(photo)
-    views = [parse_view(shared | photo, taxonomy=taxonomy, radius=radius) for photo in photos]
-    if len(views) == 1:
-        return views[0]
-    if not views or any(view.bearings is None for view in views):
-        raise InputError(
-            "there are no photos, or objects in them have no bearing; give at least one photo, "
-            "and a bearing for each object."
-        )
-    return View.joined(views).turned(0.0)
 
 
 def _columns_view(values: Row, taxonomy: Taxonomy, radius: float) -> View:
@@ -394,35 +387,30 @@ def _photo(look: Row) -> Photo:
     sigma = None if error is None else HEADING_ERRORS.get(str(error))
     if error is not None and sigma is None:
         sigma = _number("heading_error", error)
-    if fov is None:
-        return Photo(sectors=_sectors(look.get("sectors", [])), north_sigma=sigma)
-    if "sectors" in look:
-        raise InputError("a field of view was given with sectors; give one of the two.")
-    if heading is None:
-        raise InputError(
-            "a field of view was given without the heading of the camera (--look); give the "
-            "heading as well, or give sectors instead."
-        )
-    heading, fov = _number("heading", heading), _number("fov", fov)
-    return Photo.looking(heading=heading, fov=fov, north_sigma=sigma)
-
-
-def _sectors(value: object) -> tuple[tuple[float, float], ...]:
-    """Return sectors from text such as ``20-90,180-250``, or from pairs."""
-    if isinstance(value, str):
-        text = _spaced(value)
-        if _SECTORS.fullmatch(text):
-            pairs = re.findall(_SECTOR, text)
-            return tuple((float(start), float(end)) for start, end in pairs)
-    elif isinstance(value, list) and all(
+    if fov is not None:
+        if "sectors" in look:
+            raise InputError("a field of view was given with sectors; give one of the two.")
+        if heading is None:
+            raise InputError(
+                "a field of view was given without the heading of the camera (--look); give the "
+                "heading as well, or give sectors instead."
+            )
+        heading, fov = _number("heading", heading), _number("fov", fov)
+        return Photo.looking(heading=heading, fov=fov, north_sigma=sigma)
+    # Sectors are text such as 20-90,180-250, or pairs.
+    sectors = pairs = look.get("sectors", [])
+    if isinstance(sectors, str) and _SECTORS.fullmatch(text := _spaced(sectors)):
+        pairs = [list(pair) for pair in re.findall(_SECTOR, text)]
+    if not isinstance(pairs, list) or not all(
         isinstance(pair, list) and len(pair) == 2  # noqa: PLR2004
-        for pair in value
+        for pair in pairs
     ):
-        return tuple((_number("a sector", start), _number("a sector", end)) for start, end in value)
-    raise InputError(
-        f"sectors were given as {value!r}; give bearings clockwise from one to the other, such as "
-        "20-90,180-250 or [[20, 90], [180, 250]]."
-    )
+        raise InputError(
+            f"sectors were given as {sectors!r}; give bearings clockwise from one to the other, "
+            "such as 20-90,180-250 or [[20, 90], [180, 250]]."
+        )
+    numbers = tuple((_number("a sector", start), _number("a sector", end)) for start, end in pairs)
+    return Photo(sectors=numbers, north_sigma=sigma)
 
 
 def _spaced(text: str) -> str:

@@ -326,7 +326,15 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
             require_metric_crs(content["metric_crs"])
     except (CatalogError, CrsError) as error:
         raise CatalogError(f"{where}: {error}") from error
-    taxonomy = taxonomy.with_ranges(_ranges(content.get("ranges", {}), taxonomy, where))
+    ranges = _metres_by_class(
+        content.get("ranges", {}), taxonomy, f"{where}, ranges", most=MAX_RANGE_M
+    )
+    double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
+    if double is not None:
+        raise CatalogError(
+            f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
+        )
+    taxonomy = taxonomy.with_ranges(ranges)
     plain = {key: value for key, value in content.items() if CATALOG_KEYS[key] is str}
     # Values of the catalogue that its layers inherit.
     shared: dict[str, Any] = {
@@ -371,17 +379,6 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
         except CatalogError as error:
             raise CatalogError(f"{place}: {error}") from error
     return tuple(classes)
-
-
-def _ranges(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> dict[str, float]:
-    """Return the visibility ranges in metres of the table ``ranges``."""
-    ranges = _metres_by_class(item, taxonomy, f"{where}, ranges", most=MAX_RANGE_M)
-    double = next((name for name in ranges if taxonomy.by_name(name).range_m is not None), None)
-    if double is not None:
-        raise CatalogError(
-            f"{where} has a range_m of {double!r} and one in ranges; remove one of them."
-        )
-    return ranges
 
 
 def _metres_by_class(

@@ -38,21 +38,40 @@ def parse_area(text: str | gpd.GeoDataFrame) -> Area:
     """Return the area of ``"west,south,east,north"`` in degrees, of polygons, or of a file."""
     if isinstance(text, gpd.GeoDataFrame):
         return _area_of(text.geometry, "the table", name="table", kind="table")
-    if NUMBERS.fullmatch(text):
-        return _box(text)
     if names_place(text):
         raise InputError(
             f"area {text!r} is neither a bounding box nor a file; write west,south,east,north in "
             "degrees, or the path of a file with polygons."
         )
-    path = Path(text)
-    polygons = LayerSpec(name="area", class_name="", geometry="polygon")
-    layer = vector_file.read_layer(path, polygons)
-    if layer.errors:
+    if not NUMBERS.fullmatch(text):
+        path = Path(text)
+        polygons = LayerSpec(name="area", class_name="", geometry="polygon")
+        layer = vector_file.read_layer(path, polygons)
+        if layer.errors:
+            raise InputError(
+                f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
+            )
+        return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
+    try:
+        west, south, east, north = (float(number) for number in text.split(","))
+    except ValueError as error:
         raise InputError(
-            f"{path} has polygons that cannot be read ({layer.errors[0]}); correct the file."
+            f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
+        ) from error
+    # A box that crosses 180 degrees and is wider than half of the Earth is taken for an error.
+    across = east < west and east + FULL_TURN - west < HALF_TURN
+    on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
+    if not (on_earth and (west < east or across)) or not (
+        -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
+    ):
+        raise InputError(
+            f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
+            "west below east within -180 to 180, or above it across 180 degrees, and south below "
+            "north within -90 to 90."
         )
-    return _area_of(layer.table.geometry, str(path), name=path.stem, kind="file")
+    spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
+    boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
+    return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
 
 
 def names_place(text: str) -> bool:
@@ -152,29 +171,6 @@ def _narrowed(geometry: T, area: Area) -> T:
     scale = np.array([math.cos(math.radians((south + north) / 2)), 1.0])
     narrowed: T = shapely.transform(geometry, lambda xy: xy * scale)
     return narrowed
-
-
-def _box(text: str) -> Area:
-    try:
-        west, south, east, north = (float(number) for number in text.split(","))
-    except ValueError as error:
-        raise InputError(
-            f"bounding box {text!r} is not four numbers; write west,south,east,north in degrees."
-        ) from error
-    # A box that crosses 180 degrees and is wider than half of the Earth is taken for an error.
-    across = east < west and east + FULL_TURN - west < HALF_TURN
-    on_earth = max(abs(west), abs(east)) <= LONGITUDE_LIMIT
-    if not (on_earth and (west < east or across)) or not (
-        -LATITUDE_LIMIT <= south < north <= LATITUDE_LIMIT
-    ):
-        raise InputError(
-            f"bounding box {text!r} is not an area; write west,south,east,north in degrees, with "
-            "west below east within -180 to 180, or above it across 180 degrees, and south below "
-            "north within -90 to 90."
-        )
-    spans = [(west, HALF_TURN), (-HALF_TURN, east)] if across else [(west, east)]
-    boxes = [shapely.box(start, south, end, north) for start, end in spans if start < end]
-    return Area(boxes[0] if len(boxes) == 1 else shapely.MultiPolygon(boxes), text)
 
 
 def _area_of(shapes: gpd.GeoSeries, where: str, *, name: str, kind: str) -> Area:

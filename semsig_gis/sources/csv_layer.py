@@ -109,21 +109,18 @@ class CsvTable:
         texts = [(name, (row[name] or "").strip()) for name in (self.x, self.y, self.shape) if name]
         if not any(text for _, text in texts):
             return None
-        if self.shape:
-            return self._shape(texts[0][1])
-        x, y = (self._number(name, text) for name, text in texts)
-        return x, y
-
-    def _number(self, name: str, text: str) -> float:
-        try:
-            value = decimal(text, english=self.separator == ",")
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise BadFeatureError(f"{name} {text!r} is not a number")
-        return value
-
-    def _shape(self, text: str) -> Position:
+        if not self.shape:
+            numbers = []
+            for name, text in texts:
+                try:
+                    value = decimal(text, english=self.separator == ",")
+                except ValueError:
+                    value = math.nan
+                if not math.isfinite(value):
+                    raise BadFeatureError(f"{name} {text!r} is not a number")
+                numbers.append(value)
+            return numbers[0], numbers[1]
+        text = texts[0][1]
         try:
             with np.errstate(invalid="ignore"):  # NaN is checked later for all geometries at once
                 if code := HEXADECIMAL.fullmatch(text):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from semsig_gis.core import SourceError, UnknownNameError, installed_readers, nearest_name
 from semsig_gis.sources.osm import features
-from semsig_gis.sources.paths import files_in
+from semsig_gis.sources.paths import files_in, matches_pattern
 from semsig_gis.sources.probe import probe_file
 
 if TYPE_CHECKING:
@@ -111,10 +110,12 @@ def find_files(
     pairs: list[tuple[LayerSpec, Path]] = []
     missing = []
     for spec in specs:
-        direct_files = [path for path in files if _matches(path, spec.files)]
+        direct_files = [path for path in files if matches_pattern(path.name, spec.files)]
         merging = spec.reader in MERGING
         patterns = (spec.files,) if merging else tuple((pattern,) for pattern in spec.files)
-        in_folder = ([path for path in in_folders if _matches(path, any_)] for any_ in patterns)
+        in_folder = (
+            [path for path in in_folders if matches_pattern(path.name, any_)] for any_ in patterns
+        )
         candidates = direct_files or next(filter(None, in_folder), [])
         if spec.reader == TAGS_READER:
             candidates = [*candidates, *tagged]
@@ -138,19 +139,27 @@ def _group_paths(
         if not path.exists():
             raise SourceError(f"{path} does not exist; give a file or a folder of files.")
         inside = files_in(path) if path.is_dir() else [path]
-        if any(_matches(file, spec.files) for file in inside for spec in specs):
+        if any(matches_pattern(file.name, spec.files) for file in inside for spec in specs):
             (in_folders if path.is_dir() else files).extend(inside)
             continue
         with_tags = [file for file in inside if _has_tags(file, specs, skip_damaged=path.is_dir())]
         if not with_tags:
-            _refuse_unmatched(path, specs)
+            patterns: dict[tuple[str, ...], list[str]] = {}
+            for spec in specs:
+                patterns.setdefault(spec.files, []).append(spec.name)
+            layers = ", ".join(
+                f"{', '.join(names if len(names) <= MOST_NAMES else (*names[:MOST_NAMES], '...'))} "
+                f"({', '.join(names_of_files)})"
+                for names_of_files, names in patterns.items()
+            )
+            verb = "contains no file of" if path.is_dir() else "is not the file of"
+            tags = any(spec.reader == TAGS_READER for spec in specs)
+            more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
+            raise SourceError(
+                f"{path} {verb} any layer; the layers and their files are {layers}{more}."
+            )
         tagged.extend(with_tags)
     return files, in_folders, tagged
-
-
-def _matches(path: Path, patterns: Iterable[str]) -> bool:
-    name = path.name.casefold()
-    return any(fnmatchcase(name, pattern.casefold()) for pattern in patterns)
 
 
 def _has_tags(path: Path, specs: Iterable[LayerSpec], *, skip_damaged: bool) -> bool:
@@ -160,18 +169,3 @@ def _has_tags(path: Path, specs: Iterable[LayerSpec], *, skip_damaged: bool) -> 
     with contextlib.suppress(*([SourceError] if skip_damaged else [])):
         return file_reader(path) is not None
     return False
-
-
-def _refuse_unmatched(path: Path, specs: Iterable[LayerSpec]) -> NoReturn:
-    patterns: dict[tuple[str, ...], list[str]] = {}
-    for spec in specs:
-        patterns.setdefault(spec.files, []).append(spec.name)
-    layers = ", ".join(
-        f"{', '.join(names if len(names) <= MOST_NAMES else (*names[:MOST_NAMES], '...'))} "
-        f"({', '.join(files)})"
-        for files, names in patterns.items()
-    )
-    verb = "contains no file of" if path.is_dir() else "is not the file of"
-    tags = any(spec.reader == TAGS_READER for spec in specs)
-    more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
-    raise SourceError(f"{path} {verb} any layer; the layers and their files are {layers}{more}.")

@@ -51,7 +51,14 @@ class Condition:
         """Parse the values of a catalogue, such as ``">=0 or none"``; CatalogError if not valid."""
         values: list[Value] = []
         comparisons = []
-        parts = [part for value in accepted for part in _alternatives(value)]
+        parts: list[Value] = []
+        for value in accepted:
+            texts = []
+            if isinstance(value, str) and not BETWEEN_SLASHES.fullmatch(value):
+                texts = [part.strip() for part in re.split(r"\sor\s", value)]
+            # Only a text with a comparison or with "none" lists alternatives.
+            special = any(part == NO_VALUE or COMPARES.match(part) for part in texts)
+            parts += texts if special else [value]
         for part in parts:
             text = part if isinstance(part, str) else ""
             comparison = COMPARISON.fullmatch(text)
@@ -88,15 +95,6 @@ class Condition:
             for number in _numbers(value)
         )
         return all(passed) if every else any(passed)
-
-
-def _alternatives(value: Value) -> list[Value]:
-    """Return the alternatives of a text such as ``">=0 or none"``, or the value unchanged."""
-    if not isinstance(value, str) or BETWEEN_SLASHES.fullmatch(value):
-        return [value]
-    parts = [part.strip() for part in re.split(r"\sor\s", value)]
-    special = any(part == NO_VALUE or COMPARES.match(part) for part in parts)
-    return [*parts] if special else [value]
 
 
 def _numbers(value: object) -> list[float]:

@@ -217,10 +217,7 @@ def layer_of(
     where = f"{where}, layer {item.get('name', '?')!r}"
     check_keys(item, LAYER_KEYS, where, ("name",))
     role = one_of(item.get("role", "objects"), "role", get_args(Role), where)
-    class_by = _class_by(item["class_by"], taxonomy, where) if "class_by" in item else None
-    _require_classes(item, role, class_by, where)
-    if "class" in item:
-        require_class(item["class"], taxonomy, where)
+    class_by = _class_by(item, role, taxonomy, where)
     if "crs" in item:
         try:
             CRS.from_user_input(item["crs"])
@@ -268,15 +265,31 @@ def layer_of(
     return LayerSpec(**{**shared, **plain, **parsed})
 
 
-def _require_classes(
-    item: Mapping[str, Any], role: Role, class_by: ClassBy | None, where: str
-) -> None:
-    """Refuse objects without a class, and surroundings with one."""
-    has_class = "class" in item
-    if role == "objects" and not has_class and (class_by is None or class_by.otherwise):
+def _class_by(
+    layer: Mapping[str, Any], role: Role, taxonomy: Taxonomy, where: str
+) -> ClassBy | None:
+    """Check the classes of a layer; return its ``class_by`` or None."""
+    by = None
+    if "class_by" in layer:
+        item, inner = layer["class_by"], f"{where}, class_by"
+        check_keys(item, {**CLASS_BY_KEYS, "otherwise": str}, inner, CLASS_BY_KEYS)
+        if item.get("otherwise", OTHERWISE) != OTHERWISE:
+            raise CatalogError(
+                f"{inner} has otherwise = {item['otherwise']!r}; write {OTHERWISE!r}, which gives "
+                "other values the layer's class, or remove it, so that they are left out."
+            )
+        for value, name in item["values"].items():
+            if not isinstance(name, str):
+                raise CatalogError(f"{inner} has {value!r} = {name!r}; write the name of a class.")
+            require_class(name, taxonomy, inner)
+        by = ClassBy(item["field"], tuple(item["values"].items()), "otherwise" in item)
+    if role == "objects" and "class" not in layer and (by is None or by.otherwise):
         raise CatalogError(f"{where} lacks the key 'class'; add it.")
-    if role != "objects" and has_class:
+    if role != "objects" and "class" in layer:
         raise CatalogError(f"{where} needs no class; remove it.")
+    if "class" in layer:
+        require_class(layer["class"], taxonomy, where)
+    return by
 
 
 def _tags(item: object, where: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -304,21 +317,6 @@ def require_class(name: str, taxonomy: Taxonomy, where: str) -> None:
         raise CatalogError(f"{where}: {error}") from error
 
 
-def _class_by(item: dict[str, Any], taxonomy: Taxonomy, where: str) -> ClassBy:
-    where = f"{where}, class_by"
-    check_keys(item, {**CLASS_BY_KEYS, "otherwise": str}, where, CLASS_BY_KEYS)
-    if item.get("otherwise", OTHERWISE) != OTHERWISE:
-        raise CatalogError(
-            f"{where} has otherwise = {item['otherwise']!r}; write {OTHERWISE!r}, which gives "
-            "other values the layer's class, or remove it, so that they are left out."
-        )
-    for value, name in item["values"].items():
-        if not isinstance(name, str):
-            raise CatalogError(f"{where} has {value!r} = {name!r}; write the name of a class.")
-        require_class(name, taxonomy, where)
-    return ClassBy(item["field"], tuple(item["values"].items()), "otherwise" in item)
-
-
 def _width_by(item: dict[str, Any], where: str) -> WidthBy:
     where = f"{where}, width_by"
     check_keys(item, WIDTH_BY_KEYS, where, ("field", "values"))
@@ -335,21 +333,22 @@ def _width_by(item: dict[str, Any], where: str) -> WidthBy:
 
 def conditions_of(item: dict[str, Any], key: str, where: str) -> Rules:
     """Return the checked conditions of a table such as ``where`` or ``not``."""
-    return tuple((field, _values(accepted, key, field, where)) for field, accepted in item.items())
-
-
-def _values(accepted: object, key: str, field: str, where: str) -> tuple[Value, ...]:
-    values: list[Any] = accepted if isinstance(accepted, list) else [accepted]
-    if not values or not all(isinstance(value, Value) for value in values):
-        raise CatalogError(
-            f"{where} filters {field!r} by {accepted!r}; "
-            "write the accepted value, or a list of accepted values."
-        )
-    try:
-        Condition.parse(values)
-    except CatalogError as error:
-        raise CatalogError(f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}") from error
-    return tuple(values)
+    rules = []
+    for field, accepted in item.items():
+        values: list[Any] = accepted if isinstance(accepted, list) else [accepted]
+        if not values or not all(isinstance(value, Value) for value in values):
+            raise CatalogError(
+                f"{where} filters {field!r} by {accepted!r}; "
+                "write the accepted value, or a list of accepted values."
+            )
+        try:
+            Condition.parse(values)
+        except CatalogError as error:
+            raise CatalogError(
+                f"{where} has {key} = {{ {field} = {accepted!r} }}: {error}"
+            ) from error
+        rules.append((field, tuple(values)))
+    return tuple(rules)
 
 
 def _rows(item: list[Any], where: str) -> tuple[int, int]:

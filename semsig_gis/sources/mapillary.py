@@ -49,34 +49,23 @@ def read_layers(
     features: dict[str, dict[str, Any]] = {}
     for file in paths:
         features.update((str(item.get("id", "")), item) for item in load_features(file))
-    return tuple(_layer(spec, features, where, filters=filters, crs=crs) for spec in specs)
-
-
-def _layer(
-    spec: LayerSpec,
-    features: dict[str, dict[str, Any]],
-    where: str,
-    *,
-    filters: bool,
-    crs: str | None,
-) -> RawLayer:
-    where = f"layer {spec.name!r} ({where})"
-    rules = RowRules(spec, FIELDS, filters=filters, where=where)
-    rows = Rows()
-    for name, feature in features.items():
-        rows.read += 1
-        rows.add([feature.get(field) for field in rules.fields], name, _position(feature))
-    system, notes = choose_crs(WGS84, implicit=False, expected=spec.crs, requested=crs, where=where)
-    return raw_layer(rows, rules, system, by_file=True, notes=notes)
-
-
-def _position(feature: dict[str, Any]) -> Position | str:
-    """Return the position of a feature, or an error message."""
-    try:
-        longitude, latitude = feature["geometry"]["coordinates"][:2]
-        return float(longitude), float(latitude)
-    except (KeyError, TypeError, ValueError):
-        return f"map feature {feature.get('id')} has no position"
+    layers = []
+    for spec in specs:
+        rules = RowRules(spec, FIELDS, filters=filters, where=f"layer {spec.name!r} ({where})")
+        rows = Rows()
+        for name, feature in features.items():
+            rows.read += 1
+            try:
+                longitude, latitude = feature["geometry"]["coordinates"][:2]
+                position: Position | str = float(longitude), float(latitude)
+            except (KeyError, TypeError, ValueError):
+                position = f"map feature {feature.get('id')} has no position"
+            rows.add([feature.get(field) for field in rules.fields], name, position)
+        system, notes = choose_crs(
+            WGS84, implicit=False, expected=spec.crs, requested=crs, where=rules.file
+        )
+        layers.append(raw_layer(rows, rules, system, by_file=True, notes=notes))
+    return tuple(layers)
 
 
 def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:

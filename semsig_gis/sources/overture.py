@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
+import itertools
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
@@ -20,18 +19,19 @@ from pyarrow import fs
 
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.filters import ANY_VALUE, as_text
-from semsig_gis.sources.http.cache import Fetched, checksum
-from semsig_gis.sources.http.fetch import DEFAULT_HTTP, NotCachedError
+from semsig_gis.sources.http.cache import cache_key, checksum
+from semsig_gis.sources.http.fetch import DEFAULT_HTTP, cached_file
 from semsig_gis.sources.osm.elements import ElementLayer, TagIndex
 from semsig_gis.storage import groups_meeting, parse_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
     from semsig_gis.sources.area import Area
-    from semsig_gis.sources.http.cache import Cache, CacheEntry
+    from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layer import RawLayer
     from semsig_gis.sources.layer_spec import ElementKind, LayerSpec
@@ -159,8 +159,7 @@ def _slices(
                 groups = {group for box in boxes for group in groups_meeting(file, box)}
             for number in sorted(groups):
                 table = file.read_row_group(number, columns=columns).flatten()
-                mask = pc.and_(_in_boxes(table, boxes), _may_have_tags(table, specs))
-                yield table.filter(mask)
+                yield table.filter(pa.array(_may_match(table, specs, boxes)))
     except (OSError, pa.ArrowException) as error:
         raise SourceError(
             f"{path} cannot be read as GeoParquet ({_cause(error)}); download it again."
@@ -182,35 +181,34 @@ def _columns(schema: pa.Schema, specs: Iterable[LayerSpec], *, where: str) -> li
     return sorted({"id", GEOMETRY, *key_columns} | (optional & {*schema.names}))
 
 
-def _in_boxes(table: pa.Table, boxes: Boxes | None) -> pa.ChunkedArray:
-    """Return the mask of the rows that meet a box; all rows of a table without bounds."""
-    if boxes is None or not {f"{BOX}.{side}" for side in SIDES} <= {*table.column_names}:
-        return pa.array(np.ones(len(table), bool))
-    xmin, ymin, xmax, ymax = (table.column(f"{BOX}.{side}").to_numpy() for side in SIDES)
-    inside = np.zeros(len(table), bool)
-    for west, south, east, north in boxes:
-        inside |= (xmin <= east) & (xmax >= west) & (ymin <= north) & (ymax >= south)
-    return pa.array(inside)
+def _may_match(
+    table: pa.Table, specs: Iterable[LayerSpec], boxes: Boxes | None
+) -> NDArray[np.bool_]:
+    """Return the mask of the rows that meet a box and may be in a layer.
 
-
-def _may_have_tags(table: pa.Table, specs: Iterable[LayerSpec]) -> pa.Array:
-    """Return the mask of the rows that may be in a layer; tags in `source_tags` are not checked."""
-    mask = np.zeros(len(table), bool)
-    for spec in specs:
-        for tags in spec.tags:
-            # A row matches one of the alternatives in all its keys.
-            rows = np.ones(len(table), bool)
-            for key, accepted in tags:
-                column = table.column(key) if key in table.column_names else None
-                if column is not None and column.type in {pa.string(), pa.large_string()}:
-                    is_in = (
-                        pc.is_valid(column)
-                        if ANY_VALUE in accepted
-                        else pc.is_in(column, value_set=pa.array(accepted, column.type))
-                    )
-                    rows &= is_in.to_numpy()
-            mask |= rows
-    return pa.array(mask)
+    All rows of a table without bounds meet a box; tags in `source_tags` are not checked.
+    """
+    inside = np.ones(len(table), bool)
+    if boxes is not None and {f"{BOX}.{side}" for side in SIDES} <= {*table.column_names}:
+        xmin, ymin, xmax, ymax = (table.column(f"{BOX}.{side}").to_numpy() for side in SIDES)
+        inside[:] = False
+        for west, south, east, north in boxes:
+            inside |= (xmin <= east) & (xmax >= west) & (ymin <= north) & (ymax >= south)
+    tagged = np.zeros(len(table), bool)
+    for tags in itertools.chain.from_iterable(spec.tags for spec in specs):
+        # A row matches one of the alternatives in all its keys.
+        rows = np.ones(len(table), bool)
+        for key, accepted in tags:
+            column = table.column(key) if key in table.column_names else None
+            if column is not None and column.type in {pa.string(), pa.large_string()}:
+                is_in = (
+                    pc.is_valid(column)
+                    if ANY_VALUE in accepted
+                    else pc.is_in(column, value_set=pa.array(accepted, column.type))
+                )
+                rows &= is_in.to_numpy()
+        tagged |= rows
+    return inside & tagged
 
 
 def _cause(error: BaseException) -> str:
@@ -250,17 +248,19 @@ def fetch_layers(
         present = [layer for layer in layers if _may_hold(file, layer)]
         rules = [[layer.name, layer.tags, layer.fields] for layer in present]
         what = [address, file, boxes, rules]
-        key = _key(what)
+        key = cache_key(what)
+        if spec.offline:
+            return cached_file(cache, key, what=f"{file} of {address}").path
         if (cached := cache.entry(key).cached_file()) is not None:  # a release does not change
             return cached.path
-        if spec.offline:
-            raise _not_cached(file, address, cache)
         with cache.locked(key) as entry:
             tables = [table for table in _slices(system, file, present, boxes) if len(table)]
             body = entry.temporary_path(".parquet")
             # A file without columns records that there is nothing in the area.
             pq.write_table(pa.concat_tables(tables) if tables else pa.table({}), body)
-            return _store(entry, body, f"{address.partition('?')[0]} {file}", what)
+            url = f"{address.partition('?')[0]} {file}"
+            content = {"read": what}
+            return entry.store(body, sha256=checksum(body), url=url, request=content).path
 
     with ThreadPoolExecutor(THREADS) as pool:
         paths = []
@@ -311,21 +311,19 @@ def _listing(
 ) -> tuple[str, list[str]]:
     """Return the latest release in a folder and its files of `kinds`; offline, from the cache."""
     what = [address, *kinds]
-    key = _key(what)
+    key = cache_key(what)
     if spec.offline:
-        cached = cache.entry(key).cached_file()
-        if cached is None:
-            raise _not_cached(folder, address, cache)
+        cached = cached_file(cache, key, what=f"{folder} of {address}")
         content = parse_json(cached.path.read_bytes())
         return content["release"], content["files"]
     try:
         release = _latest(system, folder)
-        files = [
-            info.path
-            for kind in kinds
-            for info in system.get_file_info(_selector(release, kind))
-            if info.path.endswith(".parquet")
-        ]
+        files = []
+        for kind in kinds:
+            theme, _, name = kind.partition("/")
+            path = f"{release}/theme={theme}/type={name}"  # a local release may lack it
+            infos = system.get_file_info(fs.FileSelector(path, allow_not_found=True))
+            files += [info.path for info in infos if info.path.endswith(".parquet")]
     except OSError as error:
         raise SourceError(
             f"{address} cannot be listed ({_cause(error)}); check the address, or load files of "
@@ -338,7 +336,7 @@ def _listing(
     with cache.locked(key) as entry:
         body = entry.temporary_path(".json")
         body.write_text(json.dumps({"release": Path(release).name, "files": files}), "utf-8")
-        _store(entry, body, address, what)
+        entry.store(body, sha256=checksum(body), url=address, request={"read": what})
     return Path(release).name, files
 
 
@@ -348,36 +346,3 @@ def _latest(system: fs.FileSystem, folder: str) -> str:
     if not names:
         raise FileNotFoundError("it contains nothing")
     return folder if any(PARTITION.search(Path(name).name) for name in names) else names[-1]
-
-
-def _selector(release: str, kind: str) -> fs.FileSelector:
-    """Return the selector of the files of a kind, which a local release may lack."""
-    theme, _, name = kind.partition("/")
-    return fs.FileSelector(f"{release}/theme={theme}/type={name}", allow_not_found=True)
-
-
-def _key(what: Sequence[object]) -> str:
-    return hashlib.sha256(json.dumps(what).encode()).hexdigest()[:32]
-
-
-def _store(entry: CacheEntry, body: Path, address: str, what: Sequence[object]) -> Path:
-    """Store a file at `temporary_path` in its entry of the cache; return its new path."""
-    fetched = Fetched(
-        path=body,
-        sha256=checksum(body),
-        fetched_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        url=address,
-        from_cache=False,
-        bytes=body.stat().st_size,
-        content_type="",
-        etag="",
-        last_modified="",
-    )
-    return entry.store(fetched, {"read": what}).path
-
-
-def _not_cached(what: str, address: str, cache: Cache) -> NotCachedError:
-    return NotCachedError(
-        f"{what} of {address} is not in the cache {cache.folder}; run once without --offline to "
-        "fetch it."
-    )

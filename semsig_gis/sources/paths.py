@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from semsig_gis.core import SourceError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
 # Other files (.dbf, .prj, a README) only accompany data.
@@ -22,6 +24,11 @@ def require_file(path: Path, kind: str) -> None:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist"
         raise SourceError(f"{path} {what}; give {kind}.")
+
+
+def matches_pattern(name: str, patterns: Iterable[str]) -> bool:
+    """Whether a file name matches one of some patterns; case is ignored."""
+    return any(fnmatchcase(name.casefold(), pattern.casefold()) for pattern in patterns)
 
 
 def files_in(folder: Path) -> list[Path]:

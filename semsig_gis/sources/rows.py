@@ -200,11 +200,9 @@ def raw_layer(
     table = table.drop(index=broken.index)
     table[GEOMETRY] = pd.Series(built_geometries(table[GEOMETRY]), table.index, dtype=object)
     # Rows with coordinates that are not usable are errors, too.
-    off_globe = functools.partial(_off_globe, crs=crs, by_file=by_file, file=rules.file)
-    for check in (_not_finite, off_globe):
-        if bad := check(table):
-            errors |= bad
-            table = table.drop(index=list(bad))
+    if bad := _coordinate_errors(table, crs, by_file=by_file, file=rules.file):
+        errors |= bad
+        table = table.drop(index=list(bad))
     repeated = 0
     if spec.unique_id:
         tolerance = APART_DEGREES if crs.is_geographic else APART_METRES
@@ -216,8 +214,10 @@ def raw_layer(
     notes += tuple(_deviations(rows.read, table, spec))
     if rows.closed:
         notes += (f"{rows.closed} of {rows.read} rows have rings that are not closed; closed here",)
-    if spec.tags and errors:
-        notes += (_causes(errors.values()),)
+    if spec.tags and errors:  # elements of OpenStreetMap; count the causes
+        causes = Counter(SHARE.sub("some of its", e.partition(" ")[2]) for e in errors.values())
+        listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
+        notes += (f"unreadable: {listed}",)
     table = table.drop(columns=GEOMETRY).reset_index(drop=True)
     return RawLayer(
         spec=spec,
@@ -245,20 +245,21 @@ def built_geometries(positions: Iterable[Position]) -> NDArray[np.object_]:
     return geometry
 
 
-def _not_finite(table: pd.DataFrame) -> dict[int, str]:
-    xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
-    wrong = ~np.isfinite(xy).all(axis=1)
-    return _coordinate_errors(table.index[owner[wrong]], xy[wrong], "are not finite")
+def _coordinate_errors(
+    table: pd.DataFrame, crs: CRS, *, by_file: bool, file: str
+) -> dict[int, str]:
+    """Return the errors of rows with coordinates that are not finite, or out of range in degrees.
 
-
-def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> dict[int, str]:
-    """Return the errors of rows out of the range of degrees; CrsError if these are most rows."""
+    CrsError if most of the finite coordinates are out of range.
+    """
     xy, owner = shapely.get_coordinates(table[GEOMETRY].to_numpy(), return_index=True)
-    wrong = off_the_globe(xy, crs)
-    if 2 * wrong.sum() > len(xy):
+    not_finite = ~np.isfinite(xy).all(axis=1)
+    usable = ~np.isin(owner, owner[not_finite])
+    wrong = off_the_globe(xy, crs) & usable
+    if 2 * wrong.sum() > usable.sum():
         x, y = xy[wrong][0]
         remedy = "correct the file" if by_file else "state the crs they are in, such as 'EPSG:2154'"
-        if fits_the_globe(xy[:, ::-1]):
+        if fits_the_globe(xy[usable][:, ::-1]):
             remedy = (
                 "with x and y exchanged they would be, so exchange x_field and y_field in the "
                 "catalogue, or the axes in the file"
@@ -267,15 +268,10 @@ def _off_globe(table: pd.DataFrame, *, crs: CRS, by_file: bool, file: str) -> di
             f"{file} has coordinates such as ({x:.12g}, {y:.12g}), which are not the degrees that "
             f"{crs_label(crs)} means; {remedy}."
         )
-    return _coordinate_errors(table.index[owner[wrong]], xy[wrong], f"are not in {crs_label(crs)}")
-
-
-def _coordinate_errors(
-    numbers: Iterable[int], xy: NDArray[np.float64], what: str
-) -> dict[int, str]:
     errors: dict[int, str] = {}
-    for number, (x, y) in zip(numbers, xy, strict=True):
-        errors.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
+    for rows, what in ((not_finite, "are not finite"), (wrong, f"are not in {crs_label(crs)}")):
+        for number, (x, y) in zip(table.index[owner[rows]], xy[rows], strict=True):
+            errors.setdefault(number, f"its coordinates ({x:.12g}, {y:.12g}) {what}")
     return errors
 
 
@@ -313,13 +309,6 @@ def _deviations(read: int, table: pd.DataFrame, spec: LayerSpec) -> Iterable[str
     unknown = table[HALF_WIDTH].isna().sum() if spec.has_width else 0
     if unknown:
         yield f"{unknown} of {len(table)} streets have no known width"
-
-
-def _causes(errors: Iterable[str]) -> str:
-    """Return a note on the numbers of unreadable OpenStreetMap elements by cause."""
-    causes = Counter(SHARE.sub("some of its", text.partition(" ")[2]) for text in errors)
-    listed = ", ".join(f"{cause} ({number:,})" for cause, number in causes.most_common())
-    return f"unreadable: {listed}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, slots=True)

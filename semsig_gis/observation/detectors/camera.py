@@ -229,7 +229,16 @@ class Camera:
         its distance, are fitted to the box, so that tilted cameras and panoramas are exact.
         """
         boxes = np.asarray(boxes, dtype=np.float64).reshape(-1, 4)
-        guess = self._guess(boxes)
+        # Estimate bearing, half width, foot and head, by distance, from the middles of sides.
+        left, top, right, bottom = boxes.T
+        column, row = (left + right) / 2.0, (top + bottom) / 2.0
+        sides = [(column, row), (left, row), (right, row), (column, bottom), (column, top)]
+        rays = self.directions(np.stack([np.stack(side, axis=-1) for side in sides]))
+        bearings = np.arctan2(rays[..., 0], rays[..., 2])
+        rises = -rays[..., 1] / np.maximum(np.hypot(rays[..., 0], rays[..., 2]), MIN_DEPTH)
+        span = np.radians(np.abs(signed_degrees(np.degrees(bearings[2] - bearings[1]))))
+        half = np.tan(np.clip(span / 2.0, 0.0, 1.0))
+        guess = np.stack([bearings[0], half, *np.sort(rises[3:], axis=0)], axis=-1)
         objects = self._fit(guess, boxes)
         misfit = np.abs(self._outline(objects, boxes) - boxes).max(axis=1)
         size = (boxes[:, 2:] - boxes[:, :2]).max(axis=1)
@@ -243,20 +252,6 @@ class Camera:
             rises=np.where(has_height, head - foot, np.nan),
             pixels=np.where(has_height, pixels, np.nan),
         )
-
-    def _guess(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Estimate bearing, half width, foot and head, by distance, from the middles of sides."""
-        left, top, right, bottom = boxes.T
-        column, row = (left + right) / 2.0, (top + bottom) / 2.0
-        sides = [(column, row), (left, row), (right, row), (column, bottom), (column, top)]
-        rays = self.directions(np.stack([np.stack(side, axis=-1) for side in sides]))
-        bearings = np.arctan2(rays[..., 0], rays[..., 2])
-        flat = np.maximum(np.hypot(rays[..., 0], rays[..., 2]), MIN_DEPTH)
-        rises = -rays[..., 1] / flat
-        span = np.radians(np.abs(signed_degrees(np.degrees(bearings[2] - bearings[1]))))
-        half = np.tan(np.clip(span / 2.0, 0.0, 1.0))
-        ends = np.sort(rises[3:], axis=0)
-        return np.stack([bearings[0], half, ends[0], ends[1]], axis=-1)
 
     def _fit(self, guess: NDArray[np.float64], boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Fit objects to boxes by Gauss-Newton iterations from a guess."""

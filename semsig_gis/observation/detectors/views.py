@@ -197,7 +197,15 @@ class ViewBuilder:
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
         shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
-        if file := _file_of(picture.name, self.folders):
+        path = PurePosixPath(picture.name)
+        endings = ("", *PICTURE_SUFFIXES) if path.suffix == "" else ("",)
+        files = (
+            folder / f"{stem}{ending}"
+            for folder in self.folders
+            for stem in (path, path.name)
+            for ending in endings
+        )
+        if file := next((file for file in files if file.is_file()), None):
             shot = shot.filled(read_exif(file))
         return shot.filled(Shot(size=self.shot.size))
 
@@ -237,6 +245,13 @@ class ViewBuilder:
             heights=np.array([self._height(meaning) for _, meaning in boxes]).reshape(-1, 2),
             whole=np.array([box.whole for box, _ in boxes], dtype=bool),
         )
+        # The probability of each class; the rest is any class.
+        scores = np.zeros((len(boxes), CLASSES))
+        for row, (box, meaning) in zip(scores, boxes, strict=True):
+            for name, share in meaning.classes:
+                row[self._code(name)] += round(share * box.score, SCORE_DIGITS)
+            row[WILDCARD] = 0.0
+            row[WILDCARD] = max(round(1.0 - row.sum(), SCORE_DIGITS), 0.0)
         tally.photos += 1
         tally.objects += len(boxes)
         tally.ranges += int(np.isfinite(ranges).sum())
@@ -247,7 +262,7 @@ class ViewBuilder:
             bearings=bearings,
             ranges=ranges,
             range_errors=errors,
-            scores=np.array([self._scores(*pair) for pair in boxes]).reshape(-1, CLASSES),
+            scores=scores,
         )
 
     def _view(self, picture: AnnotatedPicture, tally: Tally) -> View:
@@ -302,15 +317,6 @@ class ViewBuilder:
             return self.taxonomy.by_name(name).code
         except UnknownNameError:
             return WILDCARD
-
-    def _scores(self, box: Box, meaning: Meaning) -> NDArray[np.float64]:
-        """Return the probability of each class code, shape (256,); the rest is any class."""
-        scores = np.zeros(CLASSES)
-        for name, share in meaning.classes:
-            scores[self._code(name)] += round(share * box.score, SCORE_DIGITS)
-        scores[WILDCARD] = 0.0
-        scores[WILDCARD] = max(round(1.0 - scores.sum(), SCORE_DIGITS), 0.0)
-        return scores
 
     def _height(self, meaning: Meaning) -> tuple[float, float]:
         """Return the height of the objects of a label and its standard deviation, or NaN."""
@@ -425,19 +431,6 @@ def _names(picture: AnnotatedPicture) -> tuple[str, str, str]:
     """Return the names of a picture: as given, without folders, and without the extension."""
     path = PurePosixPath(picture.name)
     return picture.name, path.name, path.stem
-
-
-def _file_of(name: str, folders: Iterable[Path]) -> Path | None:
-    """Return the file of a picture in some folders; None if no folder has it."""
-    path = PurePosixPath(name)
-    endings = ("", *PICTURE_SUFFIXES) if path.suffix == "" else ("",)
-    files = (
-        folder / f"{stem}{ending}"
-        for folder in folders
-        for stem in (path, path.name)
-        for ending in endings
-    )
-    return next((file for file in files if file.is_file()), None)
 
 
 def _metres(first: tuple[float, float], second: tuple[float, float]) -> float:

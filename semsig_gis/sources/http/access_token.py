@@ -45,7 +45,12 @@ class AccessToken:
 
     def redact(self, text: str) -> str:
         """Return a text without the token, however its letters are escaped."""
-        return re.sub("".join(map(_spellings, self.value)), REDACTED, text)
+        # Each letter may be as it is, in an address (%7c) or in JSON (\u007c).
+        pattern = "".join(
+            rf"(?:\\?{re.escape(letter)}|(?:%|\\u00)(?i:{ord(letter):02x}))"
+            for letter in self.value
+        )
+        return re.sub(pattern, REDACTED, text)
 
     def redact_blocks(self, blocks: Iterable[bytes]) -> Iterator[bytes]:
         """Yield a body without the token, which may start in one block and end in another."""
@@ -58,9 +63,3 @@ class AccessToken:
             rest = text[ready:]
             yield text[:ready].encode("latin-1")
         yield rest.encode("latin-1")
-
-
-def _spellings(letter: str) -> str:
-    r"""Return a pattern for a letter as it is, in an address (``%7c``) or in JSON (``\u007c``)."""
-    code = f"(?i:{ord(letter):02x})"
-    return rf"(?:\\?{re.escape(letter)}|%{code}|\\u00{code})"

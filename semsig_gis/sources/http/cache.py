@@ -15,6 +15,7 @@ import hashlib
 import json
 import time
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ from semsig_gis.core import InputError
 from semsig_gis.storage import parse_json, whole_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
 SUPERSEDED_S = 86_400.0  # a superseded body is deleted this long after its last use
 
@@ -158,23 +159,42 @@ class CacheEntry:
             path.touch()  # so that `store` does not delete a body in use
         return cached
 
-    def store(self, fetched: Fetched, request: Mapping[str, object]) -> Fetched:
+    def store(
+        self,
+        body: Path,
+        *,
+        sha256: str,
+        url: str,
+        request: Mapping[str, object],
+        version: FileVersion | None = None,
+    ) -> Fetched:
         """Move a body from `temporary_path` into the entry, delete the part and return the file.
 
         `request` is stored for people who look into the cache.
         """
-        final = self.folder / f"{self.key}-{fetched.sha256[:16]}{fetched.path.suffix}"
-        fetched.path.replace(final)
+        version = version or FileVersion()
+        fetched = Fetched(
+            path=self.folder / f"{self.key}-{sha256[:16]}{body.suffix}",
+            sha256=sha256,
+            fetched_at=datetime.now(UTC).isoformat(timespec="seconds"),
+            url=url,
+            from_cache=False,
+            bytes=body.stat().st_size,
+            content_type=version.content_type,
+            etag=version.etag,
+            last_modified=version.last_modified,
+        )
+        body.replace(fetched.path)
         meta = {name: getattr(fetched, name) for name in SIDECAR_FIELDS}
         with whole_file(self.sidecar) as partial:
-            content = {"request": request, "url": fetched.url, "file": final.name, **meta}
+            content = {"request": request, "url": url, "file": fetched.path.name, **meta}
             partial.write_text(json.dumps(content, indent=1), encoding="utf-8")
         self.drop_part()
         # Another process may still read the previous body, so only old ones are deleted.
         for old in self.folder.glob(f"{self.key}-*"):
-            if old != final and old.stat().st_mtime < time.time() - SUPERSEDED_S:
+            if old != fetched.path and old.stat().st_mtime < time.time() - SUPERSEDED_S:
                 old.unlink(missing_ok=True)
-        return dataclasses.replace(fetched, path=final)
+        return fetched
 
     def resumable(self) -> tuple[int, FileVersion]:
         """Return the number of bytes in the part and their version; 0 if it cannot be resumed."""
@@ -194,6 +214,11 @@ class CacheEntry:
         """Delete the bytes received until now."""
         self.part.unlink(missing_ok=True)
         self._part_info.unlink(missing_ok=True)
+
+
+def cache_key(what: Sequence[object]) -> str:
+    """Return the key of the entry for a request, given as values for JSON."""
+    return hashlib.sha256(json.dumps(what).encode()).hexdigest()[:32]
 
 
 def checksum(path: Path) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import http.client
 import io
 import time
+import types
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -68,33 +68,20 @@ class _Stream(io.RawIOBase):
             if self._deadline.seconds_left <= 0:
                 raise DeadlineError from error
             raise
-        self._check_speed(size or 0)
-        return size
-
-    def _check_speed(self, size: int) -> None:
         now = time.monotonic()
         if not self._interval_bytes:  # the time before the first byte does not count
             self._interval_start = now
-        self._interval_bytes += size
+        self._interval_bytes += size or 0
         elapsed = now - self._interval_start
         if size and elapsed >= self._deadline.read_timeout:
             if self._interval_bytes < self._deadline.min_bytes_per_s * elapsed:
                 raise SlowError
             self._interval_start, self._interval_bytes = now, 0
+        return size
 
     def close(self) -> None:
         self._raw.close()
         super().close()
-
-
-class _Socket:
-    """The part of a socket's interface that an HTTP response uses."""
-
-    def __init__(self, sock: socket.socket, deadline: Deadline) -> None:
-        self._stream = functools.partial(_Stream, sock, deadline)
-
-    def makefile(self, _: str) -> io.BufferedReader:
-        return io.BufferedReader(self._stream())
 
 
 class DeadlineAdapter(HTTPAdapter):
@@ -109,7 +96,11 @@ class DeadlineAdapter(HTTPAdapter):
         pool: HTTPConnectionPool = super().get_connection_with_tls_context(*args, **kwargs)
 
         def response(sock: socket.socket, *args: Any, **kwargs: Any) -> http.client.HTTPResponse:  # noqa: ANN401
-            return http.client.HTTPResponse(_Socket(sock, self._deadline), *args, **kwargs)  # type: ignore[arg-type]
+            # The only method of a socket that a response uses.
+            stream = types.SimpleNamespace(
+                makefile=lambda _: io.BufferedReader(_Stream(sock, self._deadline))
+            )
+            return http.client.HTTPResponse(stream, *args, **kwargs)  # type: ignore[arg-type]
 
         # urllib3 has no option for it, so the pool gets a subclass of its connection class.
         connection = {"response_class": staticmethod(response)}

@@ -11,7 +11,6 @@ import dataclasses
 import email.utils
 import hashlib
 import itertools
-import json
 import math
 import time
 import zlib
@@ -27,7 +26,7 @@ import urllib3.exceptions
 from semsig_gis import __version__
 from semsig_gis.core import InputError, SourceError
 from semsig_gis.sources.compression import decompression_bomb_error, ratio_too_high
-from semsig_gis.sources.http.cache import Fetched, FileVersion
+from semsig_gis.sources.http.cache import FileVersion, cache_key
 from semsig_gis.sources.http.deadline import (
     Deadline,
     DeadlineAdapter,
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from semsig_gis.sources.http.access_token import AccessToken
-    from semsig_gis.sources.http.cache import Cache, CacheEntry
+    from semsig_gis.sources.http.cache import Cache, CacheEntry, Fetched
 
 USER_AGENT = f"semsig_gis/{__version__} (reads open data once, into a cache)"
 MAX_REDIRECTS = 5
@@ -216,17 +215,15 @@ def check_status(response: requests.Response) -> None:
         return
     what = f"answered {status} {response.reason or ''}".rstrip()
     if status in RETRY_STATUSES:
-        raise TransientError(what, status, _retry_after(response))
-    detail = _detail(response)
-    raise HttpError(
-        f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it.",
-        status,
-    )
-
-
-def _detail(response: requests.Response) -> str:
-    """Return the error message of a service in parentheses, or ""."""
-    body = bytearray()
+        retry_after = response.headers.get("Retry-After", "").strip()
+        wait = float(retry_after) if retry_after.isdecimal() else None
+        if wait is None:
+            with contextlib.suppress(ValueError):  # a date, or no time at all
+                date = email.utils.parsedate_to_datetime(retry_after).astimezone(UTC)
+                wait = max(0.0, (date - datetime.now(UTC)).total_seconds())
+        raise TransientError(what, status, wait)
+    # The error message of the service, if the body contains one.
+    body, text = bytearray(), ""
     with contextlib.suppress(TransientError):
         _read_start(response, body)
     with contextlib.suppress(zlib.error):
@@ -234,8 +231,11 @@ def _detail(response: requests.Response) -> str:
         text = error_text(
             zlib.decompressobj(wbits=31).decompress(body, BLOCK_BYTES) if packed else body
         )
-        return f" ({text})" if text else ""
-    return ""
+    detail = f" ({text})" if text else ""
+    raise HttpError(
+        f"{host_of(response.url)} {what} to {response.url.partition('?')[0]}{detail}; correct it.",
+        status,
+    )
 
 
 def _read_start(response: requests.Response, body: bytearray) -> None:
@@ -254,23 +254,9 @@ def raw_blocks(response: requests.Response) -> Iterator[bytes]:
     except SlowError as error:
         raise TransientError(TOO_SLOW, slow=True) from error
     except urllib3.exceptions.ReadTimeoutError as error:
-        what = "stopped sending"
-        raise TransientError(what, slow=True) from error
+        raise TransientError("stopped sending", slow=True) from error
     except (urllib3.exceptions.HTTPError, OSError) as error:
-        what = "cut the connection"
-        raise TransientError(what) from error
-
-
-def _retry_after(response: requests.Response) -> float | None:
-    """Return the seconds to wait from a Retry-After header, which may be a date."""
-    text = response.headers.get("Retry-After", "").strip()
-    if text.isdecimal():
-        return float(text)
-    try:
-        date = email.utils.parsedate_to_datetime(text)
-    except ValueError:
-        return None
-    return max(0.0, (date.astimezone(UTC) - datetime.now(UTC)).total_seconds())
+        raise TransientError("cut the connection") from error
 
 
 def check_url(url: str) -> None:
@@ -331,17 +317,9 @@ def fetch(
     """
     check_url(url)
     request = Request(url, _pairs(params), _pairs(data))
-    what = json.dumps([request.method, identity or url, request.params, request.data])
-    key = hashlib.sha256(what.encode()).hexdigest()[:32]
+    key = cache_key([request.method, identity or url, request.params, request.data])
     if spec.offline:
-        entry = cache.entry(key)
-        cached = entry.cached_file()
-        if cached is None:
-            state = "is damaged in" if entry.sidecar.exists() else "is not in"
-            raise NotCachedError(
-                f"{url} {state} the cache {cache.folder}; run once without --offline to fetch it."
-            )
-        return cached
+        return cached_file(cache, key, what=url)
     with cache.locked(key) as entry:
         cached = entry.cached_file()
         if cached is not None and not cached.condition:
@@ -350,7 +328,7 @@ def fetch(
                 return cached
         download = _Download(request, entry, cached, spec, accept, suffix, check, progress)
         try:
-            return _fetch_with_retries(download, before)
+            return download.run(before)
         except HttpError as error:
             if spec.token is None:
                 raise
@@ -363,6 +341,18 @@ def fetch(
                 f"cache folder {cache.folder} cannot be written ({error.strerror or error}); "
                 "make room or choose another folder."
             ) from error
+
+
+def cached_file(cache: Cache, key: str, *, what: str) -> Fetched:
+    """Return a file from the cache without the network; NotCachedError if it is not there."""
+    entry = cache.entry(key)
+    cached = entry.cached_file()
+    if cached is None:
+        state = "is damaged in" if entry.sidecar.exists() else "is not in"
+        raise NotCachedError(
+            f"{what} {state} the cache {cache.folder}; run once without --offline to fetch it."
+        )
+    return cached
 
 
 def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
@@ -388,6 +378,8 @@ def read_text(url: str, *, spec: HttpSpec = DEFAULT_HTTP) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Download:
+    """A request that is repeated until its file is in the cache."""
+
     request: Request
     entry: CacheEntry
     cached: Fetched | None
@@ -399,41 +391,144 @@ class _Download:
 
     @property
     def host(self) -> str:
+        """The host of the request, for messages."""
         return host_of(self.request.url)
 
+    def run(self, before: Callable[[], None] | None) -> Fetched:
+        """Try until the file is complete, the attempts are used up or the time is over."""
+        spec = self.spec
+        deadline = spec.deadline()
+        with open_session(deadline) as session:
+            for attempt in itertools.count(1):
+                if before is not None:
+                    before()
+                try:
+                    return self.attempt(session)
+                except TransientError as error:
+                    failure = error
+                except DeadlineError as error:
+                    raise _deadline_error(self.request.url, spec, self.entry) from error
+                if failure.wait is not None and failure.wait > spec.longest_wait_s:
+                    remedy = f" and asks to wait {failure.wait:.0f} s; try again after that"
+                    break
+                most = min(spec.attempts, spec.slow_attempts) if failure.slow else spec.attempts
+                if attempt >= most:
+                    remedy = f", {attempt} times; try again later"
+                    break
+                pause = (
+                    spec.backoff_s * 2 ** (attempt - 1) if failure.wait is None else failure.wait
+                )
+                if pause >= deadline.seconds_left:
+                    remedy = f", and {spec.deadline_s:g} s are over; try again later"
+                    break
+                spec.report(
+                    f"{self.host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s"
+                )
+                spec.sleep(pause)
+        if self.cached is not None:
+            remedy += f", or work offline with the copy of {self.cached.fetched_at} in the cache"
+        raise HttpError(f"{self.host} {failure}{remedy}.", failure.status) from failure
 
-def _fetch_with_retries(download: _Download, before: Callable[[], None] | None) -> Fetched:
-    """Try until the file is complete, the attempts are used up or the time is over."""
-    spec = download.spec
-    deadline = spec.deadline()
-    with open_session(deadline) as session:
-        for attempt in itertools.count(1):
-            if before is not None:
-                before()
-            try:
-                return _try_download(session, download)
-            except TransientError as error:
-                failure = error
-            except DeadlineError as error:
-                raise _deadline_error(download.request.url, spec, download.entry) from error
-            if failure.wait is not None and failure.wait > spec.longest_wait_s:
-                remedy = f" and asks to wait {failure.wait:.0f} s; try again after that"
-                break
-            most = min(spec.attempts, spec.slow_attempts) if failure.slow else spec.attempts
-            if attempt >= most:
-                remedy = f", {attempt} times; try again later"
-                break
-            pause = spec.backoff_s * 2 ** (attempt - 1) if failure.wait is None else failure.wait
-            if pause >= deadline.seconds_left:
-                remedy = f", and {spec.deadline_s:g} s are over; try again later"
-                break
-            spec.report(
-                f"{download.host} {failure}; attempt {attempt + 1} of {most} in {pause:.0f} s"
+    def attempt(self, session: requests.Session) -> Fetched:
+        """Request the file once, or the rest of it; return it from the cache."""
+        request, entry, spec = self.request, self.entry, self.spec
+        offset, part_version, headers = self.range_and_headers()
+        with open_response(session, request, headers, spec) as response:
+            if response.status_code == NOT_MODIFIED and self.cached is not None:
+                entry.drop_part()
+                return self.cached
+            # Whether the response continues the part, in the same version.
+            partial = response.headers.get("Content-Range", "").startswith(f"bytes {offset}-")
+            partial = partial and response.status_code == PARTIAL
+            tag = response.headers.get("ETag", part_version.etag)
+            if not (offset and partial and tag == part_version.etag):
+                offset = 0
+                if response.status_code in {PARTIAL, RANGE_NOT_SATISFIABLE}:
+                    entry.drop_part()
+                    raise TransientError(
+                        "sent another part of the file than the one asked for", wait=0.0
+                    )
+            check_status(response)
+            version = part_version if offset else FileVersion.from_headers(response.headers)
+            if self.accept and version.content_type and version.content_type not in self.accept:
+                raise SourceError(
+                    f"{self.host} sent {version.content_type} where "
+                    f"{' or '.join(self.accept)} was expected; check the address {request.url}."
+                )
+            if not offset:
+                entry.start_part(version)
+            self.receive(response, offset)
+            url = response.url if spec.token is None else spec.token.redact(response.url)
+        body = entry.temporary_path(self.suffix)
+        try:
+            sha256 = self.unpack(body, version.encoding)
+            if self.check is not None:
+                self.check(body)
+            what = dataclasses.asdict(request)
+            return entry.store(body, sha256=sha256, url=url, request=what, version=version)
+        finally:
+            body.unlink(missing_ok=True)
+            entry.drop_part()  # the part was complete, so resuming it cannot correct an error
+
+    def range_and_headers(self) -> tuple[int, FileVersion, dict[str, str]]:
+        """Return the size and version of the part to resume, and the headers to send."""
+        token, is_get = self.spec.token, self.request.method == "GET"
+        # The token is removed from a body, so a part has another length than on the server.
+        resumable = is_get and token is None
+        offset, version = self.entry.resumable() if resumable else (0, FileVersion())
+        headers = self.cached.condition if self.cached and is_get else {}
+        if self.accept:
+            headers |= {"Accept": ", ".join((*self.accept, ANYTHING))}
+        if token is not None:
+            headers |= token.headers
+        if offset:
+            headers |= {"Range": f"bytes={offset}-", "If-Range": version.if_range}
+        return offset, version, headers
+
+    def receive(self, response: requests.Response, offset: int) -> None:
+        """Append the body of a response to the part, within the size limit."""
+        length = response.headers.get("Content-Length", "")
+        size = offset
+        total = offset + int(length) if length.isdecimal() else 0
+        self.check_size(total)
+        blocks = raw_blocks(response)
+        if self.spec.token is not None:
+            if FileVersion.from_headers(response.headers).encoding:
+                raise HttpError(
+                    f"{self.host} sent a compressed answer although none was requested."
+                )
+            blocks = self.spec.token.redact_blocks(blocks)
+        with self.entry.part.open("ab") as stream:
+            for block in blocks:
+                size += len(block)
+                self.check_size(size)
+                stream.write(block)
+                if self.progress is not None:
+                    self.progress(size, total)
+
+    def unpack(self, body: Path, encoding: str) -> str:
+        """Decompress the part into a body; return its checksum."""
+        digest = hashlib.sha256()
+        size = 0
+        with self.entry.part.open("rb") as packed, body.open("wb") as stream:
+            for block in _unpacked(packed.read, encoding, self.host):
+                size += len(block)
+                self.check_size(size)
+                if ratio_too_high(packed.tell(), size):
+                    raise decompression_bomb_error(
+                        f"what {self.host} sends", "report it to the publisher"
+                    )
+                digest.update(block)
+                stream.write(block)
+        return digest.hexdigest()
+
+    def check_size(self, size: int) -> None:
+        """Raise TooLargeError for more bytes than accepted."""
+        if size > self.spec.max_bytes:
+            raise TooLargeError(
+                f"{self.host} sends more than the {self.spec.max_bytes:,} bytes that are "
+                "accepted; ask for a smaller area or for fewer layers."
             )
-            spec.sleep(pause)
-    if download.cached is not None:
-        remedy += f", or work offline with the copy of {download.cached.fetched_at} in the cache"
-    raise HttpError(f"{download.host} {failure}{remedy}.", failure.status) from failure
 
 
 def _deadline_error(url: str, spec: HttpSpec, entry: CacheEntry | None = None) -> HttpError:
@@ -444,113 +539,6 @@ def _deadline_error(url: str, spec: HttpSpec, entry: CacheEntry | None = None) -
         f"{host_of(url)} was not done after {spec.deadline_s:g} s; {remedy}, or allow more time "
         "with --timeout."
     )
-
-
-def _try_download(session: requests.Session, download: _Download) -> Fetched:
-    request, entry, spec = download.request, download.entry, download.spec
-    offset, part_version, headers = _range_and_headers(download)
-    with open_response(session, request, headers, spec) as response:
-        if response.status_code == NOT_MODIFIED and download.cached is not None:
-            entry.drop_part()
-            return download.cached
-        if not (offset and _continues(response, offset, part_version)):
-            offset = 0
-            if response.status_code in {PARTIAL, RANGE_NOT_SATISFIABLE}:
-                entry.drop_part()
-                what = "sent another part of the file than the one asked for"
-                raise TransientError(what, wait=0.0)
-        check_status(response)
-        version = part_version if offset else FileVersion.from_headers(response.headers)
-        if download.accept and version.content_type and version.content_type not in download.accept:
-            raise SourceError(
-                f"{host_of(request.url)} sent {version.content_type} where "
-                f"{' or '.join(download.accept)} was expected; check the address {request.url}."
-            )
-        if not offset:
-            entry.start_part(version)
-        _receive(response, download, offset)
-        url = response.url if spec.token is None else spec.token.redact(response.url)
-    body = entry.temporary_path(download.suffix)
-    try:
-        sha256, size = _unpack(entry.part, body, version.encoding, download)
-        if download.check is not None:
-            download.check(body)
-        fetched = Fetched(
-            path=body,
-            sha256=sha256,
-            fetched_at=datetime.now(UTC).isoformat(timespec="seconds"),
-            url=url,
-            from_cache=False,
-            bytes=size,
-            content_type=version.content_type,
-            etag=version.etag,
-            last_modified=version.last_modified,
-        )
-        return entry.store(fetched, dataclasses.asdict(request))
-    finally:
-        body.unlink(missing_ok=True)
-        entry.drop_part()  # the part was complete, so resuming it cannot correct an error
-
-
-def _range_and_headers(download: _Download) -> tuple[int, FileVersion, dict[str, str]]:
-    """Return the size and version of the part to resume, and the headers to send."""
-    token, is_get = download.spec.token, download.request.method == "GET"
-    # The token is removed from a body, so a part has another length than on the server.
-    resumable = is_get and token is None
-    offset, version = download.entry.resumable() if resumable else (0, FileVersion())
-    headers = download.cached.condition if download.cached and is_get else {}
-    if download.accept:
-        headers |= {"Accept": ", ".join((*download.accept, ANYTHING))}
-    if token is not None:
-        headers |= token.headers
-    if offset:
-        headers |= {"Range": f"bytes={offset}-", "If-Range": version.if_range}
-    return offset, version, headers
-
-
-def _continues(response: requests.Response, offset: int, version: FileVersion) -> bool:
-    """Whether a response continues the part, in the same version."""
-    starts = response.headers.get("Content-Range", "").startswith(f"bytes {offset}-")
-    tag = response.headers.get("ETag", version.etag)
-    return response.status_code == PARTIAL and starts and tag == version.etag
-
-
-def _receive(response: requests.Response, download: _Download, offset: int) -> None:
-    """Append the body of a response to the part, within the size limit."""
-    length = response.headers.get("Content-Length", "")
-    size = offset
-    total = offset + int(length) if length.isdecimal() else 0
-    _check_size(total, download)
-    blocks = raw_blocks(response)
-    if download.spec.token is not None:
-        if FileVersion.from_headers(response.headers).encoding:
-            raise HttpError(
-                f"{download.host} sent a compressed answer although none was requested."
-            )
-        blocks = download.spec.token.redact_blocks(blocks)
-    with download.entry.part.open("ab") as stream:
-        for block in blocks:
-            size += len(block)
-            _check_size(size, download)
-            stream.write(block)
-            if download.progress is not None:
-                download.progress(size, total)
-
-
-def _unpack(part: Path, body: Path, encoding: str, download: _Download) -> tuple[str, int]:
-    """Decompress a part into a body; return its checksum and size."""
-    digest = hashlib.sha256()
-    size = 0
-    with part.open("rb") as packed, body.open("wb") as stream:
-        for block in _unpacked(packed.read, encoding, download.host):
-            size += len(block)
-            _check_size(size, download)
-            if ratio_too_high(packed.tell(), size):
-                what = f"what {download.host} sends"
-                raise decompression_bomb_error(what, "report it to the publisher")
-            digest.update(block)
-            stream.write(block)
-    return digest.hexdigest(), size
 
 
 def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterator[bytes]:
@@ -570,19 +558,9 @@ def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterato
                 unzip = zlib.decompressobj(wbits=31)
             yield unzip.decompress(packed, BLOCK_BYTES)
     except zlib.error as error:
-        what = "sent a damaged gzip body"
-        raise TransientError(what) from error
+        raise TransientError("sent a damaged gzip body") from error
     if not unzip.eof:
-        what = "sent a gzip body without its end"
-        raise TransientError(what)
-
-
-def _check_size(size: int, download: _Download) -> None:
-    if size > download.spec.max_bytes:
-        raise TooLargeError(
-            f"{download.host} sends more than the {download.spec.max_bytes:,} bytes that are "
-            "accepted; ask for a smaller area or for fewer layers."
-        )
+        raise TransientError("sent a gzip body without its end")
 
 
 def _pairs(items: Mapping[str, str | float] | None) -> tuple[tuple[str, str], ...]:

@@ -7,7 +7,6 @@ with all tags, or a class of Geofabrik.
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 import re
 from dataclasses import dataclass, replace
@@ -74,6 +73,61 @@ class FeatureTable:
     positions: Sequence[Position | str]
     notes: tuple[str, ...] = ()
 
+    def tags(self, keys: frozenset[str]) -> tuple[list[dict[str, str]], int]:
+        """Return the tags of every row with their `keys`, and the number of unreadable rows."""
+        size = len(next(iter(self.columns.values()), ()))
+        tags: list[dict[str, str]] = [{} for _ in range(size)]
+        unreadable = 0
+        # Columns with all tags, then a column for each tag, then Geofabrik's classes.
+        for name in MAPS:
+            for row, value in _valid_rows(self.columns.get(name)):
+                try:
+                    tags[row].update((key, text) for key, text in _parse_tags(value) if key in keys)
+                except (TypeError, ValueError):
+                    unreadable += 1
+        for key in keys.intersection(self.columns):
+            if key == TYPE and _has_kinds(self.columns[key]):
+                continue
+            for row, value in _valid_rows(self.columns[key]):
+                tags[row][key] = _tag_value(value)
+        if CLASS in self.columns and CODE in self.columns:
+            codes = dict(_valid_rows(self.columns[CODE]))
+            for row, value in _valid_rows(self.columns[CLASS]):
+                tags[row].update(_geofabrik_tags(str(value), as_text(codes.get(row, ""))))
+        return tags, unreadable
+
+    def names(self, size: int) -> list[ElementName]:
+        """Return kind and number of the element of every row; (None, "") for rows without id."""
+        names: list[ElementName] = [(None, "")] * size
+        # Numbers without a kind (GDAL, osm2pgsql).
+        among_areas = WAY_NUMBER in self.columns
+        for row, value in _valid_rows(self.columns.get(NUMBER)):
+            number = as_text(value)
+            if number.lstrip("-").isdigit():  # relations of osm2pgsql have numbers below zero
+                relation = among_areas or number.startswith("-")
+                names[row] = ("relation" if relation else None, number.lstrip("-"))
+        for row, value in _valid_rows(self.columns.get(WAY_NUMBER)):
+            if as_text(value).isdigit():
+                names[row] = ("way", as_text(value))
+        for row, name in self.whole_names():  # more exact
+            names[row] = name
+        return names
+
+    def whole_names(self) -> Iterator[tuple[int, ElementName]]:
+        """Yield kinds and numbers from two columns, then from columns such as ``node/123``."""
+        columns = self.columns
+        for kind_column, number_column in KINDS_AND_NUMBERS:
+            if {kind_column, number_column} <= columns.keys() and _has_kinds(columns[kind_column]):
+                kinds = dict(_valid_rows(columns[kind_column]))
+                for row, value in _valid_rows(columns[number_column]):
+                    if row in kinds and as_text(value).isdigit():
+                        yield row, (KIND_BY_LETTER[str(kinds[row])[0].lower()], as_text(value))
+        for column in NAMES:
+            for row, value in _valid_rows(columns.get(column)):
+                match = NAME.fullmatch(value) if isinstance(value, str) else None
+                if match:
+                    yield row, (KIND_BY_LETTER[match[1][0]], match[2])
+
 
 def read_layers(
     path: str | Path | Sequence[Path],
@@ -108,8 +162,8 @@ def _table_layers(
     known_names: set[tuple[int, str]] = set()
     notes: list[str] = []
     for table in tables:
-        tags_by_row, unreadable = _tags(table.columns, keys)
-        names = _names(table.columns, len(tags_by_row))
+        tags_by_row, unreadable = table.tags(keys)
+        names = table.names(len(tags_by_row))
         maps = set() if QUACKOSM in table.columns else {*MAPS}
         has_area_tag = not {AREA, *maps}.isdisjoint(table.columns)
         notes += table.notes
@@ -121,9 +175,8 @@ def _table_layers(
                 continue
             position = table.positions[row]
             kind, element_number = names[row]
-            kind = kind or _likely_kind(position)
+            kind, element_tags = _as_element(kind, tags, position, has_area_tag=has_area_tag)
             name = f"{kind}/{element_number}" if element_number else ""
-            element_tags = _with_area_tags(tags, kind, position, has_area_tag=has_area_tag)
             for number in numbers:
                 if name and (number, name) in known_names:
                     continue
@@ -201,7 +254,11 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         }
         positions = rows.positions
         if not table.crs.equals(WGS84, ignore_axis_order=True):
-            positions = _to_wgs84(positions, table.crs)
+            shapes = [None if isinstance(position, str) else position for position in positions]
+            degrees = gpd.GeoSeries(built_geometries(shapes), crs=table.crs).to_crs(WGS84)
+            # Error messages stay in their places.
+            pairs = zip(positions, degrees, strict=True)
+            positions = [old if isinstance(old, str) else new for old, new in pairs]
         notes = table.notes
         if rows.errors:
             number, text = next(iter(rows.errors.items()))
@@ -209,46 +266,10 @@ def _tables(path: Path, specs: Sequence[LayerSpec], *, crs: str | None) -> Itera
         yield FeatureTable(columns, positions, notes)
 
 
-def _to_wgs84(positions: Sequence[Position | str], crs: object) -> list[Position | str]:
-    """Return positions in WGS 84; error messages in their places stay."""
-    shapes = [None if isinstance(position, str) else position for position in positions]
-    degrees = gpd.GeoSeries(built_geometries(shapes), crs=crs).to_crs(WGS84)
-    return [
-        position if isinstance(position, str) else shape
-        for position, shape in zip(positions, degrees, strict=True)
-    ]
-
-
 def _keys(specs: Sequence[LayerSpec]) -> frozenset[str]:
     """Return the keys of the tags that the layers use."""
     tags = {key for spec in specs for alternative in spec.tags for key, _ in alternative}
     return frozenset({*tags, *(field for spec in specs for _, field in spec.fields), TYPE, AREA})
-
-
-def _tags(
-    columns: Mapping[str, pd.Series[Any]], keys: frozenset[str]
-) -> tuple[list[dict[str, str]], int]:
-    """Return the tags of every row with their `keys`, and the number of unreadable rows."""
-    size = len(next(iter(columns.values()), ()))
-    tags: list[dict[str, str]] = [{} for _ in range(size)]
-    unreadable = 0
-    # Columns with all tags, then a column for each tag, then Geofabrik's classes.
-    for name in MAPS:
-        for row, value in _valid_rows(columns.get(name)):
-            try:
-                tags[row].update((key, text) for key, text in _parse_tags(value) if key in keys)
-            except (TypeError, ValueError):
-                unreadable += 1
-    for key in keys.intersection(columns):
-        if key == TYPE and _has_kinds(columns[key]):
-            continue
-        for row, value in _valid_rows(columns[key]):
-            tags[row][key] = _tag_value(value)
-    if CLASS in columns and CODE in columns:
-        codes = dict(_valid_rows(columns[CODE]))
-        for row, value in _valid_rows(columns[CLASS]):
-            tags[row].update(_geofabrik_tags(str(value), as_text(codes.get(row, ""))))
-    return tags, unreadable
 
 
 def _valid_rows(values: pd.Series[Any] | None) -> Iterator[tuple[int, Any]]:
@@ -308,67 +329,31 @@ def _has_kinds(values: pd.Series[Any]) -> bool:
     return set(values.dropna().astype(str).str.lower()) <= set(KIND_BY_LETTER.values())
 
 
-def _names(columns: Mapping[str, pd.Series[Any]], size: int) -> list[ElementName]:
-    """Return kind and number of the element of every row; (None, "") if the table has no ids."""
-    names: list[ElementName] = [(None, "")] * size
-    sources = (_number_columns(columns), _pair_columns(columns), _name_columns(columns))
-    for row, name in itertools.chain.from_iterable(sources):  # later sources are more exact
-        names[row] = name
-    return names
+def _as_element(
+    kind: ElementKind | None,
+    tags: dict[str, str],
+    position: Position | str,
+    *,
+    has_area_tag: bool,
+) -> tuple[ElementKind, dict[str, str]]:
+    """Return the kind of an element, if unknown the likely one, and the tags.
 
-
-def _number_columns(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, ElementName]]:
-    """Yield element ids from tables with an id column but no type column (GDAL, osm2pgsql)."""
-    among_areas = WAY_NUMBER in columns
-    for row, value in _valid_rows(columns.get(NUMBER)):
-        number = as_text(value)
-        if number.lstrip("-").isdigit():  # relations of osm2pgsql have numbers below zero
-            relation = among_areas or number.startswith("-")
-            yield row, ("relation" if relation else None, number.lstrip("-"))
-    for row, value in _valid_rows(columns.get(WAY_NUMBER)):
-        if as_text(value).isdigit():
-            yield row, ("way", as_text(value))
-
-
-def _pair_columns(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, ElementName]]:
-    """Yield element ids from a column of kinds and a column of numbers."""
-    for kind_column, number_column in KINDS_AND_NUMBERS:
-        if {kind_column, number_column} <= columns.keys() and _has_kinds(columns[kind_column]):
-            kinds = dict(_valid_rows(columns[kind_column]))
-            for row, value in _valid_rows(columns[number_column]):
-                if row in kinds and as_text(value).isdigit():
-                    yield row, (KIND_BY_LETTER[str(kinds[row])[0].lower()], as_text(value))
-
-
-def _name_columns(columns: Mapping[str, pd.Series[Any]]) -> Iterator[tuple[int, ElementName]]:
-    """Yield element ids from a column such as ``node/123``."""
-    for column in NAMES:
-        for row, value in _valid_rows(columns.get(column)):
-            match = NAME.fullmatch(value) if isinstance(value, str) else None
-            if match:
-                yield row, (KIND_BY_LETTER[match[1][0]], match[2])
-
-
-def _likely_kind(position: Position | str) -> ElementKind:
-    """Return the most likely kind of element for a geometry."""
-    if isinstance(position, tuple | str) or position is None:
-        return "node"
-    if shapely.get_dimensions(position) <= 0:
-        return "node"
-    parts = shapely.get_parts(position)
-    simple = len(parts) == 1 and shapely.get_num_interior_rings(parts[0]) == 0
-    return "way" if simple else "relation"
-
-
-def _with_area_tags(
-    tags: dict[str, str], kind: ElementKind, position: Position | str, *, has_area_tag: bool
-) -> dict[str, str]:
-    """Add the tags of an area to an element with an area, if its table lacks such tags."""
-    if isinstance(position, tuple | str) or shapely.get_dimensions(position) != 2:  # noqa: PLR2004
-        return tags
-    if kind == "relation":
-        return {TYPE: MULTIPOLYGON, **tags}
-    return tags if has_area_tag else {AREA: "yes", **tags}
+    The tags of an area are added to an element with an area if its table lacks such tags.
+    """
+    if isinstance(position, tuple | str):
+        return kind or "node", tags
+    dimensions = shapely.get_dimensions(position)  # -1 without a position
+    if kind is None and dimensions <= 0:
+        kind = "node"
+    elif kind is None:
+        parts = shapely.get_parts(position)
+        simple = len(parts) == 1 and shapely.get_num_interior_rings(parts[0]) == 0
+        kind = "way" if simple else "relation"
+    if dimensions == 2 and kind == "relation":  # noqa: PLR2004
+        return kind, {TYPE: MULTIPOLYGON, **tags}
+    if dimensions == 2 and not has_area_tag:  # noqa: PLR2004
+        return kind, {AREA: "yes", **tags}
+    return kind, tags
 
 
 def _element_shape(position: Position | str, spec: LayerSpec) -> Position | str:

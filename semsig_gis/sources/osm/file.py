@@ -8,7 +8,7 @@ import math
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 import osmium
@@ -32,7 +32,7 @@ from semsig_gis.sources.paths import require_file
 from semsig_gis.sources.rows import BadFeatureError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
     from osmium.osm import Location
@@ -55,6 +55,38 @@ class _Outline(NamedTuple):
     outer: tuple[int, ...]  # ids of the outer ways; for a way, its own id
     inner: tuple[int, ...]
     is_way: bool
+
+    @classmethod
+    def of(cls, layer: ElementLayer, name: str, element: Way | Relation) -> Self:
+        """Return the outline of an element, the last row of its layer."""
+        row = len(layer.rows.positions) - 1
+        if isinstance(element, Way):
+            return cls(layer, row, name, (element.id,), (), is_way=True)
+        ways = [member for member in element.members if member.type == "w"]
+        outer = tuple(member.ref for member in ways if member.role != "inner")
+        inner = tuple(member.ref for member in ways if member.role == "inner")
+        return cls(layer, row, name, outer, inner, is_way=False)
+
+    def position(self, lines: Mapping[int, NDArray[np.float64]]) -> Position | str:
+        """Return the geometry of a way or multipolygon, or an error message."""
+        # The file may lack ways or nodes at its edge.
+        ways = (*self.outer, *self.inner)
+        absent = sum(way not in lines for way in ways)
+        if absent:
+            what = f"{absent} of its {len(ways)} ways"
+            return f"{self.name} lacks {what}, as where a file is clipped"
+        nodes = sum(len(lines[way]) for way in ways)
+        missing = sum(int(np.isnan(lines[way][:, 0]).sum()) for way in ways)
+        if missing:
+            what = f"{missing} of its {nodes} nodes"
+            return f"{self.name} lacks {what}, as where a file is clipped"
+        try:
+            outer, inner = ([lines[way] for way in ways] for ways in (self.outer, self.inner))
+            if self.is_way:
+                return way_shape(outer[0], self.layer.spec.role)
+            return relation_shape(outer, inner)
+        except BadFeatureError as error:
+            return f"{self.name} {error}"
 
 
 def read_layers(
@@ -85,13 +117,19 @@ def read_layers(
                 "an element identify it; remove it."
             )
     index = TagIndex(specs)
-    with _single_file(files, index) as file, read_errors(where):
+    with contextlib.ExitStack() as stack:
+        if len(files) == 1:
+            (file,) = files.values()
+        else:
+            folder = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
+            file = merge_extracts(files, index, folder / "merged.opl")
+        stack.enter_context(read_errors(where))
         # First the elements with tags, then the lines of the ways that they need.
         outlines = _scan(file, layers, index)
         ways = {way for outline in outlines for way in (*outline.outer, *outline.inner)}
         lines = _lines(file, ways) if ways else {}
     for outline in outlines:
-        outline.layer.rows.positions[outline.row] = _position(outline, lines)
+        outline.layer.rows.positions[outline.row] = outline.position(lines)
     notes = age_notes(files) if len(files) > 1 else ()
     extent = _extent(files.values())
     raw = (layer.raw(crs) for layer in layers)
@@ -113,16 +151,6 @@ def _extent(files: Iterable[osmium.io.File]) -> Area | None:
         boxes += [shapely.box(west, low.lat, east, high.lat) for west, east in spans]
     polygon = join_areas(np.array(boxes, dtype=object))
     return None if polygon is None else Area(polygon, "extract")
-
-
-@contextlib.contextmanager
-def _single_file(files: Mapping[Path, osmium.io.File], index: TagIndex) -> Iterator[osmium.io.File]:
-    """Provide the only file, or a temporary file with several extracts merged."""
-    if len(files) == 1:
-        yield from files.values()
-        return
-    with temporary_folder(Path(tempfile.gettempdir())) as folder:
-        yield merge_extracts(files, index, folder / "merged.opl")
 
 
 def _file(path: Path) -> osmium.io.File:
@@ -155,18 +183,8 @@ def _scan(file: osmium.io.File, layers: Sequence[ElementLayer], index: TagIndex)
                 position = _lonlat(element.location) if valid else "has no valid position"
                 layer.add(kind, name, tags, position)
             elif layer.add(kind, name, tags, None):
-                row = len(layer.rows.positions) - 1
-                outlines.append(_Outline(layer, row, name, *_ways(element)))
+                outlines.append(_Outline.of(layer, name, element))
     return outlines
-
-
-def _ways(element: Way | Relation) -> tuple[tuple[int, ...], tuple[int, ...], bool]:
-    """Return the outer and inner ways of an element, and whether it is a way itself."""
-    if isinstance(element, Way):
-        return (element.id,), (), True
-    ways = [member for member in element.members if member.type == "w"]
-    outer = tuple(member.ref for member in ways if member.role != "inner")
-    return outer, tuple(member.ref for member in ways if member.role == "inner"), False
 
 
 def _lines(file: osmium.io.File, numbers: set[int]) -> dict[int, NDArray[np.float64]]:
@@ -209,28 +227,3 @@ def _lonlat(location: Location) -> tuple[float, float]:
 
 def _line(points: Iterable[tuple[float, float]]) -> NDArray[np.float64]:
     return np.array(list(points), np.float64).reshape(-1, 2)
-
-
-def _position(outline: _Outline, lines: Mapping[int, NDArray[np.float64]]) -> Position | str:
-    """Return the geometry of a way or multipolygon, or an error message."""
-    try:
-        _check_complete((*outline.outer, *outline.inner), lines)
-        outer, inner = ([lines[way] for way in ways] for ways in (outline.outer, outline.inner))
-        if outline.is_way:
-            return way_shape(outer[0], outline.layer.spec.role)
-        return relation_shape(outer, inner)
-    except BadFeatureError as error:
-        return f"{outline.name} {error}"
-
-
-def _check_complete(ways: Sequence[int], lines: Mapping[int, NDArray[np.float64]]) -> None:
-    """Raise BadFeatureError if the file lacks ways or nodes, as at the edge of an extract."""
-    absent = [way for way in ways if way not in lines]
-    if absent:
-        raise BadFeatureError(
-            f"lacks {len(absent)} of its {len(ways)} ways, as where a file is clipped"
-        )
-    nodes = sum(len(lines[way]) for way in ways)
-    missing = sum(int(np.isnan(lines[way][:, 0]).sum()) for way in ways)
-    if missing:
-        raise BadFeatureError(f"lacks {missing} of its {nodes} nodes, as where a file is clipped")

@@ -37,7 +37,7 @@ from semsig_gis.sources.rows import BadFeatureError
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -232,7 +232,11 @@ def find_place(name: str, *, endpoint: str, cache: Cache, spec: HttpSpec = DEFAU
     )
     places = _places(file.path, host)
     for place in places:
-        outline = _outline(place)
+        try:
+            geometry = shapely.from_geojson(json.dumps(place.get("geojson")))
+        except shapely.errors.ShapelyError:
+            continue  # it has no outline, or an invalid one
+        outline = join_areas(np.array([geometry]))
         if outline is not None:
             return Area(outline, str(place.get("display_name", name)))
     problem = f"has no outline ({places[0].get('display_name')})" if places else "is unknown"
@@ -252,15 +256,6 @@ def _places(path: Path, host: str) -> list[dict[str, Any]]:
     return places
 
 
-def _outline(place: dict[str, Any]) -> shapely.Polygon | shapely.MultiPolygon | None:
-    """Return the outline of a place; None if it has none or an invalid one."""
-    try:
-        geometry = shapely.from_geojson(json.dumps(place.get("geojson")))
-    except shapely.errors.ShapelyError:
-        return None
-    return join_areas(np.array([geometry]))
-
-
 def overpass_query(
     specs: Sequence[LayerSpec], bounds: tuple[float, float, float, float], *, timeout: int = QUERY_S
 ) -> str:
@@ -271,19 +266,17 @@ def overpass_query(
     """
     west, south, east, north = bounds
     # A dict removes the repeats of several layers and keeps the order.
-    lines = dict.fromkeys(line for spec in specs for line in _statements(spec))
+    lines: dict[str, None] = {}
+    for spec in specs:
+        for alternative in require_tags(spec):
+            filters = "".join(_filter(key, values) for key, values in alternative)
+            for kind in spec.elements:
+                # The reader accepts only multipolygons among the relations.
+                areas = '["type"="multipolygon"]' if kind == "relation" else ""
+                lines[f"{kind}{filters}{areas};"] = None
     box = f"{south:.7f},{west:.7f},{north:.7f},{east:.7f}"
     head = f"[out:json][timeout:{timeout}][bbox:{box}];"
     return "\n".join([head, "(", *lines, ");", "out body geom;"])
-
-
-def _statements(spec: LayerSpec) -> Iterator[str]:
-    for alternative in require_tags(spec):
-        filters = "".join(_filter(key, values) for key, values in alternative)
-        for kind in spec.elements:
-            # The reader accepts only multipolygons among the relations.
-            areas = '["type"="multipolygon"]' if kind == "relation" else ""
-            yield f"{kind}{filters}{areas};"
 
 
 def _filter(key: str, values: tuple[str, ...]) -> str:
@@ -396,6 +389,23 @@ class _Servers:
             if document.failed and not document.exhausted:
                 raise HttpError(f"{host_of(address)} failed ({document.remark}); try again later.")
 
+        def wait_for_slot() -> None:
+            spec = self._spec
+            short = dataclasses.replace(spec, timeout=(STATUS_S, STATUS_S), deadline_s=STATUS_S)
+            try:
+                status = read_text(f"{address}/status", spec=short)
+            except SourceError:
+                return  # without a status page, the answer to the query shows that a server is busy
+            wait = waiting_time(status)
+            if wait > spec.longest_wait_s:
+                raise HttpError(
+                    f"{host_of(address)} has no free slot for {wait:.0f} s; try again after that.",
+                    TOO_MANY,
+                )
+            if wait:
+                spec.report(f"{host_of(address)} has no free slot for {wait:.0f} s")
+                spec.sleep(wait + NO_SLOT_MARGIN_S)
+
         return fetch(
             f"{address}/interpreter",
             data={"data": query},
@@ -405,25 +415,8 @@ class _Servers:
             suffix=".json",
             identity="overpass",
             check=check,
-            before=lambda: self._wait_for_slot(address),
+            before=wait_for_slot,
         ).path
-
-    def _wait_for_slot(self, address: str) -> None:
-        spec = self._spec
-        short = dataclasses.replace(spec, timeout=(STATUS_S, STATUS_S), deadline_s=STATUS_S)
-        try:
-            status = read_text(f"{address}/status", spec=short)
-        except SourceError:
-            return  # without a status page, the answer to the query shows that a server is busy
-        wait = waiting_time(status)
-        if wait > spec.longest_wait_s:
-            raise HttpError(
-                f"{host_of(address)} has no free slot for {wait:.0f} s; try again after that.",
-                TOO_MANY,
-            )
-        if wait:
-            spec.report(f"{host_of(address)} has no free slot for {wait:.0f} s")
-            spec.sleep(wait + NO_SLOT_MARGIN_S)
 
 
 def waiting_time(status: str) -> float:

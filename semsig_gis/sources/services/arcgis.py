@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import re
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from urllib.parse import quote
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
 from semsig_gis.sources.services.layers import Download
-from semsig_gis.sources.services.pages import ServiceQuery, geojson_page, json_object
+from semsig_gis.sources.services.pages import ServiceQuery, geojson_page
 
 if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
@@ -106,7 +105,7 @@ def _fetch_pages(
     """Fetch all rows of a query, ordered by `id_field`, and check their number."""
     total = client.json(query.with_params(returnCountOnly="true", f="json")).get("count")
     most = info.get("maxRecordCount") or PAGE_ROWS
-    read = functools.partial(_page, client=client)
+    read = functools.partial(geojson_page, client=client)
     if not (info.get("advancedQueryCapabilities") or {}).get("supportsPagination", False):
         if total is None or total > most:
             raise SourceError(
@@ -127,11 +126,3 @@ def _fetch_pages(
         return query.with_params(resultOffset=start) if page.more or rest else None
 
     return client.pages(query.with_params(resultOffset=0), read, then, total=total)
-
-
-def _page(content: bytes, client: Client) -> Page:
-    """Parse a page; each format has its own place for the flag that there are more rows."""
-    reply = json_object(content, client.endpoint)
-    flags = {**(reply.get("properties") or {}), **reply}
-    page = geojson_page(content, client)
-    return dataclasses.replace(page, more=bool(flags.get("exceededTransferLimit")))

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import functools
 import re
-from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urljoin, urlsplit
 
 from semsig_gis.core import CatalogError, SourceError
 from semsig_gis.sources.http.fetch import HttpError, host_of
+from semsig_gis.sources.paths import matches_pattern
 from semsig_gis.sources.services.layers import Download, PositionReader
-from semsig_gis.sources.services.pages import HTML, NOT_FOUND, Page, ServiceQuery, json_object
+from semsig_gis.sources.services.pages import (
+    HTML,
+    NOT_FOUND,
+    Page,
+    ServiceQuery,
+    json_object,
+    next_offset,
+)
 from semsig_gis.sources.services.table import ServiceTable
 
 if TYPE_CHECKING:
@@ -65,11 +71,17 @@ def fetch_layer(client: Client, area: Area | None) -> Download:  # noqa: ARG001 
             "here."
         )
     address = urljoin(f"{client.endpoint}/", str(resource.get("url") or ""))
+
+    def refuse_web_page(path: Path) -> None:
+        with path.open("rb") as stream:
+            if HTML.match(stream.read(200).lstrip()):
+                raise SourceError(
+                    f"{host_of(address)} sent a web page where the file {address} was expected; "
+                    "download it by hand, or report it to the publisher."
+                )
+
     file = client.file(
-        ServiceQuery(address),
-        lambda path: _refuse_web_page(path, address),
-        suffix=suffix,
-        progress=client.progress,
+        ServiceQuery(address), refuse_web_page, suffix=suffix, progress=client.progress
     )
     return Download(spec=spec, files=(file,))
 
@@ -119,7 +131,13 @@ def _resource(client: Client, resources: list[Resource]) -> tuple[Resource, str]
             f"dataset {client.dataset!r} of layer {client.layer.name!r} has no resource that can "
             f"be read, only {', '.join(names) or 'none at all'}; choose another dataset."
         )
-    matches = [pair for pair in usable if _matches(pair[0], client.layer.files)]
+    patterns = client.layer.files
+    matches = [
+        pair
+        for pair in usable
+        if matches_pattern(_file_name(pair[0]), patterns)
+        or matches_pattern(str(pair[0].get("name") or ""), patterns)
+    ]
     order = [*dict.fromkeys(FORMATS.values()), ""]
     candidates = matches or usable
     best = min((suffix for _, suffix in candidates), key=order.index)
@@ -145,11 +163,6 @@ def _shown(resource: Resource) -> str:
     return _file_name(resource) or str(resource.get("name") or resource.get("id"))
 
 
-def _matches(resource: Resource, patterns: tuple[str, ...]) -> bool:
-    names = [_file_name(resource).casefold(), str(resource.get("name") or "").casefold()]
-    return any(fnmatchcase(name, pattern.casefold()) for name in names for pattern in patterns)
-
-
 def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:
     """Fetch the rows of a resource from the datastore, in its order."""
     query = _action(client, "datastore_search", resource_id=resource)
@@ -166,14 +179,14 @@ def _rows(client: Client, spec: LayerSpec, resource: str) -> Download:
         query = query.with_params(filters=client.layer.server_where)
     query = query.with_params(limit=PAGE_ROWS, sort="_id")
 
-    def then(page: Page, rows: int) -> ServiceQuery | None:
-        rest = page.rows and (page.total is None or rows < page.total)
-        return query.with_params(offset=rows) if rest else None
+    def read(content: bytes) -> Page:
+        result = _result(content, client)
+        total = result.get("total")
+        exact = isinstance(total, int) and not result.get("total_was_estimated")
+        return Page(result["records"], total=total if exact else None)
 
-    read = functools.partial(_page, client=client)
-    return Download(
-        spec=spec, files=client.pages(query.with_params(offset=0), read, then), fields=names
-    )
+    files = client.pages(query.with_params(offset=0), read, next_offset(query, "offset"))
+    return Download(spec=spec, files=files, fields=names)
 
 
 def _result(content: bytes, client: Client) -> dict[str, Any]:
@@ -184,19 +197,3 @@ def _result(content: bytes, client: Client) -> dict[str, Any]:
             f"{client.endpoint}."
         )
     return result
-
-
-def _page(content: bytes, client: Client) -> Page:
-    result = _result(content, client)
-    total = result.get("total")
-    exact = isinstance(total, int) and not result.get("total_was_estimated")
-    return Page(result["records"], total=total if exact else None)
-
-
-def _refuse_web_page(path: Path, address: str) -> None:
-    with path.open("rb") as stream:
-        if HTML.match(stream.read(200).lstrip()):
-            raise SourceError(
-                f"{host_of(address)} sent a web page where the file {address} was expected; "
-                "download it by hand, or report it to the publisher."
-            )

@@ -15,7 +15,7 @@ from semsig_gis.core import CrsError
 from semsig_gis.sources.rows import WGS84, BadFeatureError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -33,6 +33,12 @@ COLLECTIONS = frozenset(
      "MultiLineString", "MultiPoint", "MultiPolygon", "MultiSurface", "Ring", "Surface"}
 )  # fmt: skip
 GEOMETRIES = POINTS | LINES | AREAS | COLLECTIONS
+# Types of geometries that consist of parts of one type.
+MULTIPLE: dict[str, Callable[..., shapely.Geometry]] = {
+    "Point": shapely.MultiPoint,
+    "LineString": shapely.MultiLineString,
+    "Polygon": shapely.MultiPolygon,
+}
 
 
 def local_name(element: ET.Element) -> str:
@@ -125,21 +131,13 @@ def _geometry(element: ET.Element, *, swap: bool) -> shapely.Geometry:
     # The children of `element` are properties such as pointMember; their children are the parts.
     parts = [_geometry(part, swap=swap) for member in element for part in member]
     if name in {"Curve", "CompositeCurve", "Ring"}:
-        return shapely.LineString(np.vstack([shapely.get_coordinates(part) for part in parts]))
+        return shapely.LineString(shapely.get_coordinates(parts))
     if len(parts) == 1:
         return parts[0]
-    return shapely.union_all(parts) if name == "CompositeSurface" else _collection(parts)
-
-
-def _collection(parts: list[shapely.Geometry]) -> shapely.Geometry:
-    """Return parts as one geometry, of a Multi type if they have the same type."""
     flat = shapely.get_parts(parts)
-    kind = {part.geom_type for part in flat}
-    if kind == {"Point"}:
-        return shapely.MultiPoint(flat)
-    if kind == {"LineString"}:
-        return shapely.MultiLineString(flat)
-    return shapely.MultiPolygon(flat) if kind == {"Polygon"} else shapely.GeometryCollection(flat)
+    # The name of the only type; the names of several types are no key.
+    build = MULTIPLE.get("".join({part.geom_type for part in flat}), shapely.GeometryCollection)
+    return shapely.union_all(parts) if name == "CompositeSurface" else build(flat)
 
 
 def _positions(element: ET.Element, *, swap: bool) -> NDArray[np.float64]:

@@ -122,9 +122,18 @@ class PositionReader:
             point = _point(values.get(self._point))
             if point is not None:
                 return point
-        if self._x is not None and self._y is not None:
-            return _coordinates(values, self._x, self._y)
-        return None
+        if self._x is None or self._y is None:
+            return None
+        both = (values.get(self._x), values.get(self._y))
+        if all(value is None or value == "" for value in both):
+            return None
+        try:
+            x, y = (decimal(v) if isinstance(v, str) else float(v) for v in both)  # type: ignore[arg-type]
+        except (TypeError, ValueError) as error:
+            raise BadFeatureError(
+                f"its {self._x} {both[0]!r} and {self._y} {both[1]!r} are not two numbers"
+            ) from error
+        return x, y
 
 
 def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
@@ -203,18 +212,6 @@ def _point(value: Any) -> Position:  # noqa: ANN401 - whatever is in the file
         ) from error
 
 
-def _coordinates(values: Mapping[str, Any], x: str, y: str) -> tuple[float, float] | None:
-    both = (values.get(x), values.get(y))
-    if all(value is None or value == "" for value in both):
-        return None
-    try:
-        return tuple(decimal(v) if isinstance(v, str) else float(v) for v in both)  # type: ignore[arg-type, return-value]
-    except (TypeError, ValueError) as error:
-        raise BadFeatureError(
-            f"its {x} {both[0]!r} and {y} {both[1]!r} are not two numbers"
-        ) from error
-
-
 def _shown(value: object) -> str:
     text = value if isinstance(value, str) else repr(value)
     return repr(text if len(text) <= 60 else f"{text[:60]}...")  # noqa: PLR2004 - fits a line
@@ -253,21 +250,21 @@ class Download:
         if self.fields:
             table = dataclasses.replace(table, fields=self.fields, empty=False)
         (layer,) = _read_table(table, [self.spec], first, filters=filters, crs=None)
-        return layer if self.area is None else _with_axes_corrected(layer, self.area)
-
-
-def _with_axes_corrected(layer: RawLayer, area: Area) -> RawLayer:
-    """Swap x and y if no row is in the requested area before, and some rows are after it."""
-    shapes = layer.table.geometry.to_numpy()
-    box = shapely.box(*area.bounds)
-    if layer.table.crs != WGS84 or shapely.intersects(shapes, box).any():
-        return layer
-    new_shapes = shapely.transform(shapes, lambda xy: xy[:, ::-1])
-    if not shapely.intersects(new_shapes, box).any():
-        return layer
-    note = "the service sends latitude as x and longitude as y; exchanged here"
-    table = layer.table.set_geometry(gpd.GeoSeries(new_shapes, layer.table.index, crs=WGS84))
-    return dataclasses.replace(layer, table=table, notes=(*layer.notes, note))
+        if self.area is None:
+            return layer
+        # Swap x and y if no row is in the requested area before, and some rows are after it.
+        shapes = layer.table.geometry.to_numpy()
+        box = shapely.box(*self.area.bounds)
+        if layer.table.crs != WGS84 or shapely.intersects(shapes, box).any():
+            return layer
+        new_shapes = shapely.transform(shapes, lambda xy: xy[:, ::-1])
+        if not shapely.intersects(new_shapes, box).any():
+            return layer
+        note = "the service sends latitude as x and longitude as y; exchanged here"
+        geometry = gpd.GeoSeries(new_shapes, layer.table.index, crs=WGS84)
+        return dataclasses.replace(
+            layer, table=layer.table.set_geometry(geometry), notes=(*layer.notes, note)
+        )
 
 
 def read_layers(

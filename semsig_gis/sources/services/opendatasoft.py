@@ -8,9 +8,8 @@ from urllib.parse import quote
 import shapely
 
 from semsig_gis.core import CatalogError, SourceError
-from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field
-from semsig_gis.sources.services.pages import NOT_FOUND, ServiceQuery
+from semsig_gis.sources.services.pages import ServiceQuery
 from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
@@ -36,28 +35,17 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     """
     dataset = quote(client.dataset, safe="")
     address = f"{client.endpoint}/api/explore/v2.1/catalog/datasets/{dataset}"
+    types = client.description(
+        ServiceQuery(address), _parse_description, page="explore", accept=("application/json",)
+    )
     file = client.file(
-        ServiceQuery(
-            f"{address}/exports/geojson", _query(client, _field_types(address, client), area)
-        ),
+        ServiceQuery(f"{address}/exports/geojson", _query(client, types, area)),
         _check_complete,
         accept=GEOJSON,
         suffix=".geojson",
         progress=client.progress,
     )
     return Download(spec=client.layer, files=(file,))
-
-
-def _field_types(address: str, client: Client) -> Mapping[str, str]:
-    """Return the types of the fields of a dataset, by name."""
-    try:
-        return client.document(
-            ServiceQuery(address), _parse_description, accept=("application/json",)
-        )
-    except HttpError as error:
-        if error.status != NOT_FOUND:
-            raise
-        raise client.absent_dataset("explore") from error
 
 
 def _parse_description(reply: bytes) -> dict[str, str]:
@@ -84,21 +72,19 @@ def _query(client: Client, types: Mapping[str, str], area: Area | None) -> dict[
                 f"dataset {layer.dataset!r} of layer {layer.name!r} has no positions to cut an "
                 "area out of."
             )
-        conditions.append(_inside(area, find_field(POINT, layer, points) or points[0]))
+        field = find_field(POINT, layer, points) or points[0]
+        west, south, east, north = area.bounds
+        if area.polygon.equals(shapely.box(west, south, east, north)):
+            inside = f"in_bbox({field}, {south:.7f}, {west:.7f}, {north:.7f}, {east:.7f})"
+        else:
+            inside = f"intersects({field}, geom'{_outline(area.polygon)}')"
+        conditions.append(inside)
     if conditions:
         query["where"] = " and ".join(f"({condition})" for condition in conditions)
     fields = client.fields(list(types))
     if fields:
         query["select"] = ",".join(dict.fromkeys([*fields, *places]))
     return query
-
-
-def _inside(area: Area, field: str) -> str:
-    """Return the condition in ODSQL that a position is in an area."""
-    west, south, east, north = area.bounds
-    if area.polygon.equals(shapely.box(west, south, east, north)):
-        return f"in_bbox({field}, {south:.7f}, {west:.7f}, {north:.7f}, {east:.7f})"
-    return f"intersects({field}, geom'{_outline(area.polygon)}')"
 
 
 def _outline(polygon: BaseGeometry) -> str:

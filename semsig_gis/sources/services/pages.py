@@ -56,13 +56,13 @@ class ServiceQuery(NamedTuple):
 class Page:
     """Rows of a page in any form, with the number of all rows and the next page.
 
-    `total` is None if the server does not state it. `more` is whether there are further rows, None
-    if only `total` shows it. `following` is the address of the next page, if the server sends one.
+    `total` is None if the server does not state it. `more` is whether an ArcGIS server states that
+    there are further rows. `following` is the address of the next page, if the server sends one.
     """
 
     rows: Sequence[Any]
     total: int | None = None
-    more: bool | None = None
+    more: bool = False
     following: str | None = None
 
     @property
@@ -211,13 +211,28 @@ class Client:
             "`dataset` in the catalogue."
         )
 
-    def absent_dataset(self, page: str) -> CatalogError:
-        """Return the error for a dataset that a portal lacks, with the page for searching it."""
-        return CatalogError(
-            f"{self.endpoint} has no dataset {self.dataset!r}, which the catalogue names for layer "
-            f"{self.layer.name!r}; look for it at {self.endpoint}/{page} and correct `dataset` in "
-            "the catalogue."
-        )
+    def description(
+        self,
+        query: ServiceQuery,
+        parse: Callable[[bytes], T],
+        *,
+        page: str,
+        accept: tuple[str, ...] = (),
+    ) -> T:
+        """Fetch the description of the dataset; `page` of the portal is for searching datasets.
+
+        CatalogError if the portal does not have the dataset.
+        """
+        try:
+            return self.document(query, parse, accept=accept)
+        except HttpError as error:
+            if error.status != NOT_FOUND:
+                raise
+            raise CatalogError(
+                f"{self.endpoint} has no dataset {self.dataset!r}, which the catalogue names for "
+                f"layer {self.layer.name!r}; look for it at {self.endpoint}/{page} and correct "
+                "`dataset` in the catalogue."
+            ) from error
 
     def fields(self, fields: Sequence[str]) -> list[str]:
         """Return the fields to request; empty, for all fields, if the layer selects none."""
@@ -258,13 +273,17 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
     SourceError if it is something else, such as a web page, HttpError if it is an error message of
     the service, TransientError if a retry may help.
     """
-    _refuse_markup(content, url)
-    host = host_of(url)
+    host, start = host_of(url), content[:2_000].lstrip(BLANKS)
+    if start.startswith(b"<"):  # an exception report, a web page or other XML
+        message = error_text(content)
+        if message:
+            raise HttpError(f"{host} answered with the error {message} to {url}; correct it.")
+        what = "a web page" if HTML.match(start) else "XML"
+        raise SourceError(f"{host} sent {what} where JSON was expected; check the address {url}.")
     try:
         reply = parse_json(content.decode("utf-8-sig"))
     except ValueError as error:
-        what = "sent JSON that is not whole"
-        raise TransientError(what) from error
+        raise TransientError("sent JSON that is not whole") from error
     failure = reply.get("error") if isinstance(reply, dict) else None
     if failure:
         code = failure.get("code") if isinstance(failure, dict) else None
@@ -277,7 +296,7 @@ def json_value(content: bytes, url: str) -> Any:  # noqa: ANN401 - any JSON
 
 
 def geojson_page(content: bytes, client: Client) -> Page:
-    """Parse a page of GeoJSON as OGC services send it."""
+    """Parse a page of GeoJSON, or of JSON with the same list of features."""
     reply = json_object(content, client.endpoint)
     rows = reply.get("features")
     if not isinstance(rows, list):
@@ -289,7 +308,23 @@ def geojson_page(content: bytes, client: Client) -> Page:
     total = next((count for count in counts if isinstance(count, int) and count >= 0), None)
     links = reply.get("links") or ()
     following = (item["href"] for item in links if item.get("rel") == "next")
-    return Page(rows, total=total, following=next(following, None))
+    # The place of ArcGIS servers for this flag depends on the format.
+    places = (reply, reply.get("properties"))
+    more = any(item.get("exceededTransferLimit") for item in places if isinstance(item, dict))
+    return Page(rows, total=total, more=more, following=next(following, None))
+
+
+def next_offset(
+    query: ServiceQuery, parameter: str, total: int | None = None
+) -> Callable[[Page, int], ServiceQuery | None]:
+    """Return the `then` of `Client.pages` for a service that takes the number of rows to skip."""
+
+    def then(page: Page, rows: int) -> ServiceQuery | None:
+        stated = page.total if total is None else total
+        rest = page.rows and (stated is None or rows < stated)
+        return query.with_params(**{parameter: rows}) if rest else None
+
+    return then
 
 
 def xml_root(content: bytes, url: str) -> ET.Element:
@@ -304,19 +339,4 @@ def xml_root(content: bytes, url: str) -> ET.Element:
     try:
         return parse_xml(content)
     except ValueError as error:
-        what = "sent XML that is not whole"
-        raise TransientError(what) from error
-
-
-def _refuse_markup(content: bytes, url: str) -> None:
-    """Raise HttpError for an exception report, SourceError for a web page or other XML."""
-    start = content[:2_000].lstrip(BLANKS)
-    if not start.startswith(b"<"):
-        return
-    message = error_text(content)
-    if message:
-        raise HttpError(f"{host_of(url)} answered with the error {message} to {url}; correct it.")
-    what = "a web page" if HTML.match(start) else "XML"
-    raise SourceError(
-        f"{host_of(url)} sent {what} where JSON was expected; check the address {url}."
-    )
+        raise TransientError("sent XML that is not whole") from error

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.http.fetch import HttpError
 from semsig_gis.sources.services.layers import POINT, SHAPE, Download, find_field, known_coordinates
 from semsig_gis.sources.services.pages import (
-    NOT_FOUND,
     Page,
     ServiceQuery,
     geojson_page,
+    json_object,
     json_value,
+    next_offset,
 )
 
 if TYPE_CHECKING:
@@ -40,7 +40,12 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     ``server_where`` is a condition in SoQL. Of several geometry columns, the one of an alias is
     used, or else the first.
     """
-    about = _about(client)
+    description = f"{client.endpoint}/api/views/{quote(client.dataset, safe='')}.json"
+    about = client.description(
+        ServiceQuery(description),
+        lambda content: json_object(content, description),
+        page="browse",
+    )
     types = _types(about)
     layer = client.with_license((about.get("license") or {}).get("name"), about.get("attribution"))
     places = [name for name, kind in types.items() if kind in POINTS | SHAPES]
@@ -56,6 +61,7 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
         fields = [name for name in types if name not in places]
     position_fields = filter(None, (place, *_coordinates(client, list(types))))
     columns = dict.fromkeys([*fields, *position_fields])
+    read = functools.partial(_page, client=client)
     files: tuple[Fetched, ...] = ()
     for box in area.boxes if area is not None else (None,):
         where = _where(client, types, place, box)
@@ -67,18 +73,10 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
         if fields:
             params["$select"] = ",".join(columns)
         params |= {"$order": ":id", "$limit": PAGE_ROWS}
-        files += _fetch_pages(client, ServiceQuery(f"{address}.{kind}", params), total=total)
+        query = ServiceQuery(f"{address}.{kind}", params)
+        then = next_offset(query, "$offset", total)
+        files += client.pages(query.with_params(**{"$offset": 0}), read, then, total=total)
     return Download(spec=layer, files=files, fields=tuple(types))
-
-
-def _about(client: Client) -> dict[str, Any]:
-    address = f"{client.endpoint}/api/views/{quote(client.dataset, safe='')}.json"
-    try:
-        return client.json(ServiceQuery(address))
-    except HttpError as error:
-        if error.status != NOT_FOUND:
-            raise
-        raise client.absent_dataset("browse") from error
 
 
 def _types(about: Mapping[str, Any]) -> dict[str, str]:
@@ -127,17 +125,6 @@ def _where(
             ring = ", ".join(f"{x} {y}" for x, y in corners)
             conditions.append(f"intersects({place}, 'POLYGON (({ring}))')")
     return " AND ".join(f"({condition})" for condition in conditions) or None
-
-
-def _fetch_pages(client: Client, query: ServiceQuery, *, total: int | None) -> tuple[Fetched, ...]:
-    def then(page: Page, rows: int) -> ServiceQuery | None:
-        rest = page.rows and (total is None or rows < total)
-        return ServiceQuery(query.url, {**query.params, "$offset": rows}) if rest else None
-
-    read = functools.partial(_page, client=client)
-    return client.pages(
-        ServiceQuery(query.url, {**query.params, "$offset": 0}), read, then, total=total
-    )
 
 
 def _page(content: bytes, client: Client) -> Page:

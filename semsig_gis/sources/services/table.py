@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -42,6 +43,29 @@ class ServiceRecord(NamedTuple):
 
     values: Mapping[str, Any]
     geometry: object = None
+
+    @classmethod
+    def parse(cls, item: object) -> Self | str:
+        """Return the record in an item, or an error message if it has none.
+
+        Items are of GeoJSON, Esri's JSON, Opendatasoft 1 or 2.0, or plain JSON.
+        """
+        if not isinstance(item, dict):
+            return f"is {json.dumps(item)[:40]}, not a record"
+        if isinstance(item.get("attributes"), dict):
+            return cls(item["attributes"], item.get("geometry"))
+        if item.get("type") == "Feature":
+            fields = item.get("properties") or {}
+            if not isinstance(fields, dict):
+                return "has properties without names"
+            own = item.get(ID)
+            if own is not None and ID not in fields:
+                fields = {**fields, ID: own}
+            return cls(fields, item.get("geometry"))
+        inner = item.get("record", item)
+        if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
+            return cls(inner["fields"], inner.get("geometry"))
+        return cls(item)
 
 
 # A row that cannot be read is an error message.
@@ -103,67 +127,35 @@ def _json(path: Path) -> ServiceTable:
         keys = ("features",) if collection else ("features", "results", "records")
         items = next((content[key] for key in keys if key in content), None)
         has_geometry = "features" in content
-        system = _member_crs(content, path) if collection else _esri_crs(content, path)
-    records = [_record(item) for item in items] if isinstance(items, list) else [""]
+        system = _json_crs(content, path)
+    records = [ServiceRecord.parse(item) for item in items] if isinstance(items, list) else [""]
     readable = [record for record in records if isinstance(record, ServiceRecord)]
     if records and not readable:
         raise SourceError(
             f"{path} has no records; give an export of a portal, which is a list of them or has "
             "one under features, results or records."
         )
+    page = content if isinstance(content, dict) else {}
+    total = next((page[name] for name in TOTALS if name in page), None)
     return ServiceTable(
         fields=tuple(dict.fromkeys(name for record in readable for name in record.values)),
         records=lambda _: iter(records),
         has_geometry=has_geometry or any(record.geometry for record in readable),
         crs=system,
         empty=not records,
-        rest=_rest(content, len(records)),
+        rest=max(total - len(records), 0) if isinstance(total, int) else 0,
     )
 
 
-def _rest(content: object, rows: int) -> int:
-    """Return the number of rows that a page lacks, from the total that it states."""
-    page = content if isinstance(content, dict) else {}
-    total = next((page[name] for name in TOTALS if name in page), None)
-    return max(total - rows, 0) if isinstance(total, int) else 0
-
-
-def _record(item: object) -> ServiceRecord | str:
-    """Return the record in an item of GeoJSON, Esri's JSON, Opendatasoft 1 or 2.0, or plain JSON.
-
-    An error message if it is none of these.
-    """
-    if not isinstance(item, dict):
-        return f"is {json.dumps(item)[:40]}, not a record"
-    if isinstance(item.get("attributes"), dict):
-        return ServiceRecord(item["attributes"], item.get("geometry"))
-    if item.get("type") == "Feature":
-        fields = item.get("properties") or {}
-        if not isinstance(fields, dict):
-            return "has properties without names"
-        own = item.get(ID)
-        if own is not None and ID not in fields:
-            fields = {**fields, ID: own}
-        return ServiceRecord(fields, item.get("geometry"))
-    inner = item.get("record", item)
-    if isinstance(inner, dict) and isinstance(inner.get("fields"), dict):
-        return ServiceRecord(inner["fields"], inner.get("geometry"))
-    return ServiceRecord(item)
-
-
-def _member_crs(content: dict[str, Any], path: Path) -> CRS | None:
-    """Return the CRS in a GeoJSON file from before RFC 7946."""
-    if content.get("crs") is None:
-        return None
-    try:
-        name = content["crs"]["properties"]["name"]
-    except (KeyError, TypeError):
-        name = content["crs"]
-    return _stated_crs(name, path)
-
-
-def _esri_crs(content: Mapping[str, Any], path: Path) -> CRS | None:
-    """Return the CRS in JSON of the ArcGIS REST API, given by its code or as WKT."""
+def _json_crs(content: dict[str, Any], path: Path) -> CRS | None:
+    """Return the CRS in GeoJSON from before RFC 7946, or in JSON of the ArcGIS REST API."""
+    if content.get("type") == "FeatureCollection":
+        stated = content.get("crs")
+        if stated is None:
+            return None
+        with contextlib.suppress(KeyError, TypeError):
+            stated = stated["properties"]["name"]
+        return _stated_crs(stated, path)
     stated = content.get("spatialReference")
     if not isinstance(stated, dict):
         return None
@@ -220,23 +212,23 @@ def _parquet(path: Path) -> ServiceTable:
     # Exports of portals have no GeoParquet metadata; files from other programs have.
     primary = metadata.get("primary_column")
     stated = metadata.get("columns", {}).get(primary, {}).get("crs")
+
+    def records(names: Sequence[str]) -> Records:
+        columns = list(dict.fromkeys([*names, primary] if primary else names))
+        try:
+            with pq.ParquetFile(path) as file:
+                for batch in file.iter_batches(BATCH, columns=columns):
+                    for values in batch.to_pylist():
+                        yield ServiceRecord(values, values.get(primary))
+        except (pa.ArrowException, OSError) as error:
+            raise _broken_parquet(path, error) from error
+
     return ServiceTable(
         fields,
-        lambda columns: _parquet_records(path, columns, primary),
+        records,
         has_geometry=primary is not None,
         crs=None if stated is None else _stated_crs(stated, path),
     )
-
-
-def _parquet_records(path: Path, fields: Sequence[str], primary: str | None) -> Records:
-    columns = list(dict.fromkeys([*fields, primary] if primary else fields))
-    try:
-        with pq.ParquetFile(path) as file:
-            for batch in file.iter_batches(BATCH, columns=columns):
-                for values in batch.to_pylist():
-                    yield ServiceRecord(values, values.get(primary))
-    except (pa.ArrowException, OSError) as error:
-        raise _broken_parquet(path, error) from error
 
 
 def _broken_parquet(path: Path, error: Exception) -> SourceError:

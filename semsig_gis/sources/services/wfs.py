@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 from xml.etree import ElementTree as ET
 
 from semsig_gis.core import SourceError
 from semsig_gis.sources.http.fetch import host_of
 from semsig_gis.sources.services.gml import ID, features, local_name
 from semsig_gis.sources.services.layers import Download, find_field
-from semsig_gis.sources.services.pages import Page, ServiceQuery, geojson_page, xml_root
+from semsig_gis.sources.services.pages import (
+    Page,
+    ServiceQuery,
+    geojson_page,
+    next_offset,
+    xml_root,
+)
 
 if TYPE_CHECKING:
     from semsig_gis.sources.area import Area
@@ -46,6 +52,38 @@ class _Capabilities:
     terms: str = ""
     provider: str = ""
 
+    @classmethod
+    def parse(cls, content: bytes, client: Client) -> Self:
+        """Parse the capabilities of a service; SourceError if it is not a WFS 2.0."""
+        root = xml_root(content, client.endpoint)
+        version = root.get("version", "")
+        if local_name(root) != "WFS_Capabilities" or not version.startswith("2."):
+            raise SourceError(
+                f"{host_of(client.endpoint)} is not a Web Feature Service of version 2.0 (it sent "
+                f"{local_name(root)} {version}".rstrip()
+                + f"); check the address {client.endpoint}."
+            )
+        formats = [
+            value
+            for operation in _named(root, "Operation", "GetFeature")
+            for parameter in _named(operation, "Parameter", "outputFormat")
+            for value in _texts(parameter, "Value")
+        ]
+        constraints = {
+            item.get("name", ""): next(iter(_texts(item, "DefaultValue")), "")
+            for item in root.iter()
+            if local_name(item) == "Constraint"
+        }
+        types = (item for item in root.iter() if local_name(item) == "FeatureType")
+        terms = [text for text in _texts(root, "AccessConstraints") if text.lower() != "none"]
+        return cls(
+            types=tuple(name for item in types for name in _texts(item, "Name")[:1]),
+            formats=tuple(formats),
+            constraints=constraints,
+            terms=" ".join(terms),
+            provider=" ".join(_texts(root, "ProviderName")),
+        )
+
     def lacks(self, name: str) -> bool:
         """Whether the service states that it does not support something."""
         return self.constraints.get(name, "").upper() == "FALSE"
@@ -58,7 +96,7 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     layer's `id_field` if the service supports it.
     """
     service = client.document(
-        _query(client, "GetCapabilities"), lambda content: _capabilities(content, client)
+        _query(client, "GetCapabilities"), lambda content: _Capabilities.parse(content, client)
     )
     dataset = client.dataset
     matches = [name for name in service.types if dataset in {name, name.rpartition(":")[2]}]
@@ -93,37 +131,6 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
 
 def _query(client: Client, request: str) -> ServiceQuery:
     return ServiceQuery(client.endpoint, {"service": "WFS", "version": VERSION, "request": request})
-
-
-def _capabilities(content: bytes, client: Client) -> _Capabilities:
-    root = xml_root(content, client.endpoint)
-    version = root.get("version", "")
-    if local_name(root) != "WFS_Capabilities" or not version.startswith("2."):
-        raise SourceError(
-            f"{host_of(client.endpoint)} is not a Web Feature Service of version 2.0 (it sent "
-            f"{local_name(root)} {version}".rstrip()
-            + f"); check the address {client.endpoint}."
-        )
-    formats = [
-        value
-        for operation in _named(root, "Operation", "GetFeature")
-        for parameter in _named(operation, "Parameter", "outputFormat")
-        for value in _texts(parameter, "Value")
-    ]
-    constraints = {
-        item.get("name", ""): next(iter(_texts(item, "DefaultValue")), "")
-        for item in root.iter()
-        if local_name(item) == "Constraint"
-    }
-    types = (item for item in root.iter() if local_name(item) == "FeatureType")
-    terms = [text for text in _texts(root, "AccessConstraints") if text.lower() != "none"]
-    return _Capabilities(
-        types=tuple(name for item in types for name in _texts(item, "Name")[:1]),
-        formats=tuple(formats),
-        constraints=constraints,
-        terms=" ".join(terms),
-        provider=" ".join(_texts(root, "ProviderName")),
-    )
 
 
 def _named(element: ET.Element, kind: str, name: str) -> list[ET.Element]:
@@ -179,13 +186,10 @@ def _fetch_pages(
         return client.pages(query, read, lambda *_: None, total=total, suffix=suffix)
     most = service.constraints.get("CountDefault", "")
     count = min(PAGE_ROWS, int(most) if most.isdecimal() and int(most) else PAGE_ROWS)
-
-    def then(page: Page, rows: int) -> ServiceQuery | None:
-        rest = total is None or rows < total
-        return query.with_params(count=count, startIndex=rows) if page.rows and rest else None
-
+    query = query.with_params(count=count)
     # No startIndex for the first page: a service that cannot order rows refuses it.
-    return client.pages(query.with_params(count=count), read, then, total=total, suffix=suffix)
+    then = next_offset(query, "startIndex", total)
+    return client.pages(query, read, then, total=total, suffix=suffix)
 
 
 def _gml_page(content: bytes, client: Client) -> Page:

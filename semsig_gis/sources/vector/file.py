@@ -178,23 +178,18 @@ def _read_member(
     )
     rows = read_whole(member, fields, layer.rows)
     if rows is None:
-        rows, more = _row_reader()(member, fields, layer.rows)
+        try:
+            # fiona takes 190 ms to import, and is needed only for damaged files.
+            from semsig_gis.sources.vector.by_fiona import read_each  # noqa: PLC0415
+        except ModuleNotFoundError as error:
+            if error.name != "fiona":
+                raise
+            read_each = by_pyogrio.read_each
+        rows, more = read_each(member, fields, layer.rows)
         notes += more
     if member.driver == GEOJSON:
         _mark_invalid(rows, member)
     return TableRows(fields, rows, system, own is not None and not implicit, notes)
-
-
-def _row_reader() -> Callable[[Member, Sequence[str], int], tuple[Rows, tuple[str, ...]]]:
-    """Return the function that reads a layer row by row, of fiona if it is installed."""
-    try:
-        # fiona takes 190 ms to import, and is needed only for damaged files.
-        from semsig_gis.sources.vector.by_fiona import read_each  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        if error.name != "fiona":
-            raise
-        return by_pyogrio.read_each
-    return read_each
 
 
 def read_layers(
@@ -313,15 +308,12 @@ def _mark_invalid(rows: Rows, member: Member) -> None:
     if len(features) != rows.read:
         return  # GDAL counts differently, so that rows cannot be assigned
     for row in null:
-        if not _is_empty(features[rows.numbers[row] - 1].get("geometry")):
+        geometry = features[rows.numbers[row] - 1].get("geometry")
+        empty = geometry is None
+        if isinstance(geometry, dict):
+            empty = _is_blank(geometry.get("coordinates", geometry.get("geometries")))
+        if not empty:
             rows.positions[row] = "its geometry is not valid GeoJSON"
-
-
-def _is_empty(geometry: object) -> bool:
-    """Whether a GeoJSON geometry is null or valid and empty."""
-    if not isinstance(geometry, dict):
-        return geometry is None
-    return _is_blank(geometry.get("coordinates", geometry.get("geometries")))
 
 
 def _is_blank(parts: object) -> bool:

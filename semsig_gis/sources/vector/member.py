@@ -95,8 +95,22 @@ class Member:
             start = start.removeprefix(b"\xef\xbb\xbf").lstrip()
         if not start.startswith(FIRST_BYTES[self.driver]):
             raise not_of_its_kind(self)
-        if self.driver == CONTAINER and self.inner is None:
-            _refuse_damaged(self.file)
+        if self.driver != CONTAINER or self.inner is not None:
+            return
+        # With the messages of GDAL, the readers of a damaged GeoPackage would crash.
+        address = f"{self.file.resolve().as_uri()}?mode=ro"
+        try:
+            with contextlib.closing(sqlite3.connect(address, uri=True)) as connection:
+                verdict = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+        except UnicodeDecodeError:
+            verdict = "a name in it is not UTF-8 text"
+        except sqlite3.Error as error:
+            verdict = str(error)
+        if verdict != "ok":
+            raise SourceError(
+                f"{self.file} cannot be read ({' '.join(verdict.split())}); it may be damaged, so "
+                "download it again."
+            )
 
 
 def not_of_its_kind(what: object) -> SourceError:
@@ -114,6 +128,13 @@ def unreadable(what: object, error: BaseException) -> SourceError:
     return SourceError(f"{what} cannot be read ({cause}); it may be damaged, so download it again.")
 
 
+# Exceptions of zipfile for damaged archives.
+_ZIP_FAULTS = (
+    *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
+    *(struct.error, zipfile.BadZipFile, zlib.error),
+)
+
+
 def members(path: Path) -> tuple[Member, ...]:
     """Return the members of a file: the file itself, or the vector files in an archive."""
     suffix = path.suffix.lower()
@@ -123,19 +144,8 @@ def members(path: Path) -> tuple[Member, ...]:
         raise SourceError(
             f"{path} is not a vector file; give one of {', '.join(sorted(suffixes))}."
         )
-    inner = _archived(path) if suffix == ".zip" else (None,)
-    return tuple(Member(path, name) for name in inner)
-
-
-# Exceptions of zipfile for damaged archives.
-_ZIP_FAULTS = (
-    *(EOFError, IndexError, NotImplementedError, OSError, RuntimeError, ValueError),
-    *(struct.error, zipfile.BadZipFile, zlib.error),
-)
-
-
-def _archived(path: Path) -> tuple[str, ...]:
-    """Return the names of the vector files in an archive; SourceError if it is damaged."""
+    if suffix != ".zip":
+        return (Member(path, None),)
     try:
         with zipfile.ZipFile(path) as archive:
             items = [item for item in archive.infolist() if not item.is_dir()]
@@ -161,22 +171,4 @@ def _archived(path: Path) -> tuple[str, ...]:
             f"{', '.join(sorted(DRIVERS))} is needed."
         )
     data = [name for name in usable if Path(name).suffix.lower() not in SIDE_SUFFIXES]
-    return tuple(data or usable)
-
-
-def _refuse_damaged(path: Path) -> None:
-    """Refuse a damaged GeoPackage; with the messages of GDAL its readers would crash."""
-    try:
-        with contextlib.closing(
-            sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
-        ) as connection:
-            verdict = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
-    except UnicodeDecodeError:
-        verdict = "a name in it is not UTF-8 text"
-    except sqlite3.Error as error:
-        verdict = str(error)
-    if verdict != "ok":
-        raise SourceError(
-            f"{path} cannot be read ({' '.join(verdict.split())}); it may be damaged, so download "
-            "it again."
-        )
+    return tuple(Member(path, name) for name in data or usable)
