@@ -59,6 +59,9 @@ class StandIn:
     wrong = ""
     # The names in the answer to a wrong `dataset`.
     others: tuple[str, ...] = ()
+    # The filter of the service that selects lamps, and the terms that it states.
+    only_lamps = "KIND = 'lamp'"
+    terms = ""
     limit = 2
     # Whether it can clip to an area.
     cuts = True
@@ -111,6 +114,8 @@ class ArcGIS(StandIn):
     dataset = "Street/FeatureServer/Lamps"
     wrong = "Street/FeatureServer/Lampposts"
     others = ("0 (Lamps)", "3 (Kerbs)")
+    only_lamps = "KIND='lamp'"
+    terms = "City of Somewhere (unknown)"
     geojson = True
     paging = True
 
@@ -154,7 +159,7 @@ class ArcGIS(StandIn):
             assert (query["inSR"], query["spatialRel"]) == ("4326", "esriSpatialRelIntersects")
             west, south, east, north = map(float, query["geometry"].split(","))
             rows = self.inside(west, south, east, north)
-        if query["where"] == "KIND='lamp'":
+        if query["where"] == self.only_lamps:
             rows = [row for row in rows if row["KIND"] == "lamp"]
         elif query["where"] != "1=1":
             details = ["'where' clause is invalid"]
@@ -206,6 +211,11 @@ class Wfs(StandIn):
     dataset = "lamps"
     wrong = "city:lampposts"
     others = ("city:lamps", "city:kerbs")
+    only_lamps = (
+        "<fes:PropertyIsEqualTo><fes:ValueReference>KIND</fes:ValueReference>"
+        "<fes:Literal>lamp</fes:Literal></fes:PropertyIsEqualTo>"
+    )
+    terms = "City of Somewhere (CC BY 4.0)"
     formats: tuple[str, ...] = ("text/xml; subtype=gml/3.2", "application/json; subtype=geojson")
     constraints: tuple[tuple[str, str], ...] = (("CountDefault", "2"),)
     turned = False
@@ -331,6 +341,7 @@ class OgcFeatures(StandIn):
     dataset = "lamps"
     wrong = "lampposts"
     others = ("lamps", "kerbs")
+    terms = "no attribution given (https://licence.example/by)"
     conforms: tuple[str, ...] = ("core", "geojson")
     filters = "http://www.opengis.net/spec/ogcapi-features-3/1.0/conf/features-filter"
     next_host = ""
@@ -371,7 +382,7 @@ class OgcFeatures(StandIn):
         if "bbox" in query:
             rows = self.inside(*map(float, query["bbox"].split(",")))
         if "filter" in query:
-            assert (query["filter"], query["filter-lang"]) == ("KIND = 'lamp'", "cql2-text")
+            assert (query["filter"], query["filter-lang"]) == (self.only_lamps, "cql2-text")
             rows = [row for row in rows if row["KIND"] == "lamp"]
         if (failure := self.failure()) is not None:
             return failure
@@ -401,6 +412,8 @@ class Ckan(StandIn):
     dataset = "lamps"
     wrong = "lampposts"
     others = ("the nearest is 'lamps'", "kerbs")
+    only_lamps = '{"KIND": "lamp"}'
+    terms = "City of Somewhere (CC0)"
     cuts = False
     half = b'{"success": true, "result": {"records": ['
 
@@ -465,6 +478,7 @@ class Socrata(StandIn):
     dataset = "abcd-1234"
     wrong = "abcd-9999"
     others = ("/browse",)
+    terms = "City of Somewhere (PDDL)"
     place = "point"
 
     def start(self) -> None:
@@ -507,7 +521,7 @@ class Socrata(StandIn):
         return values | ({"the_place": where} if self.place else {"lon": x, "lat": y})
 
     def holds(self, condition: str, row: Row) -> bool:
-        if condition == "KIND = 'lamp'":
+        if condition == self.only_lamps:
             return bool(row["KIND"] == "lamp")
         numbers = [float(text) for text in re.findall(r"-?\d+\.\d+", condition)]
         x, y = map(float, row["xy"])

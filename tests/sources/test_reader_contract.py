@@ -1,10 +1,13 @@
-"""What every reader does with files that are damaged, of another kind, or absent."""
+"""What every reader does with files that are damaged, of another kind, absent or too large."""
 
 from __future__ import annotations
 
+import bz2
+import gzip
 import io
 import json
 import tempfile
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,7 +21,17 @@ from geojson import collection, feature, point
 from sentences import refused
 
 from semsig_gis.core import CrsError, SourceError
-from semsig_gis.sources import LayerSpec, list_layers, mapillary, overture, reader
+from semsig_gis.sources import (
+    HARMLESS_BYTES,
+    LayerSpec,
+    check_compression_ratio,
+    list_layers,
+    mapillary,
+    overture,
+    read_layer,
+    read_layers,
+    reader,
+)
 from semsig_gis.sources.osm import features, file, overpass
 from semsig_gis.sources.services import layers as services
 
@@ -233,3 +246,33 @@ def test_unknown_crs_of_gml_is_refused(tmp_path: Path) -> None:
     path.write_bytes(CASES["service GML"].content.replace(b"<p>", b"<p srsName='EPSG:99999'>"))
     with refused(CrsError, "'EPSG:99999'", "unknown"):
         services.read_layers(path, [PLAIN])
+
+
+# Several members in succession, so that the test compresses less.
+GZIP_BOMB = gzip.compress(b" " * 2**24) * 10
+BZIP_BOMB = bz2.compress(b" " * 2**24) * 10
+
+
+@pytest.mark.parametrize(("suffix", "bomb"), [(".gz", GZIP_BOMB), (".bz2", BZIP_BOMB)])
+def test_extract_with_a_high_ratio_is_refused(tmp_path: Path, suffix: str, bomb: bytes) -> None:
+    path = tmp_path / f"city.osm{suffix}"
+    path.write_bytes(bomb)
+    with refused(SourceError, f"{path} unpacks to more than 250 times", "give what is inside"):
+        read_layers(path, [OSM])
+
+
+def test_archive_with_a_high_ratio_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "city.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("city.csv", b" " * (HARMLESS_BYTES + 1))
+    with refused(SourceError, f"city.csv in {path} unpacks to more than 250 times"):
+        read_layer(path, PLAIN)
+
+
+@pytest.mark.parametrize(
+    "content", [gzip.compress(b" " * 2**24), GZIP_BOMB[:1000], b"", b"no archive"]
+)
+def test_small_or_damaged_file_passes(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "city.osm.gz"
+    path.write_bytes(content)
+    check_compression_ratio(path)
