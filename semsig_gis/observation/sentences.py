@@ -224,10 +224,9 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
             raise InputError(
                 f"the class of a detection is {value!r}; give a symbol, a word or scores by word."
             )
-        symbol = (
-            value if isinstance(value, dict) else taxonomy.decode([class_code(value, taxonomy)])
-        )
-        classes.append(symbol)
+        if isinstance(value, str):
+            value = taxonomy.decode([class_code(value, taxonomy)])  # noqa: PLW2901 - its symbol
+        classes.append(value)
     if any(isinstance(value, dict) for value in classes):
         columns["scores"] = [
             value if isinstance(value, dict) else {value: 1.0} for value in classes
