@@ -1,6 +1,6 @@
 """Write the plugin as a zip file that QGIS installs: `python qgis_plugin/package.py dist`.
 
-The zip file holds the engine, too, as a wheel that is built here with hatchling.
+The zip file also contains the engine, as a wheel that is built here with hatchling.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = [
     "faults",
     "files",
     "metadata",
-    "read_words",
+    "read_translations",
     "write_zip",
 ]
 
@@ -35,85 +35,88 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-KINDS = {".py", ".qml", ".svg", ".txt"}
-# The first moment that a zip file can tell, so that the same files make the same bytes.
-MOMENT = (1980, 1, 1, 0, 0, 0)
+SUFFIXES = {".py", ".qml", ".svg", ".txt"}
+# The earliest time in a zip file, so that the same files give the same bytes.
+ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 ADDRESSES = ("tracker", "repository", "homepage")
-# What the official repository of plugins asks of metadata.txt, and how large a zip file it takes.
+# Limits of the official repository of plugins: fields of metadata.txt, and the size of a zip file.
 REQUIRED = (
     *("name", "description", "version", "qgisMinimumVersion", "author", "email", "about"),
     *ADDRESSES,
 )
 MOST_BYTES = 25_000_000
-# How files of compiled translations begin.
-QM = bytes.fromhex("3cb86418caef9c95cd211cbf60a1bddd")
+# The first bytes of compiled translations.
+QM_HEADER = bytes.fromhex("3cb86418caef9c95cd211cbf60a1bddd")
 
 
 def files(email: str = "") -> dict[str, bytes]:
-    """Return the files of the plugin by their names in the zip, sorted; all but the engine.
+    """Return the files of the plugin except the engine, sorted by their names in the zip file.
 
     Parameters
     ----------
     email : str, optional
-        Where its authors can be reached.
+        Address of the authors.
 
     Returns
     -------
     dict
-        What each file holds.
+        The contents of each file.
     """
     plugin = HERE / "semsig"
-    found = {path.relative_to(HERE).as_posix(): path for path in plugin.rglob("*")}
-    found = {name: path for name, path in found.items() if path.suffix in KINDS}
-    found["semsig/LICENSE"] = ROOT / "LICENSE"
-    found["semsig/constraints.txt"] = ROOT / "constraints.txt"
-    found["semsig/help.md"] = ROOT / "docs" / "qgis.md"
-    told = {name: path.read_bytes() for name, path in found.items()}
+    paths = {
+        path.relative_to(HERE).as_posix(): path
+        for path in plugin.rglob("*")
+        if path.suffix in SUFFIXES
+    }
+    paths["semsig/LICENSE"] = ROOT / "LICENSE"
+    paths["semsig/constraints.txt"] = ROOT / "constraints.txt"
+    paths["semsig/help.md"] = ROOT / "docs" / "qgis.md"
+    contents = {name: path.read_bytes() for name, path in paths.items()}
     for path in (HERE / "i18n").glob("*.ts"):
-        told[f"semsig/i18n/{path.stem}.qm"] = compiled(read_words(path))
-    told["semsig/metadata.txt"] = metadata(email).encode()
-    return dict(sorted(told.items()))
+        contents[f"semsig/i18n/{path.stem}.qm"] = compiled(read_translations(path))
+    contents["semsig/metadata.txt"] = metadata(email).encode()
+    return dict(sorted(contents.items()))
 
 
-def read_words(path: Path) -> dict[str, str]:
-    """Return the translations that a file of Qt Linguist has, by their sources.
+def read_translations(path: Path) -> dict[str, str]:
+    """Return the finished translations in a file of Qt Linguist, by their sources.
 
     Parameters
     ----------
     path : Path
-        The file, which ends in ``.ts``.
+        The file, with the suffix ``.ts``.
 
     Returns
     -------
     dict
-        Those that are finished.
+        The translations.
     """
     messages = ET.parse(path).iterfind("context/message")  # noqa: S314 - our own file
-    told = {
-        str(one.findtext("source")): str(one.findtext("translation") or "")
-        for one in messages
-        if one.find("translation[@type]") is None
+    texts = {
+        str(message.findtext("source")): str(message.findtext("translation") or "")
+        for message in messages
+        if message.find("translation[@type]") is None
     }
-    return {source: text for source, text in told.items() if text}
+    return {source: text for source, text in texts.items() if text}
 
 
-def compiled(words: Mapping[str, str], context: str = "Semsig") -> bytes:
-    """Return translations as Qt reads them, as `lrelease` does, the same on every machine.
+def compiled(translations: Mapping[str, str], context: str = "Semsig") -> bytes:
+    """Return translations in the binary format of Qt, as `lrelease` writes it.
 
     Parameters
     ----------
-    words : mapping of str to str
+    translations : mapping of str to str
         The translations by their sources.
     context : str, default "Semsig"
-        Whose they are.
+        The context of the translations.
 
     Returns
     -------
     bytes
-        The contents of a file that ends in ``.qm``.
+        The contents of a ``.qm`` file, the same on every machine.
     """
     messages, places = b"", []
-    for source, text in words.items():
+    for source, text in translations.items():
         places.append((_elf(source.encode()), len(messages)))
         for tag, value in (
             (3, text.encode("utf-16-be")),
@@ -124,11 +127,11 @@ def compiled(words: Mapping[str, str], context: str = "Semsig") -> bytes:
         messages += b"\x01"  # the end of a message
     hashes = b"".join(struct.pack(">II", *place) for place in sorted(places))
     sections = ((0x42, hashes), (0x69, messages))
-    return QM + b"".join(struct.pack(">BI", tag, len(part)) + part for tag, part in sections)
+    return QM_HEADER + b"".join(struct.pack(">BI", tag, len(part)) + part for tag, part in sections)
 
 
 def _elf(text: bytes) -> int:
-    """Return the hash by which Qt looks a text up: that of ELF files, never 0."""
+    """Return the hash of a text in Qt's index: the hash of ELF files, but never 0."""
     value = 0
     for byte in text:
         value = (value << 4) + byte
@@ -138,30 +141,30 @@ def _elf(text: bytes) -> int:
 
 
 def metadata(email: str = "") -> str:
-    """Return metadata.txt, with the addresses of the project that SEMSIG_REPOSITORY tells.
+    """Return metadata.txt with the addresses of the project, from SEMSIG_REPOSITORY.
 
     Parameters
     ----------
     email : str, optional
-        Where its authors can be reached.
+        Address of the authors.
 
     Returns
     -------
     str
-        The text; without a line for what is not told.
+        The text, without lines for unknown addresses.
     """
-    told = {"email": email}
+    addresses = {"email": email}
     if repository := os.environ.get("SEMSIG_REPOSITORY", "").rstrip("/"):
-        told |= {"homepage": repository, "repository": repository}
-        told["tracker"] = f"{repository}/issues"
+        addresses |= {"homepage": repository, "repository": repository}
+        addresses["tracker"] = f"{repository}/issues"
     text = (HERE / "semsig" / "metadata.txt").read_text("utf-8")
-    return text + "".join(f"{name}={value}\n" for name, value in told.items() if value)
+    return text + "".join(f"{name}={value}\n" for name, value in addresses.items() if value)
 
 
 def faults(plugin: Path) -> list[str]:
-    """Return why the official repository of plugins would refuse a zip file.
+    """Return the reasons why the official repository of plugins would refuse a zip file.
 
-    That the addresses can be reached, which it tries, is left out.
+    The repository also checks that the addresses can be reached; this function does not.
 
     Parameters
     ----------
@@ -171,33 +174,33 @@ def faults(plugin: Path) -> list[str]:
     Returns
     -------
     list of str
-        Sentences; none where it would take it.
+        Sentences; empty if it would be accepted.
     """
-    found = []
+    reasons = []
     if plugin.stat().st_size > MOST_BYTES:
-        found.append(f"It is larger than {MOST_BYTES:,} bytes.")
+        reasons.append(f"It is larger than {MOST_BYTES:,} bytes.")
     with zipfile.ZipFile(plugin) as archive:
         names = archive.namelist()
-        told = configparser.ConfigParser()
-        told.read_string(archive.read("semsig/metadata.txt").decode())
-    general = told["general"]
+        parser = configparser.ConfigParser()
+        parser.read_string(archive.read("semsig/metadata.txt").decode())
+    general = parser["general"]
     missing = [name for name in REQUIRED if not general.get(name)]
     if missing:
-        found.append(
+        reasons.append(
             f"metadata.txt has no {', '.join(missing)}; give the address of the project in "
             "SEMSIG_REPOSITORY and that of its authors as --email (with make, SEMSIG_EMAIL)."
         )
     for name in set(ADDRESSES) - set(missing):
         parts = urlsplit(general[name])
         if not (parts.scheme and parts.netloc):
-            found.append(f"The {name} {general[name]} is not an address.")
+            reasons.append(f"The {name} {general[name]} is not an address.")
     if "semsig/LICENSE" not in names:
-        found.append("It has no LICENSE.")
+        reasons.append("It has no LICENSE.")
     unwanted = re.compile(
         r"\.\.|^/|\.pyc|__pycache__|__MACOSX|/\.|\.(exe|dll|so|dylib|bat|sh|cmd)$"
     )
-    found += [f"It holds {name}." for name in names if unwanted.search(name)]
-    return found
+    reasons += [f"It contains {name}." for name in names if unwanted.search(name)]
+    return reasons
 
 
 def build_wheel(folder: Path) -> Path:
@@ -206,17 +209,17 @@ def build_wheel(folder: Path) -> Path:
     Parameters
     ----------
     folder : Path
-        Where to.
+        Folder to write to.
 
     Returns
     -------
     Path
-        The wheel.
+        The path of the wheel.
     """
     line = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder.absolute())]
-    done = subprocess.run(line, cwd=ROOT, check=False, capture_output=True, text=True)  # noqa: S603
-    if done.returncode != 0:
-        sys.exit(f"The engine cannot be built (hatchling builds it): {done.stderr.strip()}")
+    process = subprocess.run(line, cwd=ROOT, check=False, capture_output=True, text=True)  # noqa: S603
+    if process.returncode != 0:
+        sys.exit(f"The engine cannot be built (hatchling builds it): {process.stderr.strip()}")
     (wheel,) = folder.glob("semsig_gis-*.whl")
     return wheel
 
@@ -227,52 +230,53 @@ def write_zip(folder: Path, wheel: Path | None = None, *, email: str = "") -> Pa
     Parameters
     ----------
     folder : Path
-        Where to; made when missing.
+        Folder to write to, created if missing.
     wheel : Path, optional
-        The engine. Without it, the plugin asks the package index for one of its version.
+        The engine. Without it, the plugin installs the engine from the package index.
     email : str, optional
-        Where its authors can be reached.
+        Address of the authors.
 
     Returns
     -------
     Path
-        The file. The same files give the same bytes, on every machine.
+        The path of the file, which has the same bytes on every machine.
     """
-    packed = files(email)
+    contents = files(email)
     if wheel is not None:
+        # Written again, so that it has the same bytes on every machine.
         with zipfile.ZipFile(wheel) as archive:
-            held = {name: archive.read(name) for name in archive.namelist()}
-        packed[f"semsig/{wheel.name}"] = _archive(held)
-    told = configparser.ConfigParser()
-    told.read_string(packed["semsig/metadata.txt"].decode())
-    target = folder / f"semsig-qgis-{told['general']['version']}.zip"
+            wheel_contents = {name: archive.read(name) for name in archive.namelist()}
+        contents[f"semsig/{wheel.name}"] = _archive(wheel_contents)
+    parser = configparser.ConfigParser()
+    parser.read_string(contents["semsig/metadata.txt"].decode())
+    target = folder / f"semsig-qgis-{parser['general']['version']}.zip"
     folder.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(_archive(packed))
+    target.write_bytes(_archive(contents))
     return target
 
 
 def _archive(contents: dict[str, bytes]) -> bytes:
-    """Return a zip file of contents by their names."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
+    """Return a zip file with these contents by their names."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
         for name, content in contents.items():
-            entry = zipfile.ZipInfo(name, MOMENT)
-            entry.create_system = 3  # Unix, wherever it is made
+            entry = zipfile.ZipInfo(name, ZIP_TIME)
+            entry.create_system = 3  # Unix, on every machine
             entry.external_attr = 0o100644 << 16
-            # Not compressed: another version of the library would give other bytes.
+            # Not compressed, since compressed bytes depend on the version of the library.
             archive.writestr(entry, content)
-    return made.getvalue()
+    return buffer.getvalue()
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="where to write it")
+    parser.add_argument("folder", type=Path, help="folder to write to")
     parser.add_argument("--without-engine", action="store_true", help="leave the wheel out")
-    parser.add_argument("--email", default="", help="where its authors can be reached")
-    given = parser.parse_args()
+    parser.add_argument("--email", default="", help="address of the authors")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
-        engine = None if given.without_engine else build_wheel(Path(place))
-        plugin = write_zip(given.folder, engine, email=given.email)
+        engine = None if options.without_engine else build_wheel(Path(place))
+        plugin = write_zip(options.folder, engine, email=options.email)
     print(plugin)
     for fault in faults(plugin):
         print(f"The official repository would refuse it: {fault}", file=sys.stderr)

@@ -1,9 +1,9 @@
-"""Show the plugin from nothing, in a fresh QGIS: `tour.py --wheels FOLDER --out DIR`.
+"""Run the plugin in a fresh QGIS and take pictures: `tour.py --wheels FOLDER --out DIR`.
 
-On a screen that need not be real (Xvfb), the plugin is installed from its zip file, its engine from
-a folder of wheels by the button, OpenStreetMap is downloaded for the canvas from a server on this
-machine that plays Overpass, a database is built, a cell is clicked, a view composed, and its place
-found. Each step leaves a picture. Nothing of the network is used, and no other `semsig`.
+On a virtual screen (Xvfb), the plugin is installed from its zip file, and its engine from a folder
+of wheels with the button. OpenStreetMap is downloaded for the canvas from a local server in place
+of Overpass, a database is built, a cell is clicked, a view is composed and its place is found. Each
+step writes a picture. The network and any other `semsig` are not used.
 
 The folder of wheels is filled once with ``pip download -c constraints.txt -d FOLDER
 '.[raster,serve]'``.
@@ -34,19 +34,19 @@ __all__ = ["overpass", "play", "town"]
 HERE = Path(__file__).parent
 SESSION = HERE / "tour_session.py"
 SCREEN = "1440x900x24"
-# The south-west corner of the town that the server knows, and a degree's length there.
+# The south-west corner of the town of the server, and the length of a degree there.
 SOUTH, WEST = 43.6, 3.87
 METRES_NORTH, METRES_EAST = 111_100.0, 80_600.0
 
 
 def town() -> list[dict[str, object]]:
-    """Return a town as Overpass sends it: lamps and trees in streets, and what else is there."""
+    """Return a town in the format of Overpass: streets with lamps, trees and other objects."""
     nodes: list[dict[str, object]] = []
 
     def place(east: float, north: float, **tags: str) -> None:
         lat, lon = SOUTH + north / METRES_NORTH, WEST + east / METRES_EAST
-        told = {name.replace("__", ":"): value for name, value in tags.items()}
-        nodes.append({"type": "node", "id": len(nodes) + 1, "lat": lat, "lon": lon, "tags": told})
+        node = {"type": "node", "id": len(nodes) + 1, "lat": lat, "lon": lon}
+        nodes.append(node | {"tags": tags})
 
     for street in range(8):
         along = 40.0 + street * 75.0
@@ -68,12 +68,12 @@ def town() -> list[dict[str, object]]:
 
 @contextlib.contextmanager
 def overpass(elements: list[dict[str, object]]) -> Iterator[str]:
-    """Serve elements as an Overpass server does, and yield its address.
+    """Serve elements like an Overpass server, and yield its address.
 
     Parameters
     ----------
     elements : list of dict
-        What is sent, whatever is asked for.
+        The answer to every request.
 
     Yields
     ------
@@ -110,14 +110,14 @@ def overpass(elements: list[dict[str, object]]) -> Iterator[str]:
 
 @contextlib.contextmanager
 def screen() -> Iterator[str]:
-    """Start a screen that is not real, and yield its name."""
+    """Start a virtual screen, and yield its name."""
     read, write = os.pipe()
     line = ["Xvfb", "-displayfd", str(write), "-screen", "0", SCREEN, "-nolisten", "tcp"]
     with subprocess.Popen(line, pass_fds=[write], stderr=subprocess.DEVNULL) as server:  # noqa: S603
         try:
             os.close(write)
-            with os.fdopen(read) as told:
-                yield f":{told.readline().strip()}"
+            with os.fdopen(read) as output:
+                yield f":{output.readline().strip()}"
         finally:
             server.terminate()
 
@@ -125,25 +125,25 @@ def screen() -> Iterator[str]:
 def play(
     out: Path, wheels: Path | None, *, command: str = "", language: str = "en", minutes: float = 20
 ) -> int:
-    """Play the tour.
+    """Run the tour.
 
     Parameters
     ----------
     out : Path
-        Where the pictures go.
+        Folder for the pictures.
     wheels : Path or None
         Folder of the wheels of the engine.
     command : str, optional
-        A `semsig` to take instead of an engine.
+        A `semsig` to use instead of an engine.
     language : str, default "en"
         Language of QGIS.
     minutes : float, default 20
-        How long it may take.
+        Time limit.
 
     Returns
     -------
     int
-        0 where all went well.
+        0 if all steps succeeded.
     """
     out.mkdir(parents=True, exist_ok=True)
     with (
@@ -163,7 +163,7 @@ def play(
             "out": str(out.absolute()),
             "work": str(place),
         }
-        # Nothing is inherited: the engine of the tour is the only one.
+        # Without inherited variables, so that the engine of the tour is the only one.
         environment = {
             "DISPLAY": display,
             "HOME": home,
@@ -175,7 +175,7 @@ def play(
         line = ["qgis", "--nologo", "--noversioncheck", "--lang", language]
         line += ["--profiles-path", str(place / "profile"), "--code", str(SESSION)]
         with (out / "qgis.log").open("wb") as log:
-            done = subprocess.run(  # noqa: S603
+            process = subprocess.run(  # noqa: S603
                 line,
                 env=environment,
                 cwd=home,
@@ -187,19 +187,19 @@ def play(
     failed = out / "failed.txt"
     if failed.exists():
         print(failed.read_text("utf-8"), file=sys.stderr)
-    return 1 if failed.exists() or not (out / "done.txt").exists() else done.returncode
+    return 1 if failed.exists() or not (out / "done.txt").exists() else process.returncode
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--wheels", type=Path, help="folder of the wheels")
-    parser.add_argument("--command", default="", help="a semsig to take instead of an engine")
-    parser.add_argument("--out", type=Path, default=Path("pictures"), help="where to put pictures")
+    parser.add_argument("--command", default="", help="a semsig to use instead of an engine")
+    parser.add_argument("--out", type=Path, default=Path("pictures"), help="folder for pictures")
     parser.add_argument("--lang", default="en", help="language of QGIS: en, de or fr")
-    given = parser.parse_args()
+    options = parser.parse_args()
     for name in ("Xvfb", "qgis"):
         if shutil.which(name) is None:
             sys.exit(f"The tour needs {name}, which is not on this computer; install it.")
-    if not (given.wheels or given.command):
-        sys.exit("Give --wheels, or --command to take a semsig that is there.")
-    sys.exit(play(given.out, given.wheels, command=given.command, language=given.lang))
+    if not (options.wheels or options.command):
+        sys.exit("Give --wheels, or --command to use an installed semsig.")
+    sys.exit(play(options.out, options.wheels, command=options.command, language=options.lang))

@@ -1,4 +1,4 @@
-"""What the tour does in QGIS, whose `--code` runs this: see `tour.py`."""
+"""The steps of the tour, run in QGIS by its option `--code`: see `tour.py`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ OUT, WORK = Path(STORY["out"]), Path(STORY["work"])
 
 
 def wait(ready: Callable[[], object], seconds: float = 300.0) -> None:
-    """Let QGIS work until something is so."""
+    """Process events of QGIS until `ready` returns true."""
     end = time.monotonic() + seconds
     while not ready():
         if time.monotonic() > end:
@@ -45,7 +45,7 @@ def wait(ready: Callable[[], object], seconds: float = 300.0) -> None:
 
 
 def rest(seconds: float = 1.0) -> None:
-    """Let QGIS draw."""
+    """Give QGIS time to draw."""
     begin = time.monotonic()
     wait(lambda: time.monotonic() > begin + seconds)
 
@@ -65,7 +65,7 @@ def install_plugin() -> None:
 
 
 def install_engine() -> None:
-    """Press the button."""
+    """Install the engine with the button of its dialog."""
     plugin = plugins["semsig"]
     plugin.show_engine()
     dialog = plugin.dialog
@@ -82,18 +82,18 @@ def install_engine() -> None:
 
 
 def run(name: str, **parameters: object) -> dict[str, object]:
-    """Run a tool as its dialog does, in the background, and load what it gives."""
+    """Run a tool in the background, as its dialog does, and load its layers."""
     context = QgsProcessingContext()
     context.setProject(QgsProject.instance())
     feedback = QgsProcessingFeedback()
     algorithm = QgsApplication.processingRegistry().createAlgorithmById(f"semsig:{name}")
     ended: list[tuple[bool, dict[str, object]]] = []
     task = QgsProcessingAlgRunnerTask(algorithm, parameters, context, feedback)
-    task.executed.connect(lambda well, results: ended.append((well, results)))
+    task.executed.connect(lambda success, results: ended.append((success, results)))
     QgsApplication.taskManager().addTask(task)
     wait(lambda: ended)
-    well, results = ended[0]
-    if not well:
+    success, results = ended[0]
+    if not success:
         raise RuntimeError(feedback.textLog())
     handleAlgorithmResults(algorithm, context, feedback)
     rest()
@@ -101,7 +101,7 @@ def run(name: str, **parameters: object) -> dict[str, object]:
 
 
 def shown(place: str) -> QgsProcessingOutputLayerDefinition:
-    """Return an output that is loaded."""
+    """Return an output that is loaded into the project."""
     return QgsProcessingOutputLayerDefinition(place, QgsProject.instance())
 
 
@@ -113,10 +113,10 @@ def fetch_and_build() -> str:
     canvas = iface.mapCanvas()
     QgsProject.instance().setCrs(QgsCoordinateReferenceSystem("EPSG:3857"))
     degrees = QgsCoordinateReferenceSystem("EPSG:4326")
-    there = QgsCoordinateTransform(
+    to_canvas = QgsCoordinateTransform(
         degrees, canvas.mapSettings().destinationCrs(), QgsProject.instance()
     )
-    canvas.setExtent(there.transformBoundingBox(QgsRectangle(*STORY["extent"])))
+    canvas.setExtent(to_canvas.transformBoundingBox(QgsRectangle(*STORY["extent"])))
     algorithm = QgsApplication.processingRegistry().createAlgorithmById("semsig:fetchcanvas")
     dialog = AlgorithmDialog(algorithm, parent=iface.mainWindow())
     dialog.show()
@@ -131,27 +131,27 @@ def fetch_and_build() -> str:
 
 
 def ask(city: str) -> None:
-    """Click a cell, compose what is seen from elsewhere, and find its place."""
+    """Click a cell, compose the view from another place, and find that place."""
     plugin = plugins["semsig"]
     plugin.show_dock()
     dock, canvas = plugin.dock, iface.mapCanvas()
     dock.database.setFilePath(city)
     dock.open.click()
     wait(dock.find.isEnabled)
-    dock.click.click()
+    dock.cell_tool.click()
     press(0.42, 0.55)
     wait(lambda: dock.table.rowCount() > 0 and dock.bands)
     picture("6_cell_and_lookalikes")
-    dock.start_anew()
-    dock.stand.click()
+    dock.clear_view()
+    dock.view_tool.click()
     press(0.56, 0.47)
-    wait(lambda: dock.wheel.marks)
+    wait(lambda: dock.dial.marks)
     picture("7_view_composed")
-    marks = list(dock.wheel.marks)
-    dock.wheel.pressed.emit(33.0)  # a click adds what is chosen in the palette
-    if len(dock.wheel.marks) != len(marks) + 1:
-        raise RuntimeError(dock.wheel.marks)
-    dock.wheel.taken.emit(len(marks))  # and another takes it away
+    marks = list(dock.dial.marks)
+    dock.dial.bearing_clicked.emit(33.0)  # adds an object of the class chosen in the palette
+    if len(dock.dial.marks) != len(marks) + 1:
+        raise RuntimeError(dock.dial.marks)
+    dock.dial.mark_clicked.emit(len(marks))  # removes it again
     dock.find.click()
     wait(lambda: dock.table.rowCount() > 0)
     picture("8_places")
@@ -170,7 +170,7 @@ def press(across: float, down: float) -> None:
 
 
 def localize(city: str) -> None:
-    """Ask with the tool, whose layers get a group."""
+    """Localize with the tool, which puts its layers into a group."""
     run(
         "localize",
         DATABASE=city,
@@ -180,12 +180,12 @@ def localize(city: str) -> None:
         REGIONS=shown(str(WORK / "regions.gpkg")),
     )
     picture("10_localize")
-    groups = [one.name() for one in QgsProject.instance().layerTreeRoot().findGroups()]
+    groups = [group.name() for group in QgsProject.instance().layerTreeRoot().findGroups()]
     (OUT / "groups.txt").write_text("\n".join(groups), "utf-8")
 
 
 def play() -> None:
-    """Play all scenes, and end QGIS."""
+    """Run all steps, and end QGIS."""
     try:
         iface.mainWindow().resize(1440, 900)
         iface.mainWindow().move(0, 0)
@@ -207,6 +207,6 @@ def play() -> None:
     iface.actionExit().trigger()
 
 
-for old in ("done.txt", "failed.txt"):
-    (OUT / old).unlink(missing_ok=True)
+for name in ("done.txt", "failed.txt"):
+    (OUT / name).unlink(missing_ok=True)
 QTimer.singleShot(2000, play)

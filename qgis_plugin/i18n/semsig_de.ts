@@ -32,12 +32,12 @@
         <translation>Ein KBS in Metern; ohne Angabe das des Katalogs oder die UTM-Zone.</translation>
     </message>
     <message>
-        <source>A GeoTIFF: of each cell, how many look the same.</source>
-        <translation>Ein GeoTIFF: zu jeder Zelle, wie viele gleich aussehen.</translation>
+        <source>A GeoTIFF: for each cell, the number of cells that look the same.</source>
+        <translation>Ein GeoTIFF: für jede Zelle die Anzahl der Zellen, die gleich aussehen.</translation>
     </message>
     <message>
-        <source>A catalogue file, besides those chosen above or instead of them.</source>
-        <translation>Eine Katalogdatei, neben den oben gewählten oder statt ihrer.</translation>
+        <source>A catalogue file, in addition to the catalogues chosen above or instead of them.</source>
+        <translation>Eine Katalogdatei, zusätzlich zu den oben gewählten oder statt ihrer.</translation>
     </message>
     <message>
         <source>A catalogue says which file holds what: the open data of Montpellier and of Paris, and OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).</source>
@@ -56,8 +56,8 @@
         <translation>Ein Ordner, in dem die Dateien des Katalogs gesucht werden, statt einzelner Dateien.</translation>
     </message>
     <message>
-        <source>A large city takes minutes. What is known already is not computed again.</source>
-        <translation>Eine große Stadt braucht Minuten. Was schon bekannt ist, wird nicht noch einmal berechnet.</translation>
+        <source>A large city takes minutes. Results that exist are not computed again.</source>
+        <translation>Eine große Stadt braucht Minuten. Vorhandene Ergebnisse werden nicht noch einmal berechnet.</translation>
     </message>
     <message>
         <source>A page for the browser with the chances and the candidates.</source>
@@ -72,12 +72,12 @@
         <translation>Eine Seite für den Browser: erfolgreiche und gescheiterte Anfragen, und wo sie scheitern.</translation>
     </message>
     <message>
-        <source>A query counts as found if its best place is as near as this to the true one.</source>
-        <translation>Eine Anfrage gilt als gefunden, wenn ihr bester Ort dem wahren so nahe ist.</translation>
+        <source>A query counts as found if its best place is at most this far from the true place.</source>
+        <translation>Eine Anfrage gilt als gefunden, wenn ihr bester Ort höchstens so weit vom wahren entfernt ist.</translation>
     </message>
     <message>
-        <source>A query is right if one of so many is.</source>
-        <translation>Eine Anfrage ist richtig beantwortet, wenn einer von so vielen Kandidaten stimmt.</translation>
+        <source>A query counts as right if one of this many candidates is right.</source>
+        <translation>Eine Anfrage gilt als richtig beantwortet, wenn einer von so vielen Kandidaten stimmt.</translation>
     </message>
     <message>
         <source>A vector file of any format.</source>
@@ -108,7 +108,7 @@
         <translation>Antwort</translation>
     </message>
     <message>
-        <source>Applies new street objects to a database: only the cells that see a change are made anew. The layers of the new objects take the place of those in the database.</source>
+        <source>Applies new street objects to a database: only the cells that see a change are computed again. The layers of the new objects replace the same layers of the database.</source>
         <translation>Bringt eine Datenbank auf den Stand neuer Straßenobjekte: nur die Zellen, die eine Änderung sehen, werden neu berechnet. Die Layer der neuen Objekte ersetzen die der Datenbank.</translation>
     </message>
     <message>
@@ -136,6 +136,10 @@
         <translation>Auch Gebäudegrundrisse schreiben. „Signaturdatenbank aufbauen“ verdeckt, was hinter ihnen liegt.</translation>
     </message>
     <message>
+        <source>Building footprints; objects behind them are not seen.</source>
+        <translation>Grundrisse von Gebäuden; Objekte dahinter sind nicht zu sehen.</translation>
+    </message>
+    <message>
         <source>Buildings</source>
         <translation>Gebäude</translation>
     </message>
@@ -152,7 +156,7 @@
         <translation>Abbrechen</translation>
     </message>
     <message>
-        <source>Cancelled; what was there before is as it was.</source>
+        <source>Cancelled; the previous state was not changed.</source>
         <translation>Abgebrochen; was vorher da war, ist unverändert.</translation>
     </message>
     <message>
@@ -176,15 +180,15 @@
         <translation>Kataloge</translation>
     </message>
     <message>
-        <source>Cell {cell} sees {types}; {alike} other cells see the same types.</source>
-        <translation>Zelle {cell} sieht {types}; {alike} andere Zellen sehen dieselben Arten.</translation>
+        <source>Cell {cell} sees {types}; {count} other cells see the same types.</source>
+        <translation>Zelle {cell} sieht {types}; {count} andere Zellen sehen dieselben Arten.</translation>
     </message>
     <message>
         <source>Cells</source>
         <translation>Zellen</translation>
     </message>
     <message>
-        <source>Cells that see nothing are left out. Beside the database a folder appears with the street objects, ready to be searched; keep it there.</source>
+        <source>Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database; keep it there.</source>
         <translation>Zellen, die nichts sehen, fallen weg. Neben der Datenbank erscheint ein Ordner mit den Straßenobjekten; lassen Sie ihn dort.</translation>
     </message>
     <message>
@@ -204,7 +208,7 @@
         <translation>Wahrscheinlichkeit</translation>
     </message>
     <message>
-        <source>Chance that the regions hold</source>
+        <source>Chance that the regions contain</source>
         <translation>Wahrscheinlichkeit in den Gebieten</translation>
     </message>
     <message>
@@ -216,8 +220,8 @@
         <translation>Wählen Sie eine Signaturdatenbank und öffnen Sie sie.</translation>
     </message>
     <message>
-        <source>Choose what you see, and click its direction in the wheel. A click takes it away.</source>
-        <translation>Wählen Sie, was Sie sehen, und klicken Sie seine Richtung im Rad an. Ein Klick darauf entfernt es.</translation>
+        <source>Choose what you see, and click its direction in the dial. Click an object to remove it.</source>
+        <translation>Wählen Sie, was Sie sehen, und klicken Sie seine Richtung in der Windrose an. Ein Klick auf ein Objekt entfernt es.</translation>
     </message>
     <message>
         <source>Clear</source>
@@ -244,12 +248,16 @@
         <translation>Detektor</translation>
     </message>
     <message>
+        <source>Distance around their cells that is searched as well.</source>
+        <translation>Abstand um ihre Zellen, in dem auch gesucht wird.</translation>
+    </message>
+    <message>
         <source>Distortion</source>
         <translation>Verfälschung</translation>
     </message>
     <message>
-        <source>Divides the city into square cells and notes for each which street objects are seen from its centre, clockwise from north: its signature. That is what queries are compared with.</source>
-        <translation>Teilt die Stadt in quadratische Zellen und hält für jede fest, welche Straßenobjekte von ihrer Mitte aus zu sehen sind, von Norden an im Uhrzeigersinn: ihre Signatur. Damit werden Anfragen verglichen.</translation>
+        <source>Divides the city into square cells and stores for each which street objects are seen from its centre, clockwise from north: its signature. Queries are compared with these signatures.</source>
+        <translation>Teilt die Stadt in quadratische Zellen und speichert für jede, welche Straßenobjekte von ihrer Mitte aus zu sehen sind, von Norden an im Uhrzeigersinn: ihre Signatur. Anfragen werden mit diesen Signaturen verglichen.</translation>
     </message>
     <message>
         <source>Download OpenStreetMap for this canvas</source>
@@ -264,8 +272,8 @@
         <translation>Lädt die Straßenobjekte einer Stadt herunter: nach ihrem Namen oder in den Polygonen eines Layers. Ein Katalog sagt, woher: OpenStreetMap kennt jeden Ort; das Portal einer Stadt hat mehr von dieser Stadt.</translation>
     </message>
     <message>
-        <source>Drafts a catalogue for a file of your own: which column says what an object is, and which class of street objects each of its values may be. Look through the draft in a text editor, mend it, and give it to “Load street objects” as a catalogue of your own.</source>
-        <translation>Entwirft einen Katalog für eine eigene Datei: welche Spalte sagt, was ein Objekt ist, und welche Klasse von Straßenobjekten jeder ihrer Werte sein könnte. Sehen Sie den Entwurf in einem Texteditor durch, verbessern Sie ihn, und geben Sie ihn „Straßenobjekte laden“ als eigenen Katalog.</translation>
+        <source>Drafts a catalogue for a file of your own: which column contains the kind of an object, and which class of street objects each of its values may be. Check and correct the draft in a text editor, and give it to “Load street objects” as a catalogue of your own.</source>
+        <translation>Entwirft einen Katalog für eine eigene Datei: welche Spalte die Art eines Objekts enthält, und welche Klasse von Straßenobjekten jeder ihrer Werte sein könnte. Prüfen und verbessern Sie den Entwurf in einem Texteditor, und geben Sie ihn „Straßenobjekte laden“ als eigenen Katalog.</translation>
     </message>
     <message>
         <source>Engine of Semantic signatures</source>
@@ -276,8 +284,8 @@
         <translation>Engine ...</translation>
     </message>
     <message>
-        <source>Every cell, those outside the buildings, or along the streets and outside them.</source>
-        <translation>Alle Zellen, die außerhalb der Gebäude, oder die entlang der Straßen und außerhalb der Gebäude.</translation>
+        <source>Every cell, outdoor cells, or outdoor cells near streets.</source>
+        <translation>Alle Zellen, Zellen außerhalb der Gebäude, oder Zellen an Straßen und außerhalb der Gebäude.</translation>
     </message>
     <message>
         <source>Explore a city</source>
@@ -304,6 +312,10 @@
         <translation>Ort suchen</translation>
     </message>
     <message>
+        <source>Finds where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types without bearings, or bearings without types, are enough.</source>
+        <translation>Findet, von wo in der Stadt eine Ansicht stammt: was zu sehen ist, von Norden an im Uhrzeigersinn, wird mit der Signatur jeder Zelle verglichen. Typen ohne Richtungen oder Richtungen ohne Typen genügen.</translation>
+    </message>
+    <message>
         <source>Folder</source>
         <translation>Ordner</translation>
     </message>
@@ -324,10 +336,6 @@
         <translation>Der Ordner, in den geschrieben wird.</translation>
     </message>
     <message>
-        <source>Footprints: what they hide is not seen.</source>
-        <translation>Grundrisse: was sie verdecken, ist nicht zu sehen.</translation>
-    </message>
-    <message>
         <source>For files that do not state theirs.</source>
         <translation>Für Dateien, die ihres nicht angeben.</translation>
     </message>
@@ -338,10 +346,6 @@
     <message>
         <source>Found: the place is within {metres} m with a chance of {chance}.</source>
         <translation>Gefunden: Der Ort liegt mit einer Wahrscheinlichkeit von {chance} im Umkreis von {metres} m.</translation>
-    </message>
-    <message>
-        <source>From how far an object is seen, unless the catalogue says it of its class.</source>
-        <translation>Von wie weit ein Objekt zu sehen ist, wenn der Katalog es nicht für seine Klasse sagt.</translation>
     </message>
     <message>
         <source>From the true to the best place</source>
@@ -356,12 +360,8 @@
         <translation>Hilfe</translation>
     </message>
     <message>
-        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by how many objects must be added, taken away or exchanged to turn one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells whose types fit best. histogram+histogram: by how often each type and each angle occurs, whatever the order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by the types or the angles alone.</source>
+        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by the number of objects to add, remove or exchange to change one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells with the best types. histogram+histogram: by how often each type and each angle occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by only the types or only the angles.</source>
         <translation>Wie Zellen mit einer Anfrage verglichen werden. likelihood: nach der Chance, dass ein Detektor die Anfrage von dort sieht. edit+edit: danach, wie viele Objekte hinzukommen, wegfallen oder getauscht werden müssen, um die eine Folge in die andere zu verwandeln, im Mittel von Typen und Winkeln. edit+edit:5%: dasselbe unter den 5 % der Zellen, deren Typen am besten passen. histogram+histogram: danach, wie oft jeder Typ und jeder Winkel vorkommt, gleich in welcher Reihenfolge. jaccard+jaccard: danach, welche Typen und welche Winkel überhaupt vorkommen. types:edit und angles:edit: wie edit+edit, nach den Typen oder den Winkeln allein.</translation>
-    </message>
-    <message>
-        <source>How many are asked.</source>
-        <translation>Wie viele gestellt werden.</translation>
     </message>
     <message>
         <source>How many cells to list.</source>
@@ -372,16 +372,16 @@
         <translation>Bei wie vielen Objekten der Detektor sich irrt: keinem, 1, 7 oder 13.</translation>
     </message>
     <message>
+        <source>How many queries are asked.</source>
+        <translation>Wie viele Anfragen gestellt werden.</translation>
+    </message>
+    <message>
         <source>How much of what is seen will be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person notes down.</source>
         <translation>Wie viel von dem Gesehenen falsch sein wird: light (wenig), medium (mittel), strong (viel) oder generic, wo das nicht bekannt ist; by-hand für das, was ein Mensch notiert.</translation>
     </message>
     <message>
-        <source>If “Where queries can be placed” was run, what it found goes with the cells.</source>
-        <translation>Wurde „Wo Anfragen verortet werden können“ ausgeführt, steht bei den Zellen, was es ergab.</translation>
-    </message>
-    <message>
-        <source>In how many equal sectors the methods of the paper compare bearings. More of them tell cells apart better, and forgive less where bearings are off.</source>
-        <translation>In wie vielen gleichen Sektoren die Verfahren des Aufsatzes Richtungen vergleichen. Mehr davon unterscheiden Zellen besser und verzeihen falsche Richtungen weniger.</translation>
+        <source>If “Where queries can be placed” was run, its results are written with the cells.</source>
+        <translation>Wurde „Wo Anfragen verortet werden können“ ausgeführt, stehen die Ergebnisse bei den Zellen.</translation>
     </message>
     <message>
         <source>Install</source>
@@ -400,12 +400,16 @@
         <translation>Ihr Quadrat oder ihre Mitte.</translation>
     </message>
     <message>
+        <source>Largest distance from which an object is seen, unless the catalogue gives one for its class.</source>
+        <translation>Größte Entfernung, aus der ein Objekt zu sehen ist, wenn der Katalog keine für seine Klasse nennt.</translation>
+    </message>
+    <message>
         <source>Looking for Python...</source>
         <translation>Python wird gesucht ...</translation>
     </message>
     <message>
-        <source>Makes up a small city, builds its database, asks it, and shows what came out: for trying things, without any data or network. The folder holds city.parquet for the other tools.</source>
-        <translation>Erfindet eine kleine Stadt, baut ihre Datenbank, befragt sie und zeigt, was herauskam: zum Ausprobieren, ohne Daten und Netz. Der Ordner enthält city.parquet für die anderen Werkzeuge.</translation>
+        <source>Makes up a small city, builds its database, evaluates queries and shows the results: to try the tools without data or a network. The folder contains city.parquet for the other tools.</source>
+        <translation>Erfindet eine kleine Stadt, baut ihre Datenbank, wertet Anfragen aus und zeigt die Ergebnisse: zum Ausprobieren, ohne Daten und Netz. Der Ordner enthält city.parquet für die anderen Werkzeuge.</translation>
     </message>
     <message>
         <source>Map page</source>
@@ -420,12 +424,12 @@
         <translation>Methode</translation>
     </message>
     <message>
-        <source>Name of a city or quarter, such as Gentilly, France.</source>
-        <translation>Name einer Stadt oder eines Viertels, etwa Gentilly, France.</translation>
+        <source>More distortions of a query, separated by commas, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
+        <translation>Weitere Störungen einer Anfrage, durch Kommas getrennt, etwa compass:10,view:90 (ein Kompass, der um 10° abweicht, ein Blickfeld von 90°).</translation>
     </message>
     <message>
-        <source>New ones: the file that “Load street objects” or a download wrote.</source>
-        <translation>Neue: die Datei, die „Straßenobjekte laden“ oder ein Download geschrieben hat.</translation>
+        <source>Name of a city or quarter, such as Gentilly, France.</source>
+        <translation>Name einer Stadt oder eines Viertels, etwa Gentilly, France.</translation>
     </message>
     <message>
         <source>North</source>
@@ -442,6 +446,10 @@
     <message>
         <source>Number of candidates</source>
         <translation>Anzahl der Kandidaten</translation>
+    </message>
+    <message>
+        <source>Number of equal sectors in which the methods of the paper compare bearings. More sectors distinguish cells better, but tolerate smaller errors of bearings.</source>
+        <translation>Anzahl gleicher Sektoren, in denen die Verfahren des Aufsatzes Richtungen vergleichen. Mehr Sektoren unterscheiden Zellen besser, vertragen aber nur kleinere Fehler der Richtungen.</translation>
     </message>
     <message>
         <source>Number of queries</source>
@@ -474,6 +482,10 @@
     <message>
         <source>Polygons that the cells must lie in.</source>
         <translation>Polygone, in denen die Zellen liegen müssen.</translation>
+    </message>
+    <message>
+        <source>Predicts for every cell how likely a query from there will be found, and which other cells it may be confused with. A street with three lamps looks like thousands of others; this tool shows them.</source>
+        <translation>Sagt für jede Zelle voraus, wie wahrscheinlich eine Anfrage von dort gefunden wird und mit welchen anderen Zellen man sie verwechseln kann. Eine Straße mit drei Laternen sieht aus wie tausend andere; dieses Werkzeug zeigt sie.</translation>
     </message>
     <message>
         <source>Python (3.11 or newer)</source>
@@ -520,12 +532,12 @@
         <translation>Semantische Signaturen</translation>
     </message>
     <message>
-        <source>Shows how many cells see the same types in the same order: a cell alone can be told at once, one of a thousand cannot. “Where queries can be placed” tells more, and takes longer.</source>
-        <translation>Zeigt, wie viele Zellen dieselben Typen in derselben Reihenfolge sehen: eine einzelne erkennt man sofort, eine von tausend nicht. „Wo Anfragen verortet werden können“ sagt mehr und dauert länger.</translation>
+        <source>Shows how many cells see the same types in the same order: a unique cell can be identified at once, one of a thousand cannot. “Where queries can be placed” gives more detail, and takes longer.</source>
+        <translation>Zeigt, wie viele Zellen dieselben Typen in derselben Reihenfolge sehen: eine einmalige Zelle erkennt man sofort, eine von tausend nicht. „Wo Anfragen verortet werden können“ sagt mehr und dauert länger.</translation>
     </message>
     <message>
-        <source>Shows what is seen from a cell, and the cells most like it.</source>
-        <translation>Zeigt, was man aus einer Zelle sieht, und die Zellen, die ihr am meisten gleichen.</translation>
+        <source>Shows what is seen from a cell, and the most similar cells.</source>
+        <translation>Zeigt, was man aus einer Zelle sieht, und die ähnlichsten Zellen.</translation>
     </message>
     <message>
         <source>Side of a cell (m)</source>
@@ -538,10 +550,6 @@
     <message>
         <source>Signature databases (*.parquet)</source>
         <translation>Signaturdatenbanken (*.parquet)</translation>
-    </message>
-    <message>
-        <source>So far around their cells is searched too.</source>
-        <translation>So weit um ihre Zellen herum wird auch gesucht.</translation>
     </message>
     <message>
         <source>Some square kilometres take seconds to minutes. What was downloaded before is taken from the cache. The server is a setting: Settings &gt; Options &gt; Processing &gt; Providers &gt; Semantic signatures.</source>
@@ -572,20 +580,16 @@
         <translation>Symbole dessen, was zu sehen ist, von Norden an im Uhrzeigersinn, etwa DDBL; ? für ein unbekanntes. Die des Aufsatzes: B Baum, C Brunnen, D Laterne, E Anzeiger, G Ampel, H Fahrradstation, I öffentliche Toilette, J Carsharing, K Taxistand, L Bank, M Bushaltestelle; ein Katalog kann mehr haben.</translation>
     </message>
     <message>
-        <source>Tells of every cell, before any query, how likely one from there will be found, and for which other cells it will be taken. A street with three lamps looks like thousands of others; here they are.</source>
-        <translation>Sagt für jede Zelle, noch vor jeder Anfrage, wie wahrscheinlich eine von dort gefunden wird und mit welchen anderen Zellen man sie verwechselt. Eine Straße mit drei Laternen sieht aus wie tausend andere; hier sind sie.</translation>
-    </message>
-    <message>
-        <source>Tells where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types alone or bearings alone are fine.</source>
-        <translation>Sagt, von wo in der Stadt eine Ansicht stammt: was zu sehen ist, von Norden an im Uhrzeigersinn, wird mit der Signatur jeder Zelle verglichen. Typen allein oder Richtungen allein genügen.</translation>
-    </message>
-    <message>
         <source>The GeoPackage to write.</source>
         <translation>Das GeoPackage, das geschrieben wird.</translation>
     </message>
     <message>
         <source>The best cells.</source>
         <translation>Die besten Zellen.</translation>
+    </message>
+    <message>
+        <source>The catalogues of the files. With several, objects that two of them contain are merged; the first is treated as the best source.</source>
+        <translation>Die Kataloge der Dateien. Bei mehreren werden Objekte, die zwei davon haben, zusammengelegt; der erste gilt als beste Quelle.</translation>
     </message>
     <message>
         <source>The cells and the street objects as layers, in a GeoPackage.</source>
@@ -596,12 +600,8 @@
         <translation>Die Zellen nach ihrer Chance, in einem GeoPackage.</translation>
     </message>
     <message>
-        <source>The cells that a view from here would be taken for, by chance:</source>
-        <translation>Die Zellen, für die ein Blick von hier gehalten würde, nach Wahrscheinlichkeit:</translation>
-    </message>
-    <message>
-        <source>The database gets columns that say so, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click what a cell is taken for.</source>
-        <translation>Die Datenbank erhält Spalten, die das sagen, und die Zellen werden nach ihrer Chance gezeigt. Die Kartenseite für den Browser zeigt auf einen Klick, wofür eine Zelle gehalten wird.</translation>
+        <source>The cells that a view from here may be confused with, by chance:</source>
+        <translation>Die Zellen, mit denen eine Ansicht von hier verwechselt werden kann, nach Wahrscheinlichkeit:</translation>
     </message>
     <message>
         <source>The database to write.</source>
@@ -610,6 +610,10 @@
     <message>
         <source>The database to write. A temporary file is lost when QGIS is closed.</source>
         <translation>Die Datenbank, die geschrieben wird. Eine temporäre Datei geht verloren, wenn QGIS beendet wird.</translation>
+    </message>
+    <message>
+        <source>The direction of each object, in degrees clockwise from north, separated by commas, such as 10,80,200,310.</source>
+        <translation>Die Richtung jedes Objekts, in Grad von Norden im Uhrzeigersinn, durch Kommas getrennt, etwa 10,80,200,310.</translation>
     </message>
     <message>
         <source>The draft to write.</source>
@@ -640,6 +644,10 @@
         <translation>Die Engine wurde entfernt.</translation>
     </message>
     <message>
+        <source>The extent to download; by default the extent of the canvas.</source>
+        <translation>Der Ausschnitt, der heruntergeladen wird; ohne Angabe der Ausschnitt der Karte.</translation>
+    </message>
+    <message>
         <source>The file that “Build signature database” wrote.</source>
         <translation>Die Datei, die „Signaturdatenbank aufbauen“ geschrieben hat.</translation>
     </message>
@@ -652,20 +660,28 @@
         <translation>Die Datei, die „Straßenobjekte laden“ geschrieben hat.</translation>
     </message>
     <message>
-        <source>The likelihood method gives each candidate a chance, tells the place between the middles of the cells with its uncertainty, and says when it cannot tell. The other methods are those of the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
-        <translation>Das Verfahren likelihood gibt jedem Kandidaten eine Chance, nennt den Ort zwischen den Mitten der Zellen mit seiner Unsicherheit und sagt, wenn es ihn nicht nennen kann. Die anderen Verfahren sind die des Aufsatzes; sie ordnen Zellen nach einer Distanz, und Zellen, die gleich aussehen, teilen einen Rang.</translation>
+        <source>The likelihood method gives each candidate a chance, estimates the place between the centres of cells with its uncertainty, and reports when it cannot decide. The other methods are from the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
+        <translation>Das Verfahren likelihood gibt jedem Kandidaten eine Chance, schätzt den Ort zwischen den Mitten der Zellen mit seiner Unsicherheit und meldet, wenn es nicht entscheiden kann. Die anderen Verfahren sind aus dem Aufsatz; sie ordnen Zellen nach einer Distanz, und Zellen, die gleich aussehen, teilen einen Rang.</translation>
     </message>
     <message>
-        <source>The log has a table of the results; the folder has them for other programs, the layers and the map page for the eye.</source>
-        <translation>Im Protokoll steht eine Tabelle der Ergebnisse; der Ordner enthält sie für andere Programme, die Layer und die Kartenseite sind fürs Auge.</translation>
+        <source>The log has a table of the results; the folder contains them for other programs, and the layers and the map page show them.</source>
+        <translation>Im Protokoll steht eine Tabelle der Ergebnisse; der Ordner enthält sie für andere Programme, die Layer und die Kartenseite zeigen sie.</translation>
     </message>
     <message>
-        <source>The log tells what became of every row: how many are objects, how many were left out, and why.</source>
-        <translation>Das Protokoll sagt, was aus jeder Zeile wurde: wie viele Objekte sind, wie viele wegfielen, und warum.</translation>
+        <source>The log reports how many rows became objects, how many were left out, and why.</source>
+        <translation>Das Protokoll meldet, wie viele Zeilen Objekte wurden, wie viele wegfielen, und warum.</translation>
     </message>
     <message>
-        <source>The paper of Weng, Gouet-Brunet and Soheilian has 10 m.</source>
+        <source>The new objects: the file that “Load street objects” or a download wrote.</source>
+        <translation>Die neuen Objekte: die Datei, die „Straßenobjekte laden“ oder ein Download geschrieben hat.</translation>
+    </message>
+    <message>
+        <source>The paper of Weng, Gouet-Brunet and Soheilian uses 10 m.</source>
         <translation>Im Aufsatz von Weng, Gouet-Brunet und Soheilian sind es 10 m.</translation>
+    </message>
+    <message>
+        <source>The parts of the city to search for the query, in a GeoPackage.</source>
+        <translation>Die Teile der Stadt, die für die Anfrage abgesucht werden müssen, in einem GeoPackage.</translation>
     </message>
     <message>
         <source>The queries at their true places, and lines to the places that were found, in a GeoPackage.</source>
@@ -674,6 +690,10 @@
     <message>
         <source>The queries, their errors and a summary, for other programs.</source>
         <translation>Die Anfragen, ihre Fehler und eine Zusammenfassung, für andere Programme.</translation>
+    </message>
+    <message>
+        <source>The results become columns of the database, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click which cells a cell may be confused with.</source>
+        <translation>Die Ergebnisse werden Spalten der Datenbank, und die Zellen werden nach ihrer Chance gezeigt. Die Kartenseite für den Browser zeigt auf einen Klick, mit welchen Zellen eine Zelle verwechselt werden kann.</translation>
     </message>
     <message>
         <source>The semsig command (leave empty to look for it)</source>
@@ -716,26 +736,6 @@
         <translation>Sichtweite (m)</translation>
     </message>
     <message>
-        <source>What else happens to a query, with commas between, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
-        <translation>Was mit einer Anfrage noch geschieht, durch Kommas getrennt, etwa compass:10,view:90 (ein Kompass, der um 10° abweicht, ein Blickfeld von 90°).</translation>
-    </message>
-    <message>
-        <source>What is downloaded; that of the canvas by default.</source>
-        <translation>Was heruntergeladen wird; ohne Angabe der Ausschnitt der Karte.</translation>
-    </message>
-    <message>
-        <source>What of the city must be searched for the query, in a GeoPackage.</source>
-        <translation>Was von der Stadt für die Anfrage abgesucht werden muss, in einem GeoPackage.</translation>
-    </message>
-    <message>
-        <source>What the files hold. With several, objects that two of them have are merged; the first is treated as the best source.</source>
-        <translation>Was die Dateien enthalten. Bei mehreren werden Objekte, die zwei davon haben, zusammengelegt; der erste gilt als beste Quelle.</translation>
-    </message>
-    <message>
-        <source>Where each is seen, in degrees clockwise from north, with commas between them, such as 10,80,200,310.</source>
-        <translation>In welcher Richtung jedes zu sehen ist, in Grad von Norden im Uhrzeigersinn, durch Kommas getrennt, etwa 10,80,200,310.</translation>
-    </message>
-    <message>
         <source>Where the data come from.</source>
         <translation>Woher die Daten kommen.</translation>
     </message>
@@ -760,8 +760,8 @@
         <translation>Bei likelihood: die Ellipse, in der der Ort mit einer Chance von 90 % liegt, wenn die Antwort stimmt.</translation>
     </message>
     <message>
-        <source>With likelihood: they are as large as needed for that, 0.9 by default.</source>
-        <translation>Bei likelihood: sie sind so groß wie dafür nötig, ohne Angabe 0,9.</translation>
+        <source>With likelihood: the regions are as large as needed to contain this chance, 0.9 by default.</source>
+        <translation>Bei likelihood: die Regionen sind so groß, dass sie diese Chance enthalten, ohne Angabe 0,9.</translation>
     </message>
     <message>
         <source>Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and how many other cells look the same; with the street objects, these become a second layer.</source>

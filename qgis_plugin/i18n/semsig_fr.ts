@@ -32,11 +32,11 @@
         <translation>Un SCR en mètres ; par défaut celui du catalogue, ou la zone UTM.</translation>
     </message>
     <message>
-        <source>A GeoTIFF: of each cell, how many look the same.</source>
-        <translation>Un GeoTIFF : pour chaque cellule, combien ont le même aspect.</translation>
+        <source>A GeoTIFF: for each cell, the number of cells that look the same.</source>
+        <translation>Un GeoTIFF : pour chaque cellule, le nombre de cellules de même aspect.</translation>
     </message>
     <message>
-        <source>A catalogue file, besides those chosen above or instead of them.</source>
+        <source>A catalogue file, in addition to the catalogues chosen above or instead of them.</source>
         <translation>Un fichier de catalogue, en plus de ceux choisis ci-dessus ou à leur place.</translation>
     </message>
     <message>
@@ -56,8 +56,8 @@
         <translation>Un dossier où sont cherchés les fichiers du catalogue, au lieu de fichiers.</translation>
     </message>
     <message>
-        <source>A large city takes minutes. What is known already is not computed again.</source>
-        <translation>Une grande ville prend des minutes. Ce qui est déjà connu n’est pas recalculé.</translation>
+        <source>A large city takes minutes. Results that exist are not computed again.</source>
+        <translation>Une grande ville prend des minutes. Les résultats existants ne sont pas recalculés.</translation>
     </message>
     <message>
         <source>A page for the browser with the chances and the candidates.</source>
@@ -72,12 +72,12 @@
         <translation>Une page pour le navigateur : requêtes réussies et manquées, et où elles échouent.</translation>
     </message>
     <message>
-        <source>A query counts as found if its best place is as near as this to the true one.</source>
+        <source>A query counts as found if its best place is at most this far from the true place.</source>
         <translation>Une requête compte comme trouvée si son meilleur lieu est à cette distance au plus du vrai.</translation>
     </message>
     <message>
-        <source>A query is right if one of so many is.</source>
-        <translation>Une requête est juste si l’un d’autant de candidats l’est.</translation>
+        <source>A query counts as right if one of this many candidates is right.</source>
+        <translation>Une requête est juste si l’un de ces premiers candidats est juste.</translation>
     </message>
     <message>
         <source>A vector file of any format.</source>
@@ -108,7 +108,7 @@
         <translation>Réponse</translation>
     </message>
     <message>
-        <source>Applies new street objects to a database: only the cells that see a change are made anew. The layers of the new objects take the place of those in the database.</source>
+        <source>Applies new street objects to a database: only the cells that see a change are computed again. The layers of the new objects replace the same layers of the database.</source>
         <translation>Applique de nouveaux objets de rue à une base : seules les cellules qui voient un changement sont recalculées. Les couches des nouveaux objets remplacent celles de la base.</translation>
     </message>
     <message>
@@ -136,6 +136,10 @@
         <translation>Les emprises de bâtiments à écrire aussi. « Construire la base de signatures » cache ce qui est derrière.</translation>
     </message>
     <message>
+        <source>Building footprints; objects behind them are not seen.</source>
+        <translation>Emprises de bâtiments ; les objets derrière elles ne se voient pas.</translation>
+    </message>
+    <message>
         <source>Buildings</source>
         <translation>Bâtiments</translation>
     </message>
@@ -152,8 +156,8 @@
         <translation>Annuler</translation>
     </message>
     <message>
-        <source>Cancelled; what was there before is as it was.</source>
-        <translation>Annulé ; ce qui était là est resté tel quel.</translation>
+        <source>Cancelled; the previous state was not changed.</source>
+        <translation>Annulé ; l’état précédent n’a pas changé.</translation>
     </message>
     <message>
         <source>Candidates</source>
@@ -176,15 +180,15 @@
         <translation>Catalogues</translation>
     </message>
     <message>
-        <source>Cell {cell} sees {types}; {alike} other cells see the same types.</source>
-        <translation>La cellule {cell} voit {types} ; {alike} autres cellules voient les mêmes types.</translation>
+        <source>Cell {cell} sees {types}; {count} other cells see the same types.</source>
+        <translation>La cellule {cell} voit {types} ; {count} autres cellules voient les mêmes types.</translation>
     </message>
     <message>
         <source>Cells</source>
         <translation>Cellules</translation>
     </message>
     <message>
-        <source>Cells that see nothing are left out. Beside the database a folder appears with the street objects, ready to be searched; keep it there.</source>
+        <source>Cells that see nothing are left out. A folder with the street objects, ready to be searched, is written next to the database; keep it there.</source>
         <translation>Les cellules qui ne voient rien sont omises. À côté de la base apparaît un dossier avec les objets de rue ; laissez-le là.</translation>
     </message>
     <message>
@@ -204,7 +208,7 @@
         <translation>Probabilité</translation>
     </message>
     <message>
-        <source>Chance that the regions hold</source>
+        <source>Chance that the regions contain</source>
         <translation>Probabilité contenue dans les régions</translation>
     </message>
     <message>
@@ -216,8 +220,8 @@
         <translation>Choisissez une base de signatures et ouvrez-la.</translation>
     </message>
     <message>
-        <source>Choose what you see, and click its direction in the wheel. A click takes it away.</source>
-        <translation>Choisissez ce que vous voyez, puis cliquez sa direction dans la roue. Un clic dessus l’enlève.</translation>
+        <source>Choose what you see, and click its direction in the dial. Click an object to remove it.</source>
+        <translation>Choisissez ce que vous voyez, puis cliquez sa direction dans le cadran. Un clic sur un objet l’enlève.</translation>
     </message>
     <message>
         <source>Clear</source>
@@ -244,12 +248,16 @@
         <translation>Détecteur</translation>
     </message>
     <message>
+        <source>Distance around their cells that is searched as well.</source>
+        <translation>Distance autour de leurs cellules où l’on cherche aussi.</translation>
+    </message>
+    <message>
         <source>Distortion</source>
         <translation>Distorsion</translation>
     </message>
     <message>
-        <source>Divides the city into square cells and notes for each which street objects are seen from its centre, clockwise from north: its signature. That is what queries are compared with.</source>
-        <translation>Découpe la ville en cellules carrées et note pour chacune quels objets de rue se voient de son centre, à partir du nord dans le sens des aiguilles d’une montre : sa signature. C’est à elle que les requêtes sont comparées.</translation>
+        <source>Divides the city into square cells and stores for each which street objects are seen from its centre, clockwise from north: its signature. Queries are compared with these signatures.</source>
+        <translation>Découpe la ville en cellules carrées et enregistre pour chacune quels objets de rue se voient de son centre, à partir du nord dans le sens des aiguilles d’une montre : sa signature. Les requêtes sont comparées à ces signatures.</translation>
     </message>
     <message>
         <source>Download OpenStreetMap for this canvas</source>
@@ -264,8 +272,8 @@
         <translation>Télécharge les objets de rue d’une ville : par son nom, ou dans les polygones d’une couche. Un catalogue dit d’où : OpenStreetMap a tous les lieux ; le portail d’une ville en sait plus sur elle.</translation>
     </message>
     <message>
-        <source>Drafts a catalogue for a file of your own: which column says what an object is, and which class of street objects each of its values may be. Look through the draft in a text editor, mend it, and give it to “Load street objects” as a catalogue of your own.</source>
-        <translation>Esquisse un catalogue pour un fichier à vous : quelle colonne dit ce qu’est un objet, et quelle classe d’objets de rue chacune de ses valeurs peut être. Relisez l’esquisse dans un éditeur de texte, corrigez-la, et donnez-la à « Charger les objets de rue » comme votre propre catalogue.</translation>
+        <source>Drafts a catalogue for a file of your own: which column contains the kind of an object, and which class of street objects each of its values may be. Check and correct the draft in a text editor, and give it to “Load street objects” as a catalogue of your own.</source>
+        <translation>Esquisse un catalogue pour un fichier à vous : quelle colonne contient le genre d’un objet, et quelle classe d’objets de rue chacune de ses valeurs peut être. Relisez et corrigez l’esquisse dans un éditeur de texte, et donnez-la à « Charger les objets de rue » comme votre propre catalogue.</translation>
     </message>
     <message>
         <source>Engine of Semantic signatures</source>
@@ -276,8 +284,8 @@
         <translation>Moteur…</translation>
     </message>
     <message>
-        <source>Every cell, those outside the buildings, or along the streets and outside them.</source>
-        <translation>Toutes les cellules, celles hors des bâtiments, ou celles le long des rues et hors des bâtiments.</translation>
+        <source>Every cell, outdoor cells, or outdoor cells near streets.</source>
+        <translation>Toutes les cellules, les cellules hors des bâtiments, ou les cellules près des rues et hors des bâtiments.</translation>
     </message>
     <message>
         <source>Explore a city</source>
@@ -304,6 +312,10 @@
         <translation>Trouver le lieu</translation>
     </message>
     <message>
+        <source>Finds where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types without bearings, or bearings without types, are enough.</source>
+        <translation>Trouve d’où dans la ville une vue a été prise : ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, est comparé à la signature de chaque cellule. Des types sans azimuts ou des azimuts sans types suffisent.</translation>
+    </message>
+    <message>
         <source>Folder</source>
         <translation>Dossier</translation>
     </message>
@@ -324,10 +336,6 @@
         <translation>Le dossier où écrire.</translation>
     </message>
     <message>
-        <source>Footprints: what they hide is not seen.</source>
-        <translation>Emprises : ce qu’elles cachent ne se voit pas.</translation>
-    </message>
-    <message>
         <source>For files that do not state theirs.</source>
         <translation>Pour les fichiers qui n’indiquent pas le leur.</translation>
     </message>
@@ -338,10 +346,6 @@
     <message>
         <source>Found: the place is within {metres} m with a chance of {chance}.</source>
         <translation>Trouvé : le lieu est à moins de {metres} m avec une probabilité de {chance}.</translation>
-    </message>
-    <message>
-        <source>From how far an object is seen, unless the catalogue says it of its class.</source>
-        <translation>De quelle distance un objet se voit, si le catalogue ne le dit pas pour sa classe.</translation>
     </message>
     <message>
         <source>From the true to the best place</source>
@@ -356,12 +360,8 @@
         <translation>Aide</translation>
     </message>
     <message>
-        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by how many objects must be added, taken away or exchanged to turn one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells whose types fit best. histogram+histogram: by how often each type and each angle occurs, whatever the order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by the types or the angles alone.</source>
+        <source>How cells are compared with a query. likelihood: by the chance that a detector sees the query from there. edit+edit: by the number of objects to add, remove or exchange to change one sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % of the cells with the best types. histogram+histogram: by how often each type and each angle occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. types:edit and angles:edit: as edit+edit, by only the types or only the angles.</source>
         <translation>Comment les cellules sont comparées à une requête. likelihood : par la probabilité qu’un détecteur voie la requête de là. edit+edit : par le nombre d’objets à ajouter, à ôter ou à échanger pour changer une suite en l’autre, en moyenne des types et des angles. edit+edit:5% : de même, parmi les 5 % des cellules dont les types correspondent le mieux. histogram+histogram : par le nombre de fois que chaque type et chaque angle apparaît, quel que soit l’ordre. jaccard+jaccard : par les types et les angles qui apparaissent. types:edit et angles:edit : comme edit+edit, par les types ou les angles seuls.</translation>
-    </message>
-    <message>
-        <source>How many are asked.</source>
-        <translation>Combien sont posées.</translation>
     </message>
     <message>
         <source>How many cells to list.</source>
@@ -372,16 +372,16 @@
         <translation>Sur combien d’objets le détecteur se trompe : aucun, 1, 7 ou 13.</translation>
     </message>
     <message>
+        <source>How many queries are asked.</source>
+        <translation>Combien de requêtes sont posées.</translation>
+    </message>
+    <message>
         <source>How much of what is seen will be wrong: light, medium, strong, or generic where that is not known, by-hand for what a person notes down.</source>
         <translation>Combien de ce qui est vu sera faux : light (peu), medium (moyen), strong (beaucoup), ou generic quand on ne le sait pas ; by-hand pour ce qu’une personne note.</translation>
     </message>
     <message>
-        <source>If “Where queries can be placed” was run, what it found goes with the cells.</source>
-        <translation>Si « Où les requêtes peuvent être situées » a été exécuté, ce qu’il a trouvé accompagne les cellules.</translation>
-    </message>
-    <message>
-        <source>In how many equal sectors the methods of the paper compare bearings. More of them tell cells apart better, and forgive less where bearings are off.</source>
-        <translation>En combien de secteurs égaux les méthodes de l’article comparent les azimuts. Plus il y en a, mieux les cellules se distinguent, et moins les azimuts faux sont pardonnés.</translation>
+        <source>If “Where queries can be placed” was run, its results are written with the cells.</source>
+        <translation>Si « Où les requêtes peuvent être situées » a été exécuté, ses résultats accompagnent les cellules.</translation>
     </message>
     <message>
         <source>Install</source>
@@ -400,12 +400,16 @@
         <translation>Son carré, ou son centre.</translation>
     </message>
     <message>
+        <source>Largest distance from which an object is seen, unless the catalogue gives one for its class.</source>
+        <translation>Plus grande distance d’où un objet se voit, si le catalogue n’en donne pas pour sa classe.</translation>
+    </message>
+    <message>
         <source>Looking for Python...</source>
         <translation>Recherche de Python…</translation>
     </message>
     <message>
-        <source>Makes up a small city, builds its database, asks it, and shows what came out: for trying things, without any data or network. The folder holds city.parquet for the other tools.</source>
-        <translation>Invente une petite ville, construit sa base, l’interroge et montre le résultat : pour essayer, sans données ni réseau. Le dossier contient city.parquet pour les autres outils.</translation>
+        <source>Makes up a small city, builds its database, evaluates queries and shows the results: to try the tools without data or a network. The folder contains city.parquet for the other tools.</source>
+        <translation>Invente une petite ville, construit sa base, évalue des requêtes et montre les résultats : pour essayer, sans données ni réseau. Le dossier contient city.parquet pour les autres outils.</translation>
     </message>
     <message>
         <source>Map page</source>
@@ -420,12 +424,12 @@
         <translation>Méthode</translation>
     </message>
     <message>
-        <source>Name of a city or quarter, such as Gentilly, France.</source>
-        <translation>Nom d’une ville ou d’un quartier, comme Gentilly, France.</translation>
+        <source>More distortions of a query, separated by commas, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
+        <translation>D’autres distorsions d’une requête, séparées par des virgules, comme compass:10,view:90 (une boussole fausse de 10°, un champ de vision de 90°).</translation>
     </message>
     <message>
-        <source>New ones: the file that “Load street objects” or a download wrote.</source>
-        <translation>Les nouveaux : le fichier qu’a écrit « Charger les objets de rue » ou un téléchargement.</translation>
+        <source>Name of a city or quarter, such as Gentilly, France.</source>
+        <translation>Nom d’une ville ou d’un quartier, comme Gentilly, France.</translation>
     </message>
     <message>
         <source>North</source>
@@ -442,6 +446,10 @@
     <message>
         <source>Number of candidates</source>
         <translation>Nombre de candidats</translation>
+    </message>
+    <message>
+        <source>Number of equal sectors in which the methods of the paper compare bearings. More sectors distinguish cells better, but tolerate smaller errors of bearings.</source>
+        <translation>Nombre de secteurs égaux dans lesquels les méthodes de l’article comparent les azimuts. Plus de secteurs distinguent mieux les cellules, mais tolèrent des erreurs d’azimut plus petites.</translation>
     </message>
     <message>
         <source>Number of queries</source>
@@ -474,6 +482,10 @@
     <message>
         <source>Polygons that the cells must lie in.</source>
         <translation>Polygones où doivent se trouver les cellules.</translation>
+    </message>
+    <message>
+        <source>Predicts for every cell how likely a query from there will be found, and which other cells it may be confused with. A street with three lamps looks like thousands of others; this tool shows them.</source>
+        <translation>Prédit pour chaque cellule avec quelle probabilité une requête faite là sera située, et avec quelles autres cellules elle peut être confondue. Une rue avec trois lampadaires ressemble à des milliers d’autres ; cet outil les montre.</translation>
     </message>
     <message>
         <source>Python (3.11 or newer)</source>
@@ -520,11 +532,11 @@
         <translation>Signatures sémantiques</translation>
     </message>
     <message>
-        <source>Shows how many cells see the same types in the same order: a cell alone can be told at once, one of a thousand cannot. “Where queries can be placed” tells more, and takes longer.</source>
-        <translation>Montre combien de cellules voient les mêmes types dans le même ordre : une cellule seule se reconnaît aussitôt, une parmi mille non. « Où les requêtes peuvent être situées » en dit plus, et prend plus de temps.</translation>
+        <source>Shows how many cells see the same types in the same order: a unique cell can be identified at once, one of a thousand cannot. “Where queries can be placed” gives more detail, and takes longer.</source>
+        <translation>Montre combien de cellules voient les mêmes types dans le même ordre : une cellule unique se reconnaît aussitôt, une parmi mille non. « Où les requêtes peuvent être situées » en dit plus, et prend plus de temps.</translation>
     </message>
     <message>
-        <source>Shows what is seen from a cell, and the cells most like it.</source>
+        <source>Shows what is seen from a cell, and the most similar cells.</source>
         <translation>Montre ce que l’on voit d’une cellule, et les cellules qui lui ressemblent le plus.</translation>
     </message>
     <message>
@@ -538,10 +550,6 @@
     <message>
         <source>Signature databases (*.parquet)</source>
         <translation>Bases de signatures (*.parquet)</translation>
-    </message>
-    <message>
-        <source>So far around their cells is searched too.</source>
-        <translation>On cherche aussi jusqu’à cette distance autour de leurs cellules.</translation>
     </message>
     <message>
         <source>Some square kilometres take seconds to minutes. What was downloaded before is taken from the cache. The server is a setting: Settings &gt; Options &gt; Processing &gt; Providers &gt; Semantic signatures.</source>
@@ -572,20 +580,16 @@
         <translation>Symboles de ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, comme DDBL ; ? pour un inconnu. Ceux de l’article : B arbre, C fontaine, D lampadaire, E indicateur, G feu de circulation, H station de vélos, I toilettes publiques, J autopartage, K station de taxis, L banc, M arrêt de bus ; un catalogue peut en avoir d’autres.</translation>
     </message>
     <message>
-        <source>Tells of every cell, before any query, how likely one from there will be found, and for which other cells it will be taken. A street with three lamps looks like thousands of others; here they are.</source>
-        <translation>Dit pour chaque cellule, avant toute requête, avec quelle probabilité une requête faite là sera située, et pour quelles autres cellules elle sera prise. Une rue avec trois lampadaires ressemble à des milliers d’autres ; les voici.</translation>
-    </message>
-    <message>
-        <source>Tells where in the city a view was taken from: what is seen, clockwise from north, is compared with the signature of every cell. Types alone or bearings alone are fine.</source>
-        <translation>Dit d’où dans la ville une vue a été prise : ce qui se voit, à partir du nord dans le sens des aiguilles d’une montre, est comparé à la signature de chaque cellule. Des types seuls ou des azimuts seuls suffisent.</translation>
-    </message>
-    <message>
         <source>The GeoPackage to write.</source>
         <translation>Le GeoPackage à écrire.</translation>
     </message>
     <message>
         <source>The best cells.</source>
         <translation>Les meilleures cellules.</translation>
+    </message>
+    <message>
+        <source>The catalogues of the files. With several, objects that two of them contain are merged; the first is treated as the best source.</source>
+        <translation>Les catalogues des fichiers. S’il y en a plusieurs, les objets communs sont fusionnés ; le premier passe pour la meilleure source.</translation>
     </message>
     <message>
         <source>The cells and the street objects as layers, in a GeoPackage.</source>
@@ -596,12 +600,8 @@
         <translation>Les cellules selon leur probabilité, dans un GeoPackage.</translation>
     </message>
     <message>
-        <source>The cells that a view from here would be taken for, by chance:</source>
-        <translation>Les cellules pour lesquelles une vue d’ici serait prise, par probabilité :</translation>
-    </message>
-    <message>
-        <source>The database gets columns that say so, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click what a cell is taken for.</source>
-        <translation>La base reçoit des colonnes qui le disent, et les cellules sont montrées selon leur probabilité. La page de carte, qui s’ouvre dans un navigateur, montre d’un clic pour quoi une cellule est prise.</translation>
+        <source>The cells that a view from here may be confused with, by chance:</source>
+        <translation>Les cellules avec lesquelles une vue d’ici peut être confondue, par probabilité :</translation>
     </message>
     <message>
         <source>The database to write.</source>
@@ -610,6 +610,10 @@
     <message>
         <source>The database to write. A temporary file is lost when QGIS is closed.</source>
         <translation>La base à écrire. Un fichier temporaire est perdu à la fermeture de QGIS.</translation>
+    </message>
+    <message>
+        <source>The direction of each object, in degrees clockwise from north, separated by commas, such as 10,80,200,310.</source>
+        <translation>La direction de chaque objet, en degrés à partir du nord dans le sens des aiguilles d’une montre, séparées par des virgules, comme 10,80,200,310.</translation>
     </message>
     <message>
         <source>The draft to write.</source>
@@ -640,6 +644,10 @@
         <translation>Le moteur a été supprimé.</translation>
     </message>
     <message>
+        <source>The extent to download; by default the extent of the canvas.</source>
+        <translation>L’emprise à télécharger ; par défaut l’emprise de la carte.</translation>
+    </message>
+    <message>
         <source>The file that “Build signature database” wrote.</source>
         <translation>Le fichier qu’a écrit « Construire la base de signatures ».</translation>
     </message>
@@ -652,20 +660,28 @@
         <translation>Le fichier qu’a écrit « Charger les objets de rue ».</translation>
     </message>
     <message>
-        <source>The likelihood method gives each candidate a chance, tells the place between the middles of the cells with its uncertainty, and says when it cannot tell. The other methods are those of the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
-        <translation>La méthode likelihood donne à chaque candidat une probabilité, dit le lieu entre les centres des cellules avec son incertitude, et dit quand elle ne sait pas. Les autres méthodes sont celles de l’article ; elles classent les cellules par une distance, et les cellules de même aspect partagent un rang.</translation>
+        <source>The likelihood method gives each candidate a chance, estimates the place between the centres of cells with its uncertainty, and reports when it cannot decide. The other methods are from the paper; they rank cells by a distance, and cells that look the same share a rank.</source>
+        <translation>La méthode likelihood donne à chaque candidat une probabilité, estime le lieu entre les centres des cellules avec son incertitude, et signale quand elle ne peut pas décider. Les autres méthodes sont celles de l’article ; elles classent les cellules par une distance, et les cellules de même aspect partagent un rang.</translation>
     </message>
     <message>
-        <source>The log has a table of the results; the folder has them for other programs, the layers and the map page for the eye.</source>
-        <translation>Le journal contient un tableau des résultats ; le dossier les contient pour d’autres programmes, les couches et la page de carte sont pour l’œil.</translation>
+        <source>The log has a table of the results; the folder contains them for other programs, and the layers and the map page show them.</source>
+        <translation>Le journal contient un tableau des résultats ; le dossier les contient pour d’autres programmes, les couches et la page de carte les montrent.</translation>
     </message>
     <message>
-        <source>The log tells what became of every row: how many are objects, how many were left out, and why.</source>
-        <translation>Le journal dit ce qu’est devenue chaque ligne : combien sont des objets, combien ont été omises, et pourquoi.</translation>
+        <source>The log reports how many rows became objects, how many were left out, and why.</source>
+        <translation>Le journal indique combien de lignes sont devenues des objets, combien ont été omises, et pourquoi.</translation>
     </message>
     <message>
-        <source>The paper of Weng, Gouet-Brunet and Soheilian has 10 m.</source>
+        <source>The new objects: the file that “Load street objects” or a download wrote.</source>
+        <translation>Les nouveaux objets : le fichier qu’a écrit « Charger les objets de rue » ou un téléchargement.</translation>
+    </message>
+    <message>
+        <source>The paper of Weng, Gouet-Brunet and Soheilian uses 10 m.</source>
         <translation>L’article de Weng, Gouet-Brunet et Soheilian prend 10 m.</translation>
+    </message>
+    <message>
+        <source>The parts of the city to search for the query, in a GeoPackage.</source>
+        <translation>Les parties de la ville où chercher pour la requête, dans un GeoPackage.</translation>
     </message>
     <message>
         <source>The queries at their true places, and lines to the places that were found, in a GeoPackage.</source>
@@ -674,6 +690,10 @@
     <message>
         <source>The queries, their errors and a summary, for other programs.</source>
         <translation>Les requêtes, leurs erreurs et un résumé, pour d’autres programmes.</translation>
+    </message>
+    <message>
+        <source>The results become columns of the database, and the cells are shown by their chance. The map page, which opens in a browser, shows on a click which cells a cell may be confused with.</source>
+        <translation>Les résultats deviennent des colonnes de la base, et les cellules sont montrées selon leur probabilité. La page de carte, qui s’ouvre dans un navigateur, montre d’un clic avec quelles cellules une cellule peut être confondue.</translation>
     </message>
     <message>
         <source>The semsig command (leave empty to look for it)</source>
@@ -716,26 +736,6 @@
         <translation>Portée de visibilité (m)</translation>
     </message>
     <message>
-        <source>What else happens to a query, with commas between, such as compass:10,view:90 (a compass that is off by 10°, a view of 90°).</source>
-        <translation>Ce qui arrive encore à une requête, séparé par des virgules, comme compass:10,view:90 (une boussole fausse de 10°, un champ de vision de 90°).</translation>
-    </message>
-    <message>
-        <source>What is downloaded; that of the canvas by default.</source>
-        <translation>Ce qui est téléchargé ; par défaut l’emprise de la carte.</translation>
-    </message>
-    <message>
-        <source>What of the city must be searched for the query, in a GeoPackage.</source>
-        <translation>Ce qu’il faut chercher de la ville pour la requête, dans un GeoPackage.</translation>
-    </message>
-    <message>
-        <source>What the files hold. With several, objects that two of them have are merged; the first is treated as the best source.</source>
-        <translation>Ce que contiennent les fichiers. S’il y en a plusieurs, les objets communs sont fusionnés ; le premier passe pour la meilleure source.</translation>
-    </message>
-    <message>
-        <source>Where each is seen, in degrees clockwise from north, with commas between them, such as 10,80,200,310.</source>
-        <translation>Dans quelle direction chacun se voit, en degrés à partir du nord dans le sens des aiguilles d’une montre, séparés par des virgules, comme 10,80,200,310.</translation>
-    </message>
-    <message>
         <source>Where the data come from.</source>
         <translation>D’où viennent les données.</translation>
     </message>
@@ -760,8 +760,8 @@
         <translation>Avec likelihood : l’ellipse où se trouve le lieu avec une probabilité de 90 %, si la réponse est juste.</translation>
     </message>
     <message>
-        <source>With likelihood: they are as large as needed for that, 0.9 by default.</source>
-        <translation>Avec likelihood : elles sont aussi grandes qu’il le faut pour cela, 0,9 par défaut.</translation>
+        <source>With likelihood: the regions are as large as needed to contain this chance, 0.9 by default.</source>
+        <translation>Avec likelihood : les régions sont aussi grandes qu’il le faut pour contenir cette probabilité, 0,9 par défaut.</translation>
     </message>
     <message>
         <source>Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and how many other cells look the same; with the street objects, these become a second layer.</source>

@@ -1,4 +1,4 @@
-"""What the algorithms share: how they call the command, and their common parameters."""
+"""The base class of the algorithms, which calls the command, and their common parameters."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from . import settings
 from .answers import log_text
 from .arguments import check_output
 from .command import Cancelled, CommandError, Watcher, run_command
-from .results import gather
-from .words import tr
+from .results import move_to_group
+from .translation import tr
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingFeedback, QgsProject
@@ -63,13 +63,13 @@ __all__ = [
 HERE = Path(__file__).parent
 PARQUET = "GeoParquet (*.parquet)"
 REGIONS = "Regions to search"
-"""What the layer of regions is called."""
-# How QGIS names what is no file, such as memory: or postgres: (a disk of Windows has one letter).
+"""Title of the layer of regions."""
+# How the paths of layers that are not in a file begin, such as memory: (but not C: of Windows).
 NO_FILE = re.compile(r"\w\w+:")
 
 
 class SemsigAlgorithm(QgsProcessingAlgorithm):
-    """An algorithm that runs the command; a subclass says what it is called and what it does."""
+    """An algorithm that runs the command; subclasses define its names, parameters and work."""
 
     NAME = ""
     TITLE = ""
@@ -79,7 +79,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     # The names of these methods are those of QGIS.
 
     def createInstance(self) -> SemsigAlgorithm:  # noqa: N802
-        """Return a new one of the same kind."""
+        """Return a new instance."""
         return type(self)()
 
     def name(self) -> str:
@@ -91,7 +91,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         return tr(self.TITLE)
 
     def tags(self) -> list[str]:
-        """Return further words by which it is found."""
+        """Return more words for the search in the toolbox."""
         return list(self.TAGS)
 
     def icon(self) -> QIcon:
@@ -99,22 +99,24 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         return QIcon(self.svgIconPath())
 
     def svgIconPath(self) -> str:  # noqa: N802
-        """Return where the icon is."""
+        """Return the path of the icon."""
         return settings.icon_path()
 
     def shortHelpString(self) -> str:  # noqa: N802
-        """Return what it does, and what each parameter means."""
+        """Return the help of the tool and of its parameters, in HTML."""
         parts = [
-            *(tr(" ".join(part.split())) for part in self.HELP.split("\n\n")),  # breaks would show
             *(
-                f"<b>{one.description()}</b><br>{html.escape(one.help())}"
-                for one in self.parameterDefinitions()
+                tr(" ".join(part.split())) for part in self.HELP.split("\n\n")
+            ),  # line breaks would be shown
+            *(
+                f"<b>{parameter.description()}</b><br>{html.escape(parameter.help())}"
+                for parameter in self.parameterDefinitions()
             ),
         ]
         return "".join(f"<p>{part}</p>" for part in parts)
 
     def canExecute(self) -> tuple[bool, str]:  # noqa: N802
-        """Tell whether the command is there, and what to do if not."""
+        """Whether the command exists, and what to do if not."""
         try:
             settings.command()
         except CommandError as error:
@@ -122,12 +124,12 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         return True, ""
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802, ARG002
-        """Say what goes in and out."""
+        """Add the parameters."""
         for parameter in self.definitions():
             self.addParameter(parameter)
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         raise NotImplementedError
 
     def processAlgorithm(  # noqa: N802
@@ -136,7 +138,7 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        """Do the work; what goes wrong is told in one sentence."""
+        """Run the algorithm; raise QgsProcessingException with one sentence if it fails."""
         try:
             self._check_outputs(parameters, context)
             return self.work(parameters, context, feedback)
@@ -152,11 +154,11 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        """Do the work and return the outputs by their names."""
+        """Run the command and return the outputs by their names."""
         raise NotImplementedError
 
     def _check_outputs(self, parameters: dict[str, Any], context: QgsProcessingContext) -> None:
-        """Refuse outputs that cannot be written, however late they are."""
+        """Raise CommandError before the work if an output cannot be written."""
         for output in self.destinationParameterDefinitions():
             if isinstance(output, QgsProcessingParameterFeatureSink):
                 path = self.sink_file(parameters, output.name(), context)
@@ -170,13 +172,13 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
     def call(
         self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None = None
     ) -> str:
-        """Run the command, which may write a file, and return what it prints."""
-        told = ""
+        """Run the command, which may write a file, and return its standard output."""
+        last_label = ""
 
         def progress(percent: int, label: str) -> None:
-            nonlocal told
-            if label != told:  # each time is a line in the log
-                told = label
+            nonlocal last_label
+            if label != last_label:  # each call adds a line to the log
+                last_label = label
                 feedback.setProgressText(label[:1].upper() + label[1:])
             feedback.setProgress(percent)
 
@@ -186,29 +188,29 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
             [settings.command(), *arguments], settings.environment(), watcher, written=written
         )
 
-    def tell(
+    def execute(
         self, arguments: list[str], feedback: QgsProcessingFeedback, written: str | None = None
     ) -> None:
-        """Run the command, which may write a file, and show what it prints."""
+        """Run the command, which may write a file, and show its standard output in the log."""
         feedback.pushConsoleInfo(log_text(self.call(arguments, feedback, written)))
 
     def file(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
-        """Return the path of a file to read, or nothing."""
+        """Return the path of a file to read; empty if not set."""
         return str(self.parameterAsFile(parameters, name, context))
 
     def file_out(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
-        """Return the path of a file to write, or nothing."""
+        """Return the path of a file to write; empty if not set."""
         return str(self.parameterAsFileOutput(parameters, name, context))
 
     def sink_file(
         self, parameters: dict[str, Any], name: str, context: QgsProcessingContext
     ) -> str:
-        """Return the path of a layer that QGIS itself writes, or nothing if it is in no file."""
+        """Return the path of a layer that QGIS itself writes; empty if it is not in a file."""
         path = self.file_out(parameters, name, context)
         return "" if NO_FILE.match(path) else path
 
     def text(self, parameters: dict[str, Any], name: str, context: QgsProcessingContext) -> str:
-        """Return what was chosen or typed, or nothing."""
+        """Return the choice or text of a parameter; empty if not set."""
         definition = self.parameterDefinition(name)
         if isinstance(definition, QgsProcessingParameterEnum):
             return str(self.parameterAsEnumString(parameters, name, context))
@@ -221,10 +223,10 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> str:
-        """Return a file with the polygons of a layer, or nothing."""
+        """Return the path of a file with the polygons of a layer; empty if not set."""
         if self.parameterAsVectorLayer(parameters, name, context) is None:
             return ""
-        # Not GeoPackages: of those the command could not tell which layer is meant.
+        # Not GeoPackages: the command does not know which of their layers to read.
         formats = ["shp", "geojson"]
         return str(
             self.parameterAsCompatibleSourceLayerPath(
@@ -236,29 +238,29 @@ class SemsigAlgorithm(QgsProcessingAlgorithm):
 def show_layers(
     context: QgsProcessingContext, path: str, titles: dict[str, str], *, group: str
 ) -> str:
-    """Let layers of a GeoPackage be shown, where the user wishes to see the file.
+    """Show the layers of a GeoPackage, if the user wants to see the file.
 
     Parameters
     ----------
     context : QgsProcessingContext
-        Where the file is listed if it shall be shown.
+        Contains the file if it is to be shown.
     path : str
         The file.
     titles : dict of str to str
-        What its layers are called.
+        Titles of its layers, by their names.
     group : str
-        The group of layers that they are put into.
+        Title of the group for the layers.
 
     Returns
     -------
     str
-        The first of the layers, as QGIS names it.
+        The source of the first layer, in the notation of QGIS.
     """
-    listed = context.layersToLoadOnCompletion()
-    wished = listed.pop(path, None)
-    if wished is not None:
-        context.setLayersToLoadOnCompletion(listed)
-        add_layers(context, path, titles, group=group, project=wished.project)
+    layers = context.layersToLoadOnCompletion()
+    details = layers.pop(path, None)
+    if details is not None:
+        context.setLayersToLoadOnCompletion(layers)
+        add_layers(context, path, titles, group=group, project=details.project)
     return _source(path, next(iter(titles)))
 
 
@@ -270,23 +272,23 @@ def add_layers(
     group: str,
     project: QgsProject | None = None,
 ) -> None:
-    """Let layers of a GeoPackage be shown.
+    """Show the layers of a GeoPackage.
 
     Parameters
     ----------
     context : QgsProcessingContext
-        Where they are listed.
+        The context of the run.
     path : str
         The file.
     titles : dict of str to str
-        What its layers are called, the lowest first.
+        Titles of its layers by their names, the lowest first.
     group : str
-        The group of layers that they are put into.
+        Title of the group for the layers.
     project : QgsProject, optional
-        Where they are shown; in that of the context by default.
+        The project that shows them; the project of the context by default.
     """
     project = project or context.project()
-    if project is None:  # nobody looks
+    if project is None:  # there is no window
         return
     for layer, title in titles.items():
         details = QgsProcessingContext.LayerDetails(tr(title), project, title)
@@ -295,15 +297,15 @@ def add_layers(
 
 
 def _source(path: str, layer: str) -> str:
-    """Return how QGIS names a layer of a GeoPackage."""
-    # It loads layers in the order of these texts, each above the one before: points belong above
-    # lines, and capitals, which it does not mind, come first.
+    """Return the source of a layer of a GeoPackage, in the notation of QGIS."""
+    # QGIS loads layers in alphabetical order of these texts, each above the one before. It ignores
+    # the case of the key, and capitals come first, so lines are loaded below points.
     word = "LAYERNAME" if layer.endswith("_lines") else "layername"
     return f"{path}|{word}={layer}"
 
 
 class _Styler(QgsProcessingLayerPostProcessorInterface):
-    """Gives a layer its style once it is loaded: one of ours, or that of its GeoPackage."""
+    """Applies a style to a layer after it is loaded: from the plugin, or from its GeoPackage."""
 
     def __init__(self, name: str, group: str) -> None:
         super().__init__()
@@ -315,57 +317,57 @@ class _Styler(QgsProcessingLayerPostProcessorInterface):
         _context: QgsProcessingContext,
         _feedback: QgsProcessingFeedback,
     ) -> None:
-        """Give the layer its style; Processing itself does not even load the default one."""
-        # It may be in the project already, with the file open that was there before.
+        """Apply the style, since Processing does not load the default one."""
+        # The layer may be in the project already, with the previous version of the file open.
         layer.dataProvider().reloadData()
         if self.name:
             load_style(layer, self.name)
         else:
             layer.loadDefaultStyle()
-        if layer.name() == tr(REGIONS):  # what is below shines through
+        if layer.name() == tr(REGIONS):  # layers below stay visible
             layer.setBlendMode(QPainter.CompositionMode.CompositionMode_Multiply)
         layer.triggerRepaint()
-        gather(layer.id(), self.group)
+        move_to_group(layer.id(), self.group)
 
 
 def _styler(name: str = "", *, group: str) -> _Styler:
-    """Return a styler for one layer; QGIS deletes it after use, but does not keep it until then."""
-    made = _Styler(name, tr(group).lstrip("0123456789. "))
-    _STYLERS.append(made)
-    return made
+    """Return a styler for one layer, and keep a reference, since QGIS does not."""
+    styler = _Styler(name, tr(group).lstrip("0123456789. "))
+    _STYLERS.append(styler)
+    return styler
 
 
-# Enough for all layers that are being made at a time.
+# More than there are layers at a time; QGIS deletes stylers after use.
 _STYLERS: deque[_Styler] = deque(maxlen=1000)
 
 
 def style_layer(context: QgsProcessingContext, source: str, style: str, *, group: str) -> None:
-    """Let a layer have a style of ours, where the user wishes to see it.
+    """Apply a style of the plugin to a layer, if the user wants to see it.
 
     Parameters
     ----------
     context : QgsProcessingContext
-        Where it is listed if it shall be shown.
+        Contains the layer if it is to be shown.
     source : str
         The layer.
     style : str
-        Name of the style's file, without its ending.
+        Name of the style's file, without its suffix.
     group : str
-        The group of layers that it is put into.
+        Title of the group for the layer.
     """
     if context.willLoadLayerOnCompletion(source):
         context.layerToLoadOnCompletionDetails(source).setPostProcessor(_styler(style, group=group))
 
 
 def keep_style(source: str, style: str) -> None:
-    """Write a style of ours into the GeoPackage that a layer is in, if it is in one.
+    """Write a style of the plugin into the GeoPackage of a layer, if it is in one.
 
     Parameters
     ----------
     source : str
         The layer.
     style : str
-        Name of the style's file, without its ending.
+        Name of the style's file, without its suffix.
     """
     layer = QgsVectorLayer(source, style, "ogr")
     if layer.storageType() == "GPKG":  # a temporary layer is in no file
@@ -374,14 +376,14 @@ def keep_style(source: str, style: str) -> None:
 
 
 def load_style(layer: QgsVectorLayer, style: str) -> None:
-    """Give a layer a style of ours.
+    """Apply a style of the plugin to a layer.
 
     Parameters
     ----------
     layer : QgsVectorLayer
         The layer.
     style : str
-        Name of the style's file, without its ending.
+        Name of the style's file, without its suffix.
     """
     layer.loadNamedStyle(str(HERE / "styles" / f"{style}.qml"))
 
@@ -435,7 +437,7 @@ def area(text: str) -> QgsProcessingParameterVectorLayer:
 def choice(
     name: str, title: str, options: tuple[str, ...], text: str, *, default: str | None = None
 ) -> QgsProcessingParameterEnum:
-    """Return the parameter for one of several names; the first by default."""
+    """Return the parameter for a choice of names; the first is the default."""
     parameter = QgsProcessingParameterEnum(
         name,
         title,
@@ -449,7 +451,7 @@ def choice(
 def number(
     name: str, title: str, default: float | None, bounds: tuple[float, float], text: str
 ) -> QgsProcessingParameterNumber:
-    """Return the parameter for a number; one without a default may be left out."""
+    """Return the parameter for a number, optional if it has no default."""
     parameter = QgsProcessingParameterNumber(
         name,
         title,
@@ -481,7 +483,7 @@ def whole_number(
 def file_to_write(
     name: str, title: str, text: str, *, kind: str = PARQUET, optional: bool = False
 ) -> QgsProcessingParameterFileDestination:
-    """Return the parameter for a file to write; an optional one is not written by default."""
+    """Return the parameter for a file to write; an optional file is not written by default."""
     parameter = QgsProcessingParameterFileDestination(
         name, title, fileFilter=kind, optional=optional, createByDefault=not optional
     )

@@ -1,4 +1,4 @@
-"""What the command prints, as lines for the log and rows for layers. Nothing here imports QGIS."""
+"""Convert output of the command to lines of the log and rows of layers, without QGIS."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = [
     "ring",
 ]
 
-# Names and types as the provider of memory layers takes them, in every version of QGIS.
+# Names and types that the provider of memory layers accepts in every version of QGIS.
 CANDIDATE_FIELDS = {
     "rank": "integer",
     "rank_high": "integer",
@@ -46,9 +46,9 @@ BARS = re.compile("[┃│]")
 
 
 def log_text(printed: str) -> str:
-    """Return what the command printed, without the frames of its tables.
+    """Return the output of the command without the frames of its tables.
 
-    The log of QGIS has letters of different widths and swallows blanks, which breaks frames.
+    The log of QGIS has a proportional font and removes blanks, which breaks frames.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def log_text(printed: str) -> str:
     Returns
     -------
     str
-        The same, with the cells of a table divided by simple bars.
+        The same text, with ``|`` between the cells of a table.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def log_text(printed: str) -> str:
 
 
 def parse_answer(printed: str) -> dict[str, Any]:
-    """Return the answer that the command printed.
+    """Return the answer in the output of the command.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def parse_answer(printed: str) -> dict[str, Any]:
     Raises
     ------
     CommandError
-        If it is something else.
+        If it is not an answer.
     """
     try:
         answer: dict[str, Any] = json.loads(printed)
@@ -110,7 +110,7 @@ def parse_answer(printed: str) -> dict[str, Any]:
 
 
 def answer_lines(answer: dict[str, Any]) -> list[str]:
-    """Return what there is to say of an answer beside its layers.
+    """Return the lines of the log for an answer.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     Returns
     -------
     list of str
-        Sentences: how sure the place is, or which candidates tie; what of the query could not be
-        used as it was given; and what must be searched.
+        The chance of the place, or the ties of the candidates; notes on the query; the size of
+        the regions to search.
 
     Examples
     --------
@@ -130,17 +130,21 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     ['The best 4 cells share the ranks 1 to 4.', '3 further cells tie with the last candidate.']
     """
     place, searched = answer.get("place"), answer.get("searched")
-    lines = _tie_lines(answer) if place is None else [_verdict(answer["answered"], place)]
+    if place is None:
+        lines = _tie_lines(answer)
+    else:
+        verdict = "The place is" if answer["answered"] else "Cannot tell: the best place is"
+        within, chance = f"{place['within_m']:g} m", f"{place['chance']:.1%}"
+        lines = [f"{verdict} within {within} of the ellipse's middle with a chance of {chance}."]
     lines += [f"Note: {note}" for note in answer.get("notes", [])]
-    return lines if searched is None else [*lines, _search_line(searched)]
-
-
-def _verdict(answered: bool, place: dict[str, Any]) -> str:  # noqa: FBT001
-    verdict = "The place is" if answered else "Cannot tell: the best place is"
-    return (
-        f"{verdict} within {place['within_m']:g} m of the ellipse's middle with a chance of "
-        f"{place['chance']:.1%}."
-    )
+    if searched is not None:
+        regions = searched["regions"]
+        chance = f", with {searched['chance']:.1%} of the chance" if "chance" in searched else ""
+        lines.append(
+            f"To search: {regions:,} region{'' if regions == 1 else 's'}, "
+            f"{searched['km2']:.4g} km2, {searched['percent']:.3g} % of the city{chance}."
+        )
+    return lines
 
 
 def _tie_lines(answer: dict[str, Any]) -> list[str]:
@@ -154,15 +158,6 @@ def _tie_lines(answer: dict[str, Any]) -> list[str]:
         further = "1 further cell ties" if beyond == 1 else f"{beyond:,} further cells tie"
         lines.append(f"{further} with the last candidate.")
     return lines
-
-
-def _search_line(searched: dict[str, Any]) -> str:
-    regions = searched["regions"]
-    chance = f", with {searched['chance']:.1%} of the chance" if "chance" in searched else ""
-    return (
-        f"To search: {regions:,} region{'' if regions == 1 else 's'}, {searched['km2']:.4g} km2, "
-        f"{searched['percent']:.3g} % of the city{chance}."
-    )
 
 
 def candidate_rows(answer: dict[str, Any]) -> list[tuple[float, float, list[Any]]]:
@@ -180,19 +175,19 @@ def candidate_rows(answer: dict[str, Any]) -> list[tuple[float, float, list[Any]
     """
     return [
         (
-            one["x"],
-            one["y"],
+            candidate["x"],
+            candidate["y"],
             [
-                one.get("rank", one.get("rank_low")),
-                one.get("rank", one.get("rank_high")),
-                one["cell_id"],
-                one["types"],
-                one["length"],
-                one.get("chance"),
-                one.get("distance"),
+                candidate.get("rank", candidate.get("rank_low")),
+                candidate.get("rank", candidate.get("rank_high")),
+                candidate["cell_id"],
+                candidate["types"],
+                candidate["length"],
+                candidate.get("chance"),
+                candidate.get("distance"),
             ],
         )
-        for one in answer["candidates"]
+        for candidate in answer["candidates"]
     ]
 
 
@@ -207,8 +202,8 @@ def place_row(answer: dict[str, Any]) -> tuple[list[tuple[float, float]], list[A
     Returns
     -------
     tuple or None
-        The ellipse in which the place lies with a chance of 90 %, if the answer is right; None
-        where the method only ranks cells.
+        The ellipse that contains the place with a chance of 90 %, if the answer is right; None
+        if the method only ranks cells.
     """
     place = answer.get("place")
     if place is None:
@@ -233,21 +228,21 @@ def place_row(answer: dict[str, Any]) -> tuple[list[tuple[float, float]], list[A
 def ring(
     centre: tuple[float, float], longer: float, shorter: float, bearing: float
 ) -> list[tuple[float, float]]:
-    """Return the corners of an ellipse, the first again at the end.
+    """Return the corners of an ellipse as a closed ring.
 
     Parameters
     ----------
     centre : tuple of float
-        Its middle.
+        The centre.
     longer, shorter : float
         Half axes.
     bearing : float
-        Degrees clockwise from north of the longer one.
+        Direction of the longer axis, in degrees clockwise from north.
 
     Returns
     -------
     list of tuple
-        The corners.
+        The corners, the first again at the end.
 
     Examples
     --------
@@ -259,11 +254,12 @@ def ring(
     corners = []
     for corner in range(CORNERS):
         angle = math.tau * corner / CORNERS
-        ahead, aside = longer * math.cos(angle), shorter * math.sin(angle)
+        # The corner in the axes of the ellipse, then turned by its bearing.
+        u, v = longer * math.cos(angle), shorter * math.sin(angle)
         corners.append(
             (
-                centre[0] + ahead * along[0] + aside * across[0],
-                centre[1] + ahead * along[1] + aside * across[1],
+                centre[0] + u * along[0] + v * across[0],
+                centre[1] + u * along[1] + v * across[1],
             )
         )
     return [*corners, corners[0]]

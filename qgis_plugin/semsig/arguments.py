@@ -1,4 +1,4 @@
-"""Command lines of `semsig` from the values of parameters. Nothing here imports QGIS."""
+"""Make command lines of `semsig` from the values of parameters, without QGIS."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CATALOGS = (
 )
 FILES_ONLY = ("montpellier",)
 SERVICES = tuple(name for name in CATALOGS if name not in FILES_ONLY)
-"""Catalogues that are downloaded from."""
+"""Catalogues with a service to download from."""
 LIKELIHOOD = "likelihood"
 METHODS = (
     LIKELIHOOD,
@@ -48,12 +48,12 @@ METHODS = (
     "angles:edit",
 )
 METHOD_HELP = (
-    "How cells are compared with a query. likelihood: by the chance that a detector sees the query "
-    "from there. edit+edit: by how many objects must be added, taken away or exchanged to turn one "
+    "How cells are compared with a query. likelihood: by the chance that a detector sees the query"
+    " from there. edit+edit: by the number of objects to add, remove or exchange to change one "
     "sequence into the other, the mean of types and angles. edit+edit:5%: the same, among the 5 % "
-    "of the cells whose types fit best. histogram+histogram: by how often each type and each angle "
-    "occurs, whatever the order. jaccard+jaccard: by which types and which angles occur at all. "
-    "types:edit and angles:edit: as edit+edit, by the types or the angles alone."
+    "of the cells with the best types. histogram+histogram: by how often each type and each angle "
+    "occurs, in any order. jaccard+jaccard: by which types and which angles occur at all. "
+    "types:edit and angles:edit: as edit+edit, by only the types or only the angles."
 )
 NOISES = ("generic", "light", "medium", "strong", "by-hand")
 DISTORTIONS = ("none", "light", "medium", "strong")
@@ -61,19 +61,18 @@ DISTORTIONS = ("none", "light", "medium", "strong")
 Value = Union[str, float, bool, None, "list[str]"]
 
 
-def command_line(command: str, *given: str, **options: Value) -> list[str]:
+def command_line(command: str, *arguments: str, **options: Value) -> list[str]:
     """Return the arguments of a command.
 
     Parameters
     ----------
     command : str
         Such as ``"build"``.
-    *given : str
-        What has no name: the files that the command takes.
+    *arguments : str
+        Arguments without a name: the files that the command takes.
     **options : str, float, bool, list of str or None
-        What has a name; the name of an option without its dashes, ``_`` where it has ``-``. What
-        is empty or None is left out, True is an option without a value, and a list is an option
-        that is given several times.
+        Options by name, without the dashes and with ``_`` for ``-``. An empty value or None is
+        left out, True is an option without a value, and a list repeats the option.
 
     Returns
     -------
@@ -85,28 +84,28 @@ def command_line(command: str, *given: str, **options: Value) -> list[str]:
     >>> command_line("build", "objects.parquet", out="city.parquet", step=10.0, area=None)
     ['build', '--out=city.parquet', '--step=10.0', '--', 'objects.parquet']
     """
-    named: list[str] = []
+    line: list[str] = []
     for name, value in options.items():
         option = "--" + name.rstrip("_").replace("_", "-")
         if value is True:
-            named.append(option)
+            line.append(option)
         elif isinstance(value, list):
-            named += [f"{option}={one}" for one in value]
+            line += [f"{option}={item}" for item in value]
         elif value is not None and value is not False and value != "":
-            named.append(f"{option}={value}")
-    # Nothing after the two dashes is taken for an option, whatever a file is called.
-    return [command, *named, "--", *given]
+            line.append(f"{option}={value}")
+    # Files after the two dashes are never read as options, whatever their names.
+    return [command, *line, "--", *arguments]
 
 
 def require_likelihood(method: str, parameter: str) -> None:
-    """Refuse what only the likelihood method has.
+    """Raise an error if a parameter of the likelihood method is given with another method.
 
     Parameters
     ----------
     method : str
-        The method that was chosen.
+        The chosen method.
     parameter : str
-        What was given for it, as the dialog calls it.
+        The name of the parameter in the dialog.
 
     Raises
     ------
@@ -122,14 +121,14 @@ def require_likelihood(method: str, parameter: str) -> None:
 
 
 def check_output(path: str, suffix: str) -> None:
-    """Refuse what cannot be written, before the work is done for it.
+    """Raise an error before the work if an output cannot be written.
 
     Parameters
     ----------
     path : str
-        The file or folder to write. Folders that are missing are made by the command.
+        The file or folder to write. Missing folders are created by the command.
     suffix : str
-        How a file must end, without the dot; empty for a folder.
+        The suffix of the file without the dot; empty for a folder.
 
     Raises
     ------
@@ -140,14 +139,14 @@ def check_output(path: str, suffix: str) -> None:
     if suffix and target.suffix.lower() != f".{suffix}":
         message = f"{path} does not end in .{suffix}; give the name of a .{suffix} file."
         raise CommandError(message)
-    if suffix and os.path.isdir(target):  # noqa: PTH112 - it answers where Path.is_dir raises
+    if suffix and os.path.isdir(target):  # noqa: PTH112 - Path.is_dir may raise
         message = f"{path} is a folder; give the name of a file to write."
         raise CommandError(message)
-    # The nearest folder that is there; of what is a folder itself, that may be the one.
-    whole = target.absolute()
-    places = [*whole.parents] if suffix else [whole, *whole.parents]
-    there = (place for place in places if os.path.exists(place))  # noqa: PTH110 - as above
-    folder = next(there, places[-1])
+    # Find the nearest folder that exists; a folder to write may exist itself.
+    absolute = target.absolute()
+    places = [*absolute.parents] if suffix else [absolute, *absolute.parents]
+    existing = (place for place in places if os.path.exists(place))  # noqa: PTH110 - as above
+    folder = next(existing, places[-1])
     if not folder.is_dir():
         message = f"{path} cannot be written, since {folder} is not a folder; choose another place."
         raise CommandError(message)

@@ -1,9 +1,9 @@
-"""The `semsig` command as a process of its own: where it is, how it is run, what it tells.
+"""Find the `semsig` command and run it as a separate process.
 
-QGIS has its own Python with its own GDAL and PROJ, which must not meet those of `semsig`. Hence a
-process, in an environment from which everything of QGIS is taken out.
+QGIS has its own Python with its own GDAL and PROJ, which must not be mixed with the libraries of
+`semsig`. Therefore the command runs in a process without the environment variables of QGIS.
 
-Nothing here imports QGIS.
+This module does not import QGIS.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ __all__ = [
     "Watcher",
     "clean_environment",
     "find_command",
+    "matching_folders",
     "run_command",
     "run_program",
 ]
 
-# What belongs to QGIS, by how the names of variables begin.
-FOREIGN = (
+# Prefixes of environment variables that belong to QGIS.
+QGIS_PREFIXES = (
     "CPL_",
     "DYLD_",
     "GDAL_",
@@ -51,9 +52,9 @@ FOREIGN = (
     "QT_",
     "__PYVENV_LAUNCHER__",
 )
-# Where installers put commands; a program that was started from a desktop menu has a short PATH.
+# Folders of installers; a program that was started from a desktop menu has a short PATH.
 PLACES = (
-    "~/semsig/bin",  # where docs/qgis.md has it
+    "~/semsig/bin",  # as in docs/qgis.md
     "~/semsig/Scripts",
     "~/.local/bin",
     "/usr/local/bin",
@@ -66,72 +67,72 @@ PLACES = (
     "~/anaconda3/bin",
 )
 SETTINGS = "Settings > Options > Processing > Providers > Semantic signatures"
-"""Where in QGIS the command is chosen."""
+"""The setting of QGIS with the path of the command."""
 
 ENGINE = "Plugins > Semantic signatures > Engine..."
-"""Where in QGIS the command is installed."""
+"""The menu of QGIS that installs the command."""
 
 PROGRESS = re.compile(r"semsig progress (\d+)% (.*)")
-# How its sentences begin.
-SENTENCE = "semsig: "
-# How often a cancel is looked for, and how long the command may take to clean up.
-BLINK_S = 0.1
-PATIENCE_S = 20.0
+SENTENCE = "semsig: "  # prefix of the sentences of the command
+POLL_S = 0.1  # between two checks whether the user cancelled
+PATIENCE_S = 20.0  # time for the command to clean up
 
 
 class CommandError(Exception):
-    """The command could not do it; the message is a sentence for people."""
+    """The command failed; the message is a sentence for the user."""
 
 
-class Cancelled(Exception):  # noqa: N818 - nothing went wrong
+class Cancelled(Exception):  # noqa: N818 - not an error
     """The work was stopped on request."""
 
 
 class Watcher(NamedTuple):
-    """What hears from a running command, and may stop it."""
+    """Callbacks of a running command."""
 
     progress: Callable[[int, str], None]
-    """Called with the percent that is done, and of what."""
+    """Called with the finished percentage and the name of the step."""
     remark: Callable[[str], None]
-    """Called with every other line that the command says beside its results."""
+    """Called with every other line on standard error."""
     cancelled: Callable[[], bool]
-    """Tells whether the work shall end."""
+    """Returns whether to end the work."""
 
 
 def clean_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment for the command: nothing of QGIS, texts in UTF-8, progress as lines.
+    """Return the environment for the command: without QGIS, with UTF-8 and progress as lines.
 
     Parameters
     ----------
     environment : mapping of str to str
-        That of QGIS.
+        Environment variables of QGIS.
 
     Returns
     -------
     dict
-        That of the command.
+        Environment variables of the command.
     """
-    kept = {
-        name: value for name, value in environment.items() if not name.upper().startswith(FOREIGN)
+    variables = {
+        name: value
+        for name, value in environment.items()
+        if not name.upper().startswith(QGIS_PREFIXES)
     }
-    return {**kept, "PYTHONUTF8": "1", "SEMSIG_SUPERVISED": "1"}
+    return {**variables, "PYTHONUTF8": "1", "SEMSIG_SUPERVISED": "1"}
 
 
 def find_command(
-    chosen: str, environment: Mapping[str, str], places: Sequence[str] = PLACES, *, own: str = ""
+    setting: str, environment: Mapping[str, str], places: Sequence[str] = PLACES, *, own: str = ""
 ) -> str:
     """Return the path of the `semsig` command.
 
     Parameters
     ----------
-    chosen : str
-        What the settings say; empty where nothing was chosen.
+    setting : str
+        The command from the settings; empty if not set.
     environment : mapping of str to str
         Its ``PATH`` is searched first.
     places : sequence of str, optional
-        Folders to look in after that; may have wildcards and begin with ``~``.
+        Folders to search after that; may contain wildcards and begin with ``~``.
     own : str, optional
-        The command that the plugin installed, which comes before the search.
+        The command that the plugin installed, which is used before the search.
 
     Returns
     -------
@@ -141,36 +142,48 @@ def find_command(
     Raises
     ------
     CommandError
-        If it is not there.
+        If it does not exist.
     """
-    if chosen:
-        found = shutil.which(os.path.expanduser(chosen))  # noqa: PTH111 - a Path adds nothing
-        if found is None:
+    if setting:
+        program = shutil.which(os.path.expanduser(setting))  # noqa: PTH111 - a Path adds nothing
+        if program is None:
             message = (
-                f"{chosen} is not a program that can be run; choose the semsig command in "
+                f"{setting} is not a program that can be run; choose the semsig command in "
                 f"{SETTINGS}."
             )
             raise CommandError(message)
-        return found
+        return program
     if own:
         return own
-    folders = [str(folder) for place in places for folder in _folders(place)]
+    folders = [str(folder) for place in places for folder in matching_folders(place)]
     path = os.pathsep.join([environment.get("PATH", ""), *folders])
-    found = shutil.which("semsig", path=path)
-    if found is None:
+    program = shutil.which("semsig", path=path)
+    if program is None:
         message = (
-            "The semsig command is not on this computer, or not where it is looked for; install "
-            f"it with {ENGINE}, or choose the command in {SETTINGS}."
+            "The semsig command was not found on this computer; install it with "
+            f"{ENGINE}, or choose the command in {SETTINGS}."
         )
         raise CommandError(message)
-    return found
+    return program
 
 
-def _folders(place: str) -> Iterator[Path]:
-    """Yield the folders that a place stands for."""
-    path = Path(place).expanduser()
-    root = Path(path.anchor)
-    return root.glob(str(path.relative_to(root)))
+def matching_folders(pattern: str) -> list[Path]:
+    """Return the folders that match an absolute path with wildcards or ``~``, sorted.
+
+    Parameters
+    ----------
+    pattern : str
+        The path.
+
+    Returns
+    -------
+    list of Path
+        The folders; empty for a relative path, such as a path of another system.
+    """
+    path = Path(pattern).expanduser()
+    if not path.is_absolute():
+        return []
+    return sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
 
 
 def run_command(
@@ -180,7 +193,7 @@ def run_command(
     *,
     written: str | None = None,
 ) -> str:
-    """Run the command and return its results, which it prints on standard output.
+    """Run the command and return its standard output, which contains its results.
 
     Parameters
     ----------
@@ -189,9 +202,9 @@ def run_command(
     environment : mapping of str to str
         See `clean_environment`.
     watcher : Watcher
-        Who hears of it.
+        Callbacks for progress, remarks and cancelling.
     written : str, optional
-        A file that the command writes.
+        A file that the command must write.
 
     Returns
     -------
@@ -201,40 +214,41 @@ def run_command(
     Raises
     ------
     CommandError
-        If the command cannot be run or fails, where the message is what it says last; or if it
-        is not `semsig`, since it fails without a word of that or leaves the file as it was.
+        If the command cannot be run or fails, with its last sentence as message; or if it is not
+        `semsig`, since it prints no sentence of `semsig` or does not write the file.
     Cancelled
-        If the watcher wished so. The command has ended and cleaned up.
+        If the watcher cancelled the work. The command has ended and cleaned up.
     """
     before = _state(written)
     try:
         process = _start(command, environment)
     except OSError as error:
         raise CommandError(_unusable(command[0], error)) from error
-    said: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    # Two threads read the two streams, so that neither of them fills up and blocks the command.
+    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     results: list[str] = []
     readers = [
-        threading.Thread(target=_hand_on, args=(process.stderr, said), daemon=True),
-        threading.Thread(target=_collect, args=(process, results), daemon=True),
+        threading.Thread(target=_queue_lines, args=(process.stderr, lines), daemon=True),
+        threading.Thread(target=lambda: results.extend(process.stdout or ()), daemon=True),
     ]
     with process:
         for reader in readers:
             reader.start()
         try:
-            last, known = _hand_out(said, watcher)
+            last, is_semsig = _report_lines(lines, watcher)
             code = process.wait()
-        except BaseException:  # whoever ends the watching, ends the command
+        except BaseException:  # also if a callback fails, the command must end
             _stop(process)
             raise
         finally:
             for reader in readers:
                 reader.join(PATIENCE_S)
     if code != 0:
-        raise CommandError(_reason(command[0], last, code, known=known))
+        raise CommandError(_reason(command[0], last, code, is_semsig=is_semsig))
     if last:
         watcher.remark(last.removeprefix(SENTENCE))
     if written is not None and _state(written) == before:
-        raise CommandError(_foreign(command[0], f"it did not write {written}"))
+        raise CommandError(_not_semsig(command[0], f"it did not write {written}"))
     return "".join(results)
 
 
@@ -253,9 +267,9 @@ def run_program(
     environment : mapping of str to str
         See `clean_environment`.
     hear : callable
-        Takes each line that the program prints, be it a result or an error.
+        Called with each line that the program prints on either stream.
     cancelled : callable
-        Tells whether the program shall end; asked ten times a second.
+        Returns whether to end the program; called ten times a second.
 
     Returns
     -------
@@ -267,18 +281,18 @@ def run_program(
     CommandError
         If it cannot be run.
     Cancelled
-        If that was wished. The program has ended, with all that it started.
+        If `cancelled` returned True. The program has ended, with all processes that it started.
     """
     try:
         process = _start(command, environment, errors=subprocess.STDOUT)
     except OSError as error:
         raise CommandError(_unusable(command[0], error)) from error
-    said: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-    reader = threading.Thread(target=_hand_on, args=(process.stdout, said), daemon=True)
+    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    reader = threading.Thread(target=_queue_lines, args=(process.stdout, lines), daemon=True)
     with process:
         reader.start()
         try:
-            for line in _listen(said, cancelled):
+            for line in _listen(lines, cancelled):
                 hear(line)
             code = process.wait()
         except BaseException:
@@ -290,18 +304,18 @@ def run_program(
 
 
 def _state(path: str | None) -> tuple[int, int] | None:
-    """Return what differs once a file is written anew."""
+    """Return inode and time of a file, which change if it is written again; None if missing."""
     try:
-        found = os.stat(path or "")  # noqa: PTH116 - a Path adds nothing
+        status = os.stat(path or "")  # noqa: PTH116 - a Path adds nothing
     except OSError:
         return None
-    return found.st_ino, found.st_mtime_ns
+    return status.st_ino, status.st_mtime_ns
 
 
 def _start(
     command: Sequence[str], environment: Mapping[str, str], errors: int = subprocess.PIPE
 ) -> subprocess.Popen[str]:
-    # The program is what the user installed or chose.
+    # The program was installed or chosen by the user.
     return subprocess.Popen(  # noqa: S603  # nosec B603
         command,
         env=dict(environment),
@@ -311,9 +325,9 @@ def _start(
         text=True,
         encoding="utf-8",
         errors="replace",
-        # A session of its own, so that it can be ended with all that it started.
+        # A separate session, so that all processes of the program can be ended together.
         start_new_session=True,
-        # No console window pops up on Windows.
+        # Without a console window on Windows.
         creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
     )
 
@@ -322,36 +336,33 @@ def _unusable(program: str, error: OSError) -> str:
     return f"{program} cannot be run ({error.strerror or error}); choose another program."
 
 
-def _hand_on(lines: Iterable[str] | None, said: queue.SimpleQueue[str | None]) -> None:
-    for line in lines or ():
-        said.put(line.rstrip())
-    said.put(None)
+def _queue_lines(stream: Iterable[str] | None, lines: queue.SimpleQueue[str | None]) -> None:
+    """Put the lines of a stream into a queue, and None at the end."""
+    for line in stream or ():
+        lines.put(line.rstrip())
+    lines.put(None)
 
 
-def _collect(process: subprocess.Popen[str], results: list[str]) -> None:
-    results.extend(process.stdout or ())
-
-
-def _hand_out(said: queue.SimpleQueue[str | None], watcher: Watcher) -> tuple[str, bool]:
-    """Tell what is said, and return the last remark and whether it was `semsig` that spoke."""
-    last, known = "", False
-    for line in _listen(said, watcher.cancelled):
-        # The last remark is held back: it says why the command fails, if it does.
+def _report_lines(lines: queue.SimpleQueue[str | None], watcher: Watcher) -> tuple[str, bool]:
+    """Pass lines to the watcher; return the last remark and whether `semsig` printed them."""
+    last, is_semsig = "", False
+    for line in _listen(lines, watcher.cancelled):
+        # Wait with each remark: the last one is the reason if the command fails.
         if last:
             watcher.remark(last.removeprefix(SENTENCE))
-        told = PROGRESS.fullmatch(line)
-        if told is not None:
-            watcher.progress(int(told[1]), told[2])
-        last = "" if told else line
-        known = known or told is not None or line.startswith(SENTENCE)
-    return last, known
+        progress = PROGRESS.fullmatch(line)
+        if progress is not None:
+            watcher.progress(int(progress[1]), progress[2])
+        last = "" if progress else line
+        is_semsig = is_semsig or progress is not None or line.startswith(SENTENCE)
+    return last, is_semsig
 
 
-def _listen(said: queue.SimpleQueue[str | None], cancelled: Callable[[], bool]) -> Iterator[str]:
-    """Yield the lines until the command has no more to say."""
+def _listen(lines: queue.SimpleQueue[str | None], cancelled: Callable[[], bool]) -> Iterator[str]:
+    """Yield the lines of a queue until None; raise Cancelled on request."""
     while not cancelled():
         try:
-            line = said.get(timeout=BLINK_S)
+            line = lines.get(timeout=POLL_S)
         except queue.Empty:
             continue
         if line is None:
@@ -362,7 +373,7 @@ def _listen(said: queue.SimpleQueue[str | None], cancelled: Callable[[], bool]) 
 
 
 def _stop(process: subprocess.Popen[str]) -> None:
-    """End the command: by the end of its input, which lets it clean up, or in the end by force."""
+    """End the command by closing its input, which lets it clean up; kill it if it does not end."""
     process.stdin.close()  # type: ignore[union-attr] # it is a pipe
     try:
         process.wait(PATIENCE_S)
@@ -371,7 +382,7 @@ def _stop(process: subprocess.Popen[str]) -> None:
 
 
 def _kill(process: subprocess.Popen[str]) -> None:
-    """End a program with all that it started, by force."""
+    """Kill a program and all processes that it started."""
     if sys.platform == "win32":
         subprocess.run(  # noqa: S603  # nosec B603 B607
             ["taskkill", "/F", "/T", "/PID", str(process.pid)],  # noqa: S607 - of the system
@@ -385,17 +396,17 @@ def _kill(process: subprocess.Popen[str]) -> None:
     process.wait()
 
 
-def _reason(program: str, last: str, code: int, *, known: bool) -> str:
-    """Return why the command failed: its last words, which are a sentence where it is the input."""
+def _reason(program: str, last: str, code: int, *, is_semsig: bool) -> str:
+    """Return why the command failed, from its exit code and its last line."""
     if code == 2 and last.startswith(SENTENCE):  # noqa: PLR2004 - unusable input
         return last.removeprefix(SENTENCE)
-    if known:
+    if is_semsig:
         why = f": {last.removeprefix(SENTENCE)}" if last else " and did not say why."
         return f"The semsig command failed with exit code {code}{why}"
-    return _foreign(program, f"exit code {code}: {last}" if last else f"exit code {code}")
+    return _not_semsig(program, f"exit code {code}: {last}" if last else f"exit code {code}")
 
 
-def _foreign(program: str, why: str) -> str:
+def _not_semsig(program: str, why: str) -> str:
     return (
         f"{program} is not the semsig command, or not one that fits this plugin ({why}); choose "
         f"the semsig command in {SETTINGS}."

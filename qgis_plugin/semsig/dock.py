@@ -1,4 +1,4 @@
-"""The dock: click a cell, compose a view, go through the places where it may be."""
+"""The dock to explore a city: click a cell, compose a view, and list the places that match."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from qgis.core import (
+    Qgis,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
     QgsGeometry,
@@ -32,10 +33,10 @@ from qgis.PyQt.QtWidgets import (
 )
 
 from .algorithm import load_style
-from .bench import Bench
+from .compass_dial import CompassDial, Mark, Sign, sign_icon
 from .results import WGS84, show_answer
-from .wheel import Mark, Sign, Wheel, sign_icon
-from .words import tr
+from .server import CityServer
+from .translation import tr
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,16 +46,16 @@ if TYPE_CHECKING:
 
 __all__ = ["SemsigDock"]
 
-LAST = "semsig/database"
-"""The setting that remembers the database."""
-CELL, LOOKALIKE = QColor("#d55e00"), QColor("#0072b2")
+LAST_DATABASE = "semsig/database"
+"""The setting with the last opened database."""
+CELL_COLOUR, LOOKALIKE_COLOUR = QColor("#d55e00"), QColor("#0072b2")
 LOOKALIKES = 20
-SCALE = 2500.0
-KIND = 0x0100  # the first role of data that is ours
+LARGEST_SCALE = 2500.0  # denominator
+CLASS_ROLE = 0x0100  # the first role for data of plugins
 
 
 class SemsigDock(QgsDockWidget):
-    """Asks a city.
+    """The dock.
 
     Parameters
     ----------
@@ -66,29 +67,31 @@ class SemsigDock(QgsDockWidget):
         super().__init__(tr("Semantic signatures"), iface.mainWindow())
         self.setObjectName("SemsigDock")
         self.canvas = iface.mapCanvas()
-        self.bench = Bench(self)
-        self.bench.opened.connect(self._opened)
-        self.bench.failed.connect(self._failed)
+        self.server = CityServer(self)
+        self.server.opened.connect(self._show_city)
         self.candidates: list[dict[str, Any]] = []
         self.bands: list[QgsRubberBand] = []
         self.tool: QgsMapToolEmitPoint | None = None
-        self._build()
+        self._create_widgets()
+        self.server.failed.connect(self.message.setText)
+        self._lay_out_widgets()
+        self._enable(on=False)
 
-    def _build(self) -> None:
+    def _create_widgets(self) -> None:
         self.database = QgsFileWidget()
         self.database.setFilter(tr("Signature databases (*.parquet)"))
-        self.database.setFilePath(str(QgsSettings().value(LAST, "") or ""))
+        self.database.setFilePath(str(QgsSettings().value(LAST_DATABASE, "") or ""))
         self.open = QPushButton(tr("Open"))
         self.open.clicked.connect(self.open_database)
-        self.told = QLabel(tr("Choose a signature database, and open it."))
-        self.told.setWordWrap(True)
-        self.click = self._tool(tr("Click a cell"), self._ask_cell)
-        self.click.setToolTip(tr("Shows what is seen from a cell, and the cells most like it."))
-        self.stand = self._tool(tr("Seen from here"), self._simulate)
-        self.stand.setToolTip(tr("Composes the view that is seen from a place of the map."))
-        self.wheel = Wheel()
-        self.wheel.pressed.connect(self._add)
-        self.wheel.taken.connect(self._take)
+        self.message = QLabel(tr("Choose a signature database, and open it."))
+        self.message.setWordWrap(True)
+        self.cell_tool = self._tool(tr("Click a cell"), self.ask_cell)
+        self.cell_tool.setToolTip(tr("Shows what is seen from a cell, and the most similar cells."))
+        self.view_tool = self._tool(tr("Seen from here"), self.simulate)
+        self.view_tool.setToolTip(tr("Composes the view that is seen from a place of the map."))
+        self.dial = CompassDial()
+        self.dial.bearing_clicked.connect(self._add_object)
+        self.dial.mark_clicked.connect(self._remove_object)
         self.palette_ = QListWidget()
         self.palette_.setViewMode(QListView.ViewMode.ListMode)
         self.palette_.setFlow(QListView.Flow.LeftToRight)
@@ -97,31 +100,35 @@ class SemsigDock(QgsDockWidget):
         self.palette_.setIconSize(QSize(20, 20))
         self.palette_.setMaximumHeight(84)
         self.palette_.setToolTip(
-            tr("Choose what you see, and click its direction in the wheel. A click takes it away.")
+            tr(
+                "Choose what you see, and click its direction in the dial. Click an object to "
+                "remove it."
+            )
         )
         self.north = QCheckBox(tr("North is unknown"))
         self.clear = QPushButton(tr("Clear"))
-        self.clear.clicked.connect(self.start_anew)
+        self.clear.clicked.connect(self.clear_view)
         self.find = QPushButton(tr("Find the place"))
         self.find.clicked.connect(self.ask_place)
         self.verdict = QLabel()
         self.verdict.setWordWrap(True)
-        self.table = self._table()
-        content = QWidget()
-        whole = QVBoxLayout(content)
-        whole.addLayout(_row(self.database, self.open))
-        whole.addWidget(self.told)
-        whole.addLayout(_row(self.click, self.stand))
-        whole.addWidget(self.wheel, 2)
-        whole.addWidget(self.palette_)
-        whole.addLayout(_row(self.north, self.clear, self.find))
-        whole.addWidget(self.verdict)
-        whole.addWidget(self.table, 1)
-        self.setWidget(content)
-        self._enable(on=False)
+        self.table = self._candidate_table()
 
-    def _table(self) -> QTableWidget:
-        """Return the list of ranks."""
+    def _lay_out_widgets(self) -> None:
+        content = QWidget()
+        layout = QVBoxLayout(content)
+        layout.addLayout(_row(self.database, self.open))
+        layout.addWidget(self.message)
+        layout.addLayout(_row(self.cell_tool, self.view_tool))
+        layout.addWidget(self.dial, 2)
+        layout.addWidget(self.palette_)
+        layout.addLayout(_row(self.north, self.clear, self.find))
+        layout.addWidget(self.verdict)
+        layout.addWidget(self.table, 1)
+        self.setWidget(content)
+
+    def _candidate_table(self) -> QTableWidget:
+        """Return the table of candidates."""
         table = QTableWidget(0, 3)
         table.setHorizontalHeaderLabels([tr("Rank"), tr("Chance"), tr("Sees")])
         table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -131,72 +138,75 @@ class SemsigDock(QgsDockWidget):
         table.verticalHeader().setDefaultSectionSize(22)
         table.setMinimumHeight(160)
         table.horizontalHeader().setStretchLastSection(True)
-        table.itemSelectionChanged.connect(self._zoom)
+        table.itemSelectionChanged.connect(self._zoom_to_selected)
         return table
 
-    def _tool(self, title: str, asked: Callable[[QgsPointXY], None]) -> QPushButton:
-        """Return a button that turns a map tool on and off."""
+    def _tool(self, title: str, action: Callable[[float, float], None]) -> QPushButton:
+        """Return a button for a map tool that calls `action` with latitude and longitude."""
         button = QPushButton(title)
         button.setCheckable(True)
-        button.toggled.connect(lambda on: self._use(button, asked, on=on))
+
+        def ask(point: QgsPointXY, _button: object) -> None:
+            place = self.degrees(point)
+            action(place.y(), place.x())
+
+        def use(on: bool) -> None:  # noqa: FBT001 - as Qt calls it
+            if on:
+                tool = QgsMapToolEmitPoint(self.canvas)
+                tool.canvasClicked.connect(ask)
+                tool.deactivated.connect(lambda: button.setChecked(False))
+                self.canvas.setMapTool(tool)
+                self.tool = tool
+            elif self.tool is not None and self.canvas.mapTool() is self.tool:
+                self.canvas.unsetMapTool(self.tool)
+
+        button.toggled.connect(use)
         return button
 
-    def _use(self, button: QPushButton, asked: Callable[[QgsPointXY], None], *, on: bool) -> None:
-        if on:
-            tool = QgsMapToolEmitPoint(self.canvas)
-            tool.canvasClicked.connect(lambda point, _button: asked(self.degrees(point)))
-            tool.deactivated.connect(lambda: button.setChecked(False))
-            self.canvas.setMapTool(tool)
-            self.tool = tool
-        elif self.tool is not None and self.canvas.mapTool() is self.tool:
-            self.canvas.unsetMapTool(self.tool)
-
     def _enable(self, *, on: bool) -> None:
-        for widget in (self.click, self.stand, self.palette_, self.find, self.clear, self.wheel):
+        tools = (self.cell_tool, self.view_tool)
+        for widget in (*tools, self.palette_, self.find, self.clear, self.dial):
             widget.setEnabled(on)
 
     def open_database(self) -> None:
-        """Open the database that is chosen."""
+        """Open the chosen database."""
         path = self.database.filePath()
         if not path:
-            self.told.setText(tr("Choose a signature database, and open it."))
+            self.message.setText(tr("Choose a signature database, and open it."))
             return
-        QgsSettings().setValue(LAST, path)
+        QgsSettings().setValue(LAST_DATABASE, path)
         self._enable(on=False)
-        self.told.setText(tr("Opening; a large city takes some seconds..."))
-        self.bench.open(path)
+        self.message.setText(tr("Opening; a large city takes some seconds..."))
+        self.server.open(path)
 
-    def _opened(self, city: dict[str, Any]) -> None:
-        self.told.setText(
+    def _show_city(self, city: dict[str, Any]) -> None:
+        """Show the name and the classes of the opened city."""
+        self.message.setText(
             tr("{name}: {cells} cells. Click a cell, or compose what you see.").format(
                 name=city["name"], cells=f"{city['cells']:,}"
             )
         )
-        self.wheel.reach = city["radius"]
-        self.wheel.signs = {
-            one["name"]: Sign(one["title"], one["symbol"], one["colour"], one["ink"])
-            for one in city["classes"]
+        self.dial.reach = city["radius"]
+        self.dial.signs = {
+            item["name"]: Sign(item["title"], item["symbol"], item["colour"], item["ink"])
+            for item in city["classes"]
         }
         self.palette_.clear()
-        for name, sign in self.wheel.signs.items():
-            item = QListWidgetItem(sign_icon(sign), sign.title)
-            item.setData(KIND, name)
-            self.palette_.addItem(item)
+        for name, sign in self.dial.signs.items():
+            entry = QListWidgetItem(sign_icon(sign), sign.title)
+            entry.setData(CLASS_ROLE, name)
+            self.palette_.addItem(entry)
         self.palette_.setCurrentRow(0)
-        self.start_anew()
+        self.clear_view()
         self._enable(on=True)
-
-    def _failed(self, message: str) -> None:
-        self.told.setText(message)
 
     # --- Places ------------------------------------------------------------------------------
 
-    def _to_degrees(self) -> QgsCoordinateTransform:
-        return QgsCoordinateTransform(
-            self.canvas.mapSettings().destinationCrs(),
-            QgsCoordinateReferenceSystem(WGS84),
-            QgsProject.instance(),
-        )
+    def _to_canvas(self) -> QgsCoordinateTransform:
+        """Return the transformation from degrees to the CRS of the canvas."""
+        degrees = QgsCoordinateReferenceSystem(WGS84)
+        crs = self.canvas.mapSettings().destinationCrs()
+        return QgsCoordinateTransform(degrees, crs, QgsProject.instance())
 
     def degrees(self, point: QgsPointXY) -> QgsPointXY:
         """Return a place of the canvas in degrees.
@@ -204,27 +214,23 @@ class SemsigDock(QgsDockWidget):
         Parameters
         ----------
         point : QgsPointXY
-            In the CRS of the canvas.
+            The place in the CRS of the canvas.
 
         Returns
         -------
         QgsPointXY
             Longitude and latitude.
         """
-        return self._to_degrees().transform(point)
+        return self._to_canvas().transform(point, Qgis.TransformDirection.Reverse)
 
     def _geometry(self, places: list[list[float]]) -> QgsGeometry:
         """Return places, given as latitudes and longitudes, in the CRS of the canvas."""
-        found = QgsGeometry.fromMultiPointXY([QgsPointXY(lon, lat) for lat, lon in places])
-        back = QgsCoordinateTransform(
-            QgsCoordinateReferenceSystem(WGS84),
-            self.canvas.mapSettings().destinationCrs(),
-            QgsProject.instance(),
-        )
-        found.transform(back)
-        return found
+        points = QgsGeometry.fromMultiPointXY([QgsPointXY(lon, lat) for lat, lon in places])
+        points.transform(self._to_canvas())
+        return points
 
-    def _light(self, places: list[list[float]], colour: QColor, size: int) -> None:
+    def _highlight(self, places: list[list[float]], colour: QColor, size: int) -> None:
+        """Draw circles on the canvas."""
         if not places:
             return
         band = QgsRubberBand(self.canvas)
@@ -235,52 +241,47 @@ class SemsigDock(QgsDockWidget):
         band.setWidth(3)
         self.bands.append(band)
 
-    def _unlight(self) -> None:
+    def _remove_highlights(self) -> None:
         for band in self.bands:
             self.canvas.scene().removeItem(band)
         self.bands = []
 
     # --- A cell ------------------------------------------------------------------------------
 
-    def _ask_cell(self, point: QgsPointXY) -> None:
-        self.ask_cell(point.y(), point.x())
-
     def ask_cell(self, lat: float, lon: float) -> None:
-        """Show the cell at a place: its wheel, and its lookalikes on the canvas.
+        """Show the cell at a place: its objects in the dial, and its lookalikes on the canvas.
 
         Parameters
         ----------
         lat, lon : float
             The place in degrees.
         """
-        self.bench.ask("cell", {"place": [lat, lon]}, self._show_cell)
+        self.server.ask("cell", {"place": [lat, lon]}, self._show_cell)
 
     def _show_cell(self, cell: dict[str, Any]) -> None:
         marks = [
-            Mark(one["class"], one["bearing"], metres)
-            for one, metres in zip(cell["view"]["compass"], cell["distances"])
+            Mark(item["class"], item["bearing"], metres)
+            for item, metres in zip(cell["view"]["compass"], cell["distances"])
         ]
-        self.wheel.show_marks(marks)
+        self.dial.show_marks(marks)
         self.north.setChecked(False)
         question = {"views": [cell["view"]], "seen_from": "cells", "top": LOOKALIKES}
-        self.bench.ask("answer", question, partial(self._show_lookalikes, cell))
+        self.server.ask("answer", question, partial(self._show_lookalikes, cell))
 
     def _show_lookalikes(self, cell: dict[str, Any], answer: dict[str, Any]) -> None:
-        others = [one for one in answer["candidates"] if one["cell"] != cell["cell"]]
-        self._unlight()
-        self._light([one["place"] for one in others], LOOKALIKE, 12)
-        self._light([cell["place"]], CELL, 20)
-        self.told.setText(
-            tr("Cell {cell} sees {types}; {alike} other cells see the same types.").format(
-                cell=cell["cell"], types=cell["types"], alike=f"{cell['alike']:,}"
+        candidates = answer["candidates"]
+        others = [row["place"] for row in candidates if row["cell"] != cell["cell"]]
+        self._remove_highlights()
+        self._highlight(others, LOOKALIKE_COLOUR, 12)
+        self._highlight([cell["place"]], CELL_COLOUR, 20)
+        self.message.setText(
+            tr("Cell {cell} sees {types}; {count} other cells see the same types.").format(
+                cell=cell["cell"], types=cell["types"], count=f"{cell['alike']:,}"
             )
         )
-        self._list(answer, tr("The cells that a view from here would be taken for, by chance:"))
+        self._list(answer, tr("The cells that a view from here may be confused with, by chance:"))
 
     # --- A view ------------------------------------------------------------------------------
-
-    def _simulate(self, point: QgsPointXY) -> None:
-        self.simulate(point.y(), point.x())
 
     def simulate(self, lat: float, lon: float) -> None:
         """Compose the view that is seen from a place.
@@ -290,62 +291,63 @@ class SemsigDock(QgsDockWidget):
         lat, lon : float
             The place in degrees.
         """
-        self.bench.ask("simulate", {"place": [lat, lon]}, self._show_view)
+        self.server.ask("simulate", {"place": [lat, lon]}, self._show_view)
 
-    def _show_view(self, told: dict[str, Any]) -> None:
-        marks = [Mark(one["class"], one["bearing"]) for one in told["view"]["compass"]]
-        self.wheel.show_marks(marks)
-        self._unlight()
-        self._light([told["truth"]["place"]], CELL, 20)
-        self.told.setText(tr("This is what is seen from there; change it, or find the place."))
+    def _show_view(self, simulation: dict[str, Any]) -> None:
+        compass = simulation["view"]["compass"]
+        self.dial.show_marks([Mark(item["class"], item["bearing"]) for item in compass])
+        self._remove_highlights()
+        self._highlight([simulation["truth"]["place"]], CELL_COLOUR, 20)
+        self.message.setText(tr("This is what is seen from there; change it, or find the place."))
 
-    def _add(self, bearing: float) -> None:
-        """Add an object of the class that is chosen."""
-        item = self.palette_.currentItem()
-        if item is not None:
-            marks = [Mark(one.kind, one.bearing) for one in self.wheel.marks]
-            self.wheel.show_marks([*marks, Mark(item.data(KIND), bearing)])
+    def _add_object(self, bearing: float) -> None:
+        """Add an object of the chosen class."""
+        entry = self.palette_.currentItem()
+        if entry is not None:
+            marks = [Mark(mark.kind, mark.bearing) for mark in self.dial.marks]
+            self.dial.show_marks([*marks, Mark(entry.data(CLASS_ROLE), bearing)])
 
-    def _take(self, number: int) -> None:
-        """Take an object away."""
-        kept = (one for place, one in enumerate(self.wheel.marks) if place != number)
-        self.wheel.show_marks([Mark(one.kind, one.bearing) for one in kept])
+    def _remove_object(self, number: int) -> None:
+        marks = [*self.dial.marks[:number], *self.dial.marks[number + 1 :]]
+        self.dial.show_marks([Mark(mark.kind, mark.bearing) for mark in marks])
 
-    def start_anew(self) -> None:
-        """Compose another view."""
-        self.wheel.show_marks([])
-        self._unlight()
+    def clear_view(self) -> None:
+        """Remove all objects of the view, and the candidates."""
+        self.dial.show_marks([])
+        self._remove_highlights()
         self.verdict.setText("")
         self.table.setRowCount(0)
 
     def ask_place(self) -> None:
-        """Find where the view on the wheel was seen."""
-        marks = sorted(self.wheel.marks, key=lambda mark: mark.bearing)
-        compass = [{"class": one.kind, "bearing": one.bearing, "range": None} for one in marks]
+        """Localize the view on the dial."""
+        marks = sorted(self.dial.marks, key=lambda mark: mark.bearing)
+        compass = [{"class": mark.kind, "bearing": mark.bearing, "range": None} for mark in marks]
         error = "unknown" if self.north.isChecked() else None
         view = {"compass": compass, "heading_error": error, "step": None}
-        self.bench.ask("answer", {"views": [view], "top": LOOKALIKES}, self._show_place)
+        self.server.ask("answer", {"views": [view], "top": LOOKALIKES}, self._show_place)
 
     def _show_place(self, answer: dict[str, Any]) -> None:
-        self._unlight()
-        told = (
+        self._remove_highlights()
+        verdict = (
             tr("Found: the place is within {metres} m with a chance of {chance}.")
             if answer["given"]
             else tr("Cannot tell: within {metres} m of the best place with a chance of {chance}.")
         )
         chance = f"{answer['mass']:.1%}"
-        self._list(answer, told.format(metres=f"{answer['radius']:g}", chance=chance))
-        self.told.setText(tr("Choose a rank in the list to go there."))
+        self._list(answer, verdict.format(metres=f"{answer['radius']:g}", chance=chance))
+        self.message.setText(tr("Choose a rank in the list to go there."))
         show_answer(answer, load_style)
-        self._go_to([one["place"] for one in self.candidates[:3]])
+        self._go_to([candidate["place"] for candidate in self.candidates[:3]])
 
     def _list(self, answer: dict[str, Any], verdict: str) -> None:
+        """Show the candidates of an answer in the table."""
         self.candidates = answer["candidates"]
         self.verdict.setText(verdict)
         self.table.blockSignals(True)  # noqa: FBT003 - as Qt calls it
         self.table.setRowCount(len(self.candidates))
-        for row, one in enumerate(self.candidates):
-            for column, text in enumerate((str(one["rank"]), f"{one['chance']:.1%}", one["types"])):
+        for row, candidate in enumerate(self.candidates):
+            texts = str(candidate["rank"]), f"{candidate['chance']:.1%}", candidate["types"]
+            for column, text in enumerate(texts):
                 item = QTableWidgetItem(text)
                 if column < 2:  # noqa: PLR2004 - the numbers
                     right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -355,14 +357,14 @@ class SemsigDock(QgsDockWidget):
         self.table.clearSelection()
         self.table.blockSignals(False)  # noqa: FBT003
 
-    def _zoom(self) -> None:
-        """Go to the candidate that is chosen in the list."""
+    def _zoom_to_selected(self) -> None:
+        """Show the candidate that is selected in the table."""
         rows = self.table.selectionModel().selectedRows()
         if rows:
             self._go_to([self.candidates[rows[0].row()]["place"]])
 
     def _go_to(self, places: list[list[float]]) -> None:
-        """Show places on the canvas, not from nearer than is of use."""
+        """Show places on the canvas, at most at the largest useful scale."""
         if not places:
             return
         box: QgsRectangle = self._geometry(places).boundingBox()
@@ -371,16 +373,16 @@ class SemsigDock(QgsDockWidget):
             self.canvas.setExtent(box)
         else:
             self.canvas.setCenter(box.center())
-        if self.canvas.scale() < SCALE or len(places) == 1:
-            self.canvas.zoomScale(SCALE)
+        if self.canvas.scale() < LARGEST_SCALE or len(places) == 1:
+            self.canvas.zoomScale(LARGEST_SCALE)
         self.canvas.refresh()
 
-    def leave(self) -> None:
-        """Put everything back; the plugin is unloaded."""
-        self._unlight()
+    def clean_up(self) -> None:
+        """Remove everything from the canvas and end the server, before the plugin is unloaded."""
+        self._remove_highlights()
         if self.tool is not None:
             self.canvas.unsetMapTool(self.tool)
-        self.bench.close()
+        self.server.close()
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:

@@ -1,9 +1,9 @@
-"""The engine: `semsig` in a virtual environment of its own, in the profile of QGIS.
+"""Install the engine: `semsig` in a virtual environment in the profile of QGIS.
 
-It lies in one of two folders, and a file beside them says in which. A new one is made in the other
-folder, so that what was there keeps working until the new one does.
+The engine is in one of two folders, and a file next to them says in which. A new engine is
+installed in the other folder, so that the old one works until the new one is ready.
 
-Nothing here imports QGIS.
+This module does not import QGIS.
 """
 
 from __future__ import annotations
@@ -17,7 +17,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Optional
 from urllib.parse import quote
 
-from .command import ENGINE, SETTINGS, CommandError, clean_environment, run_program
+from .command import (
+    ENGINE,
+    SETTINGS,
+    CommandError,
+    clean_environment,
+    matching_folders,
+    run_program,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -31,7 +38,7 @@ HERE = Path(__file__).parent
 CONSTRAINTS = HERE / "constraints.txt"
 STATE = "engine.json"
 FOLDERS = ("a", "b")
-# Newest first, among those that the pinned versions are for; then any other.
+# Versions with pinned packages first, the newest of them first; then any other.
 PROGRAMS = ("python3.13", "python3.12", "python3.11", "python3.14", "python3", "python")
 PYTHONS = (
     "/usr/local/bin",
@@ -47,50 +54,49 @@ PYTHONS = (
     "C:/Python3*",
     "C:/Program Files/Python3*",
 )
-# What a Python says of itself: its version, and whether it can make virtual environments.
-ASK = (
+# A program that prints the version of a Python and whether it can create virtual environments.
+PROBE = (
     "import importlib.util as u, sys; print('python', *sys.version_info[:2], "
     "all(u.find_spec(name) for name in ('venv', 'ensurepip')))"
 )
-TOLD = re.compile(r"python (\d+) (\d+) (True|False)")
-TAG = re.compile(r"-cp3(\d+)-cp3\d+-")
-FOUND = re.compile(r"(?:Collecting|Processing) (\S+)")
-INSTALLING = "Installing collected packages: "
-UNREACHED = {
+PROBE_OUTPUT = re.compile(r"python (\d+) (\d+) (True|False)")
+WHEEL_TAG = re.compile(r"-cp3(\d+)-cp3\d+-")
+PIP_COLLECTING = re.compile(r"(?:Collecting|Processing) (\S+)")
+PIP_INSTALLING = "Installing collected packages: "
+NETWORK_ERRORS = {
     "ProxyError": "the proxy cannot be reached, or refuses",
     "SSLError": "the package index has no certificate that is trusted",
     "NewConnectionError": "the package index cannot be reached",
     "ConnectTimeoutError": "the package index cannot be reached",
     "NameResolutionError": "the package index cannot be reached",
 }
-"""What pip's warnings say of the network."""
-# Packages that pip looks for before it installs them, for the bar of progress.
-USUAL = 76
-# Percent of the work when the environment is there, when all is found, and when all is installed.
-MADE, GATHERED, INSTALLED = 8, 70, 95
-# What QGIS calls kinds of proxies.
+"""Reasons for names of errors in the warnings of pip."""
+USUAL_COUNT = 76  # packages that pip collects before it installs them, for the progress bar
+# Percent of the work when the environment exists, and all packages are collected and installed.
+CREATED, COLLECTED, INSTALLED = 8, 70, 95
+# Names of proxy types in QGIS.
 SOCKS = "Socks5Proxy"
 HTTP = ("HttpProxy", "HttpCachingProxy")
 
 
 class Wishes(NamedTuple):
-    """How the engine shall be installed."""
+    """Options of the installation of the engine."""
 
     python: str = ""
-    """Program to make it with; empty to look for one."""
+    """The Python to use; empty to search for one."""
     wheels: str = ""
-    """Folder with all that is needed; nothing is downloaded then. Empty for the package index."""
+    """Folder with all wheels, to download nothing; empty for the package index."""
     proxies: Optional[Mapping[str, str]] = None  # noqa: UP045 - QGIS's Python may be 3.9
     """Environment variables that name proxies, see `proxy_variables`."""
 
 
 class Engine:
-    """The engine of a profile.
+    """The engine of a QGIS profile.
 
     Parameters
     ----------
     root : Path
-        Folder of the plugin in the profile, made when it is needed.
+        Folder of the plugin in the profile, created when needed.
     version : str
         Version of the plugin.
     """
@@ -108,39 +114,39 @@ class Engine:
 
     @property
     def command(self) -> str:
-        """The program, or nothing where there is none."""
+        """The path of the program; empty if not installed."""
         state = self._state()
         program = _program(self.root / state["folder"], "semsig") if state else None
         return str(program) if program is not None and program.is_file() else ""
 
     @property
     def current(self) -> bool:
-        """Whether it is there and of the version of the plugin."""
+        """Whether it is installed in the version of the plugin."""
         return bool(self.command) and self._state()["version"] == self.version
 
     def install(self, wishes: Wishes, environment: Mapping[str, str], watcher: Watcher) -> str:
-        """Install the engine, or install it anew, and return the program.
+        """Install the engine, or install it again, and return the program.
 
         Parameters
         ----------
         wishes : Wishes
-            From where.
+            The Python, the wheels and the proxies.
         environment : mapping of str to str
-            That of QGIS.
+            Environment variables of QGIS.
         watcher : Watcher
-            Who hears of it.
+            Callbacks for progress, remarks and cancelling.
 
         Returns
         -------
         str
-            The program.
+            The path of the program.
 
         Raises
         ------
         CommandError
-            If it cannot be installed. What was there is as it was, and nothing is half-made.
+            If it cannot be installed. An engine from before still works; no files are left.
         Cancelled
-            If the watcher wished so; likewise.
+            If the watcher cancelled the work; likewise.
         """
         if wishes.wheels and not Path(wishes.wheels).is_dir():
             message = (
@@ -152,14 +158,17 @@ class Engine:
         clean = {**clean_environment(environment), **(wishes.proxies or {})}
         python = find_python(wishes.python, clean, wheels=wishes.wheels)
         old = self._state().get("folder")
-        name = next(one for one in FOLDERS if one != old)
+        name = next(folder_name for folder_name in FOLDERS if folder_name != old)
         folder = self.root / name
         try:
             self.root.mkdir(parents=True, exist_ok=True)
             _remove(folder)
             watcher.remark(f"Python: {python}")
-            self._make(folder, python, wishes, clean, watcher)
-            self._point_to(name)
+            self._create(folder, python, wishes, clean, watcher)
+            # Switch to the new folder in one step.
+            part = self.root / f"{STATE}.part"
+            part.write_text(json.dumps({"folder": name, "version": self.version}), "utf-8")
+            part.replace(self.root / STATE)
         except OSError as error:
             _remove(folder)
             message = (
@@ -175,7 +184,7 @@ class Engine:
         watcher.progress(100, "ready")
         return self.command
 
-    def _make(
+    def _create(
         self,
         folder: Path,
         python: str,
@@ -183,7 +192,7 @@ class Engine:
         environment: Mapping[str, str],
         watcher: Watcher,
     ) -> None:
-        """Make a virtual environment and install the packages in it."""
+        """Create a virtual environment and install the packages in it."""
         step = _Step(watcher, environment)
         watcher.progress(1, "making a virtual environment")
         step.run([python, "-m", "venv", str(folder)], "The virtual environment cannot be made")
@@ -192,7 +201,7 @@ class Engine:
         line += ["--disable-pip-version-check", "--progress-bar=off", f"--constraint={CONSTRAINTS}"]
         if wishes.wheels:
             line += ["--no-index", f"--find-links={wishes.wheels}"]
-        watcher.progress(MADE, "gathering packages")
+        watcher.progress(CREATED, "gathering packages")
         step.run(
             [*line, _requirement(self.version)],
             "The packages cannot be installed",
@@ -202,20 +211,15 @@ class Engine:
         watcher.progress(INSTALLED, "checking")
         step.run([str(_program(folder, "semsig")), "--version"], "The engine does not start")
 
-    def _point_to(self, folder: str) -> None:
-        part = self.root / f"{STATE}.part"
-        part.write_text(json.dumps({"folder": folder, "version": self.version}), "utf-8")
-        part.replace(self.root / STATE)
-
     def remove(self) -> None:
-        """Take the engine away."""
+        """Remove the engine."""
         (self.root / STATE).unlink(missing_ok=True)
         for folder in FOLDERS:
             _remove(self.root / folder)
 
 
 class _Step:
-    """Runs programs, and tells why one failed."""
+    """Runs the programs of the installation."""
 
     def __init__(self, watcher: Watcher, environment: Mapping[str, str]) -> None:
         self.watcher, self.environment = watcher, environment
@@ -227,11 +231,11 @@ class _Step:
         hear: Callable[[str], None] | None = None,
         look: Callable[[], None] | None = None,
     ) -> None:
-        """Run a program; CommandError with what it said of its failure."""
-        said: list[str] = []
+        """Run a program; raise CommandError with its reason if it fails."""
+        lines: list[str] = []
 
         def listen(line: str) -> None:
-            said.append(line)
+            lines.append(line)
             self.watcher.remark(line)
             if hear is not None:
                 hear(line)
@@ -243,7 +247,7 @@ class _Step:
 
         code = run_program(command, self.environment, listen, cancelled)
         if code != 0:
-            reason = _reason(said) or f"exit code {code}"
+            reason = _reason(lines) or f"exit code {code}"
             message = (
                 f"{failure}: {reason}; see the log, check the network, the proxy or the folder of "
                 f"wheels in {SETTINGS}, and press Install again."
@@ -251,80 +255,81 @@ class _Step:
             raise CommandError(message)
 
 
-def _reason(said: list[str]) -> str:
-    """Return why a program failed by what it said; pip tells of the network in warnings alone."""
-    for sign, reason in UNREACHED.items():
-        if any(sign in line for line in said):
+def _reason(lines: list[str]) -> str:
+    """Return why a program failed; pip reports network errors in warnings only."""
+    for name, reason in NETWORK_ERRORS.items():
+        if any(name in line for line in lines):
             return reason
-    errors = [line[7:] for line in said if line.startswith("ERROR: ")]
-    return (errors[:1] or said[-1:] or [""])[0].rstrip(".")
+    errors = [line[7:] for line in lines if line.startswith("ERROR: ")]
+    return (errors[:1] or lines[-1:] or [""])[0].rstrip(".")
 
 
 class _Packages:
-    """How far pip is."""
+    """The progress of pip."""
 
     def __init__(self, watcher: Watcher, folder: Path) -> None:
         self.watcher, self.folder = watcher, folder
-        self.found, self.wanted, self.there = 0, 0, -1
+        self.collected, self.total, self.installed = 0, 0, -1
 
     def hear(self, line: str) -> None:
-        """Count a line of pip."""
+        """Count the packages in the output of pip."""
         stripped = line.strip()
-        named = FOUND.match(stripped)
-        if stripped.startswith(INSTALLING):
-            self.wanted = len(stripped.removeprefix(INSTALLING).split(", "))
-        elif named is not None:
-            self.found += 1
-            share = min(1.0, self.found / USUAL)
-            name = re.split(r"[^\w.]", Path(named[1]).name)[0]
-            self.watcher.progress(int(MADE + share * (GATHERED - MADE)), f"gathering {name}")
+        collecting = PIP_COLLECTING.match(stripped)
+        if stripped.startswith(PIP_INSTALLING):
+            self.total = len(stripped.removeprefix(PIP_INSTALLING).split(", "))
+        elif collecting is not None:
+            self.collected += 1
+            share = min(1.0, self.collected / USUAL_COUNT)
+            name = re.split(r"[^\w.]", Path(collecting[1]).name)[0]
+            percent = int(CREATED + share * (COLLECTED - CREATED))
+            self.watcher.progress(percent, f"gathering {name}")
 
     def look(self) -> None:
-        """Count what is installed, of which pip says nothing."""
-        if not self.wanted:
+        """Count the packages on disk, since pip prints nothing while it installs them."""
+        if not self.total:
             return
         packages = "Lib/site-packages" if sys.platform == "win32" else "lib/python*/site-packages"
-        there = sum(1 for _ in self.folder.glob(f"{packages}/*.dist-info"))
-        if there != self.there:
-            self.there = there
-            share = min(1.0, there / self.wanted)
-            percent = int(GATHERED + share * (INSTALLED - GATHERED))
-            self.watcher.progress(percent, f"installing {self.wanted} packages")
+        installed = sum(1 for _ in self.folder.glob(f"{packages}/*.dist-info"))
+        if installed != self.installed:
+            self.installed = installed
+            share = min(1.0, installed / self.total)
+            percent = int(COLLECTED + share * (INSTALLED - COLLECTED))
+            self.watcher.progress(percent, f"installing {self.total} packages")
 
 
 def _program(folder: Path, name: str) -> Path:
-    """Return where a virtual environment has a program."""
+    """Return the path of a program in a virtual environment."""
     if sys.platform == "win32":
         return folder / "Scripts" / f"{name}.exe"
     return folder / "bin" / name
 
 
 def _requirement(version: str) -> str:
-    """Return what pip shall install: the wheel that is packed with the plugin, or else by name."""
-    packed = sorted(HERE.glob("semsig_gis-*.whl"))
-    return f"{packed[-1]}[raster,serve]" if packed else f"semsig_gis[raster,serve]=={version}"
+    """Return the requirement for pip: the wheel in the plugin if there is one, else by version."""
+    wheels = sorted(HERE.glob("semsig_gis-*.whl"))
+    return f"{wheels[-1]}[raster,serve]" if wheels else f"semsig_gis[raster,serve]=={version}"
 
 
 def _remove(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def find_python(chosen: str, environment: Mapping[str, str], *, wheels: str = "") -> str:
-    """Return a Python that can make the engine's environment.
+def find_python(setting: str, environment: Mapping[str, str], *, wheels: str = "") -> str:
+    """Return a Python that can create the environment of the engine.
 
     Parameters
     ----------
-    chosen : str
-        What the settings say; empty where nothing was chosen.
+    setting : str
+        The Python in the settings; empty if not set.
     environment : mapping of str to str
         See `command.clean_environment`.
     wheels : str, optional
-        Folder of wheels, some of which may be for one version of Python alone.
+        Folder of wheels; some may be for certain versions of Python only.
 
     Returns
     -------
     str
-        The program.
+        The path of the program.
 
     Raises
     ------
@@ -332,106 +337,97 @@ def find_python(chosen: str, environment: Mapping[str, str], *, wheels: str = ""
         If there is none, with what to do.
     """
     incomplete = ""
-    seen: list[str] = []
+    versions: list[str] = []
     fitting = _versions(wheels) if wheels else set()
     others = False
-    for program in [chosen] if chosen else _pythons(environment):
-        told = _ask(program, environment)
-        if told is None:
+    for program in [setting] if setting else _pythons(environment):
+        answer = _probe(program, environment)
+        if answer is None:
             continue
-        version, complete = told
+        version, complete = answer
         fits = not fitting or version in fitting
         if version >= OLDEST and complete and fits:
             return program
         if version >= OLDEST and not complete:
             incomplete = incomplete or program
         others = others or not fits
-        seen.append(".".join(map(str, version)))
+        versions.append(".".join(map(str, version)))
     if others:
+        wheel_versions = " or ".join(".".join(map(str, version)) for version in sorted(fitting))
         message = (
-            f"The wheels in {wheels} are for Python {_listed(fitting)}, and there is only "
-            f"{', '.join(dict.fromkeys(seen))}; install that Python, or get wheels for this one."
+            f"The wheels in {wheels} are for Python {wheel_versions}, and there is only "
+            f"{', '.join(dict.fromkeys(versions))}; install that Python, or get wheels for this "
+            "one."
         )
     elif incomplete:
         message = (
             f"{incomplete} cannot make virtual environments; install what is missing (on Debian "
             "and Ubuntu: sudo apt install python3-venv), then press Install again."
         )
-    elif chosen:
-        what = f"is Python {seen[0]}" if seen else "is not a Python that can be run"
+    elif setting:
+        what = f"is Python {versions[0]}" if versions else "is not a Python that can be run"
         message = (
-            f"{chosen} {what}; choose a Python of version 3.11 or newer in {SETTINGS}, or leave it "
-            "empty to look for one."
+            f"{setting} {what}; choose a Python of version 3.11 or newer in {SETTINGS}, or leave "
+            "it empty to look for one."
         )
     else:
-        there = f", only {', '.join(sorted(set(seen)))}" if seen else ""
+        existing = f", only {', '.join(sorted(set(versions)))}" if versions else ""
         message = (
-            f"There is no Python of version 3.11 or newer on this computer{there}; install one "
+            f"There is no Python of version 3.11 or newer on this computer{existing}; install one "
             f"from python.org or your system's packages, then press Install in {ENGINE}"
         )
     raise CommandError(message)
 
 
 def _versions(wheels: str) -> set[tuple[int, int]]:
-    """Return the versions of Python that wheels of a folder name, if any do."""
-    names = (TAG.search(wheel.name) for wheel in Path(wheels).glob("*.whl"))
-    return {(3, int(tag[1])) for tag in names if tag is not None}
-
-
-def _listed(versions: set[tuple[int, int]]) -> str:
-    return " or ".join(".".join(map(str, version)) for version in sorted(versions))
+    """Return the versions of Python in the names of wheels in a folder."""
+    tags = (WHEEL_TAG.search(wheel.name) for wheel in Path(wheels).glob("*.whl"))
+    return {(3, int(tag[1])) for tag in tags if tag is not None}
 
 
 def _pythons(environment: Mapping[str, str]) -> Iterator[str]:
-    """Yield the programs that may be a Python, each once: QGIS's own last, since it may move."""
-    folders = [str(folder) for place in PYTHONS for folder in _matching(place)]
+    """Yield programs that may be a Python, each once; the Python of QGIS last, as it may move."""
+    folders = [str(folder) for place in PYTHONS for folder in matching_folders(place)]
     path = os.pathsep.join([environment.get("PATH", ""), *folders])
-    named = [shutil.which(name, path=path) for name in PROGRAMS]
-    # Python 3 of Windows has one name in many folders.
-    named += [shutil.which("python", path=folder) for folder in reversed(folders)]
+    programs = [shutil.which(name, path=path) for name in PROGRAMS]
+    # On Windows, all versions have the same name, in different folders.
+    programs += [shutil.which("python", path=folder) for folder in reversed(folders)]
     own = Path(sys.exec_prefix)
-    named += [str(own / name) for name in ("python3.exe", "python.exe", "bin/python3")]
-    for program in dict.fromkeys(one for one in named if one):
+    programs += [str(own / name) for name in ("python3.exe", "python.exe", "bin/python3")]
+    for program in dict.fromkeys(filter(None, programs)):
         if Path(program).is_file():
             yield program
 
 
-def _matching(place: str) -> list[Path]:
-    path = Path(place).expanduser()
-    if not path.is_absolute():
-        return []
-    return sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-
-
-def _ask(program: str, environment: Mapping[str, str]) -> tuple[tuple[int, int], bool] | None:
-    """Return the version of a Python, and whether it can make virtual environments."""
-    said: list[str] = []
+def _probe(program: str, environment: Mapping[str, str]) -> tuple[tuple[int, int], bool] | None:
+    """Return the version of a Python, and whether it can create virtual environments."""
+    lines: list[str] = []
     try:
-        run_program([program, "-c", ASK], environment, said.append, lambda: False)
+        run_program([program, "-c", PROBE], environment, lines.append, lambda: False)
     except CommandError:
         return None
-    told = TOLD.fullmatch("\n".join(said[-1:]))
-    return None if told is None else ((int(told[1]), int(told[2])), told[3] == "True")
+    output = PROBE_OUTPUT.fullmatch("\n".join(lines[-1:]))
+    return None if output is None else ((int(output[1]), int(output[2])), output[3] == "True")
 
 
 def proxy_variables(settings: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment variables for the proxy that QGIS is told to use.
+    """Return the environment variables for the proxy in the settings of QGIS.
 
     Parameters
     ----------
     settings : mapping of str to str
-        Those of QGIS: ``proxyEnabled``, ``proxyType``, ``proxyHost``, ``proxyPort``,
-        ``proxyUser``, ``proxyPassword`` and ``noProxyUrls``, with commas between the last ones.
+        Settings of QGIS: ``proxyEnabled``, ``proxyType``, ``proxyHost``, ``proxyPort``,
+        ``proxyUser``, ``proxyPassword`` and ``noProxyUrls`` (separated by commas).
 
     Returns
     -------
     dict
-        The variables. None where QGIS has no proxy of its own: those of the system count then.
+        The variables; empty if QGIS has no proxy, so that the variables of the system apply.
 
     Examples
     --------
-    >>> told = {"proxyEnabled": "true", "proxyType": "HttpProxy", "proxyHost": "proxy.town"}
-    >>> proxy_variables({**told, "proxyPort": "3128"})["HTTPS_PROXY"]
+    >>> proxy = {"proxyEnabled": "true", "proxyType": "HttpProxy", "proxyHost": "proxy.town"}
+    >>> proxy_variables({**proxy, "proxyPort": "3128"})["HTTPS_PROXY"]
     'http://proxy.town:3128'
     """
     kind, host = settings.get("proxyType", ""), settings.get("proxyHost", "")
@@ -443,9 +439,9 @@ def proxy_variables(settings: Mapping[str, str]) -> dict[str, str]:
     login = quote(user, safe="") + (f":{quote(password, safe='')}" if password else "")
     port = settings.get("proxyPort", "")
     address = f"{scheme}://{login + '@' if user else ''}{host}{':' + port if port else ''}"
-    excluded = [one.strip() for one in settings.get("noProxyUrls", "").split(",") if one.strip()]
-    hosts = [re.sub(r"^\w+://", "", one).split("/")[0] for one in excluded]
-    told = dict.fromkeys(("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"), address)
-    told["NO_PROXY"] = ",".join(["localhost", "127.0.0.1", *hosts])
-    # Some programs know these names in small letters alone.
-    return {**told, **{name.lower(): value for name, value in told.items()}}
+    excluded = filter(None, map(str.strip, settings.get("noProxyUrls", "").split(",")))
+    hosts = [re.sub(r"^\w+://", "", url).split("/")[0] for url in excluded]
+    variables = dict.fromkeys(("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"), address)
+    variables["NO_PROXY"] = ",".join(["localhost", "127.0.0.1", *hosts])
+    # Some programs read these names only in lower case.
+    return {**variables, **{name.lower(): value for name, value in variables.items()}}

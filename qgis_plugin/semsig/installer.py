@@ -21,7 +21,7 @@ from qgis.PyQt.QtWidgets import (
 
 from . import settings
 from .command import Cancelled, CommandError, Watcher
-from .words import tr
+from .translation import tr
 
 if TYPE_CHECKING:
     from qgis.PyQt.QtWidgets import QWidget
@@ -32,14 +32,14 @@ __all__ = ["EngineDialog", "Installation"]
 
 
 class Installation(QgsTask):
-    """Installs the engine beside all other work; it can be cancelled."""
+    """Installs the engine in the background; it can be cancelled."""
 
-    said = pyqtSignal(str)
+    logged = pyqtSignal(str)
     """A line for the log."""
-    doing = pyqtSignal(int, str)
-    """The percent that is done, and of what."""
+    progressed = pyqtSignal(int, str)
+    """The finished percentage and the name of the step."""
     ended = pyqtSignal(bool, str)
-    """Whether it went well, and what there is to say."""
+    """Whether it succeeded, and a message."""
 
     def __init__(self, engine: Engine, wishes: Wishes) -> None:
         super().__init__(tr("Installing the engine of Semantic signatures"))
@@ -47,12 +47,12 @@ class Installation(QgsTask):
         self.message = ""
 
     def run(self) -> bool:
-        """Do the work; QGIS calls this in a thread of its own."""
-        watcher = Watcher(self._progress, self.said.emit, self.isCanceled)
+        """Install the engine; QGIS calls this in a separate thread."""
+        watcher = Watcher(self._progress, self.logged.emit, self.isCanceled)
         try:
             program = self.engine.install(self.wishes, os.environ, watcher)
         except Cancelled:
-            self.message = tr("Cancelled; what was there before is as it was.")
+            self.message = tr("Cancelled; the previous state was not changed.")
             return False
         except CommandError as error:
             self.message = str(error)
@@ -62,18 +62,18 @@ class Installation(QgsTask):
 
     def _progress(self, percent: int, label: str) -> None:
         self.setProgress(percent)
-        self.doing.emit(percent, label)
+        self.progressed.emit(percent, label)
 
     def finished(self, result: bool) -> None:  # noqa: FBT001 - as QGIS calls it
-        """Tell the end; QGIS calls this where the windows are."""
+        """Report the end; QGIS calls this in the thread of the windows."""
         self.ended.emit(result, self.message)
 
 
 class EngineDialog(QDialog):
-    """Says whether the engine is there, installs it, repairs it, takes it away."""
+    """Shows the state of the engine, installs it, repairs it and removes it."""
 
     changed = pyqtSignal()
-    """The engine came or went."""
+    """The engine was installed or removed."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -94,7 +94,7 @@ class EngineDialog(QDialog):
         self.install = QPushButton()
         self.install.clicked.connect(self.start)
         self.remove = QPushButton(tr("Remove"))
-        self.remove.clicked.connect(self.take_away)
+        self.remove.clicked.connect(self.remove_engine)
         self.stop = QPushButton(tr("Cancel"))
         self.stop.clicked.connect(self.cancel)
         close = QPushButton(tr("Close"))
@@ -104,16 +104,17 @@ class EngineDialog(QDialog):
             buttons.addWidget(button)
         buttons.addStretch()
         buttons.addWidget(close)
-        whole = QVBoxLayout(self)
-        whole.addWidget(self.state)
-        whole.addLayout(form)
-        whole.addWidget(self.stage)
-        whole.addWidget(self.bar)
-        whole.addWidget(self.log)
-        whole.addLayout(buttons)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.state)
+        layout.addLayout(form)
+        layout.addWidget(self.stage)
+        layout.addWidget(self.bar)
+        layout.addWidget(self.log)
+        layout.addLayout(buttons)
         self.show_state()
 
     def _chooser(self, name: str, empty: str, *, folder: bool = False) -> QgsFileWidget:
+        """Return a widget for a path in the settings; `empty` is shown if it is not set."""
         widget = QgsFileWidget()
         mode = QgsFileWidget.StorageMode
         widget.setStorageMode(mode.GetDirectory if folder else mode.GetFile)
@@ -123,12 +124,12 @@ class EngineDialog(QDialog):
         return widget
 
     def show_state(self, message: str = "") -> None:
-        """Say how things stand.
+        """Show the state of the engine, and enable the buttons.
 
         Parameters
         ----------
         message : str, optional
-            What there is to say besides.
+            A message below the state.
         """
         engine, running = settings.engine(), self.task is not None
         if not engine.command:
@@ -154,8 +155,8 @@ class EngineDialog(QDialog):
         """Install the engine, or install it again."""
         self.log.clear()
         self.task = Installation(settings.engine(), settings.wishes())
-        self.task.said.connect(self.log.appendPlainText)
-        self.task.doing.connect(self._progress)
+        self.task.logged.connect(self.log.appendPlainText)
+        self.task.progressed.connect(self._progress)
         self.task.ended.connect(self._end)
         self.bar.setValue(0)
         self.show_state(tr("Looking for Python..."))
@@ -167,7 +168,7 @@ class EngineDialog(QDialog):
             self.stage.setText(tr("Stopping..."))
             self.task.cancel()
 
-    def take_away(self) -> None:
+    def remove_engine(self) -> None:
         """Remove the engine."""
         settings.engine().remove()
         self.show_state(tr("The engine was removed."))
@@ -177,7 +178,7 @@ class EngineDialog(QDialog):
         self.bar.setValue(percent)
         self.stage.setText(f"{label[:1].upper()}{label[1:]}...")
 
-    def _end(self, _well: bool, message: str) -> None:  # noqa: FBT001
+    def _end(self, _success: bool, message: str) -> None:  # noqa: FBT001
         self.task = None
         self.show_state(message)
         self.log.appendPlainText(message)

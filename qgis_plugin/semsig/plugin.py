@@ -1,4 +1,4 @@
-"""What QGIS loads and unloads."""
+"""The plugin object that QGIS loads and unloads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qgis.PyQt.QtGui import QIcon
 
 from . import settings
 from .provider import SemsigProvider
-from .words import speak, tr
+from .translation import install_translator, tr
 
 if TYPE_CHECKING:
     from qgis.gui import QgisInterface
@@ -31,12 +31,12 @@ class SemsigPlugin:
     Parameters
     ----------
     iface : QgisInterface or None
-        The window of QGIS; None where there is none.
+        The window of QGIS; None without a window.
     """
 
     def __init__(self, iface: QgisInterface | None = None) -> None:
         self.iface = iface
-        self.translator = speak()
+        self.translator = install_translator()
         self.provider: SemsigProvider | None = None
         self.menu: QMenu | None = None
         self.bar: QToolBar | None = None
@@ -45,7 +45,7 @@ class SemsigPlugin:
         self.help: QTextBrowser | None = None
 
     def initProcessing(self) -> None:  # noqa: N802 - the names are those of QGIS
-        """Add the provider; all that `qgis_process` calls."""
+        """Add the provider; `qgis_process` calls only this."""
         self.provider = SemsigProvider()
         QgsApplication.processingRegistry().addProvider(self.provider)
 
@@ -64,7 +64,7 @@ class SemsigPlugin:
         self.bar.addAction(icon, tr("Explore a city")).triggered.connect(self.show_dock)
 
     def show_dock(self) -> None:
-        """Show the dock that asks a city."""
+        """Show the dock to explore a city."""
         from .dock import SemsigDock
 
         if self.dock is None and self.iface is not None:
@@ -86,7 +86,7 @@ class SemsigPlugin:
             self.dialog.raise_()
 
     def show_help(self) -> None:
-        """Show the page of help, which is that of the documentation."""
+        """Show the help, a page of the documentation."""
         from qgis.PyQt.QtWidgets import QTextBrowser
 
         if self.help is None and self.iface is not None:
@@ -101,12 +101,12 @@ class SemsigPlugin:
             self.help.raise_()
 
     def unload(self) -> None:
-        """Take all of it away."""
+        """Remove all parts of the plugin."""
         if self.dialog is not None:
             self.dialog.cancel()
             self.dialog.deleteLater()
         if self.dock is not None and self.iface is not None:
-            self.dock.leave()
+            self.dock.clean_up()
             self.iface.removeDockWidget(self.dock)
             self.dock.deleteLater()
         for widget in (self.menu, self.bar, self.help):

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from pkgutil import iter_modules
+
 from qgis.core import QgsProcessingProvider
 from qgis.PyQt.QtGui import QIcon
 
-from . import settings
-from .build import Build
-from .evaluate import Evaluate
-from .export import Export
-from .extras import Ambiguity, Demo, Draft, Update
-from .fetch import FetchCanvas, FetchCity
-from .identify import Identify
-from .load import Load
-from .localize import Localize
+from . import settings, tools
 
 __all__ = ["SemsigProvider"]
 
@@ -30,7 +25,7 @@ class SemsigProvider(QgsProcessingProvider):
         return settings.GROUP
 
     def longName(self) -> str:  # noqa: N802 - the names are those of QGIS
-        """Return the name with what it is for."""
+        """Return the name with the name of the command."""
         return "Semantic signatures (semsig)"
 
     def icon(self) -> QIcon:
@@ -48,21 +43,21 @@ class SemsigProvider(QgsProcessingProvider):
         return True
 
     def unload(self) -> None:
-        """Take the settings away."""
+        """Remove the settings."""
         settings.remove_settings()
 
     def loadAlgorithms(self) -> None:  # noqa: N802
-        """Add the algorithms, in the order in which they are used."""
-        for algorithm in (
-            *(Load, Build, Localize, Evaluate, Identify, Export),
-            *(FetchCanvas, FetchCity, Update, Draft, Ambiguity, Demo),
-        ):
-            self.addAlgorithm(algorithm())
+        """Add the algorithms, which are the classes in `__all__` of the modules in `tools`."""
+        for _, name, _ in iter_modules(tools.__path__):
+            module = import_module(f"{tools.__name__}.{name}")
+            for member in map(vars(module).get, module.__all__):
+                if isinstance(member, type):
+                    self.addAlgorithm(member())
 
     def defaultVectorFileExtension(self, _hasGeometry: bool = True) -> str:  # noqa: N802, N803, FBT001, FBT002
-        """Return what a layer is written to where nothing else is said."""
+        """Return the suffix of layers by default."""
         return "gpkg"
 
     def supportedOutputVectorLayerExtensions(self) -> list[str]:  # noqa: N802
-        """Return what a layer can be written to."""
+        """Return the suffixes that layers can have."""
         return ["gpkg"]

@@ -1,4 +1,4 @@
-"""Answers of the dock as layers of the project, in a group of their own."""
+"""Show the answers of the dock as layers of the project, in a group."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from qgis.PyQt.QtCore import QTimer
 from qgis.PyQt.QtGui import QPainter
 
 from .answers import CANDIDATE_FIELDS, PLACE_FIELDS
-from .words import tr
+from .translation import tr
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from qgis.core import QgsLayerTreeGroup
 
-__all__ = ["gather", "group_of", "show_answer"]
+__all__ = ["group_of", "move_to_group", "show_answer"]
 
 WGS84 = "EPSG:4326"
 KEY = "semsig"
-"""Property of the layers and groups that are ours."""
+"""Custom property of the layers of the plugin."""
 
 
 def group_of(title: str) -> QgsLayerTreeGroup:
-    """Return the group of that title above all layers, made where it is missing.
+    """Return the group with a title; create it above all layers if it is missing.
 
     Parameters
     ----------
@@ -50,15 +50,15 @@ def group_of(title: str) -> QgsLayerTreeGroup:
     return group
 
 
-def gather(identifier: str, title: str) -> None:
-    """Put a layer into a group, once QGIS has put it into the tree.
+def move_to_group(identifier: str, title: str) -> None:
+    """Move a layer into a group, after QGIS has added it to the layer tree.
 
     Parameters
     ----------
     identifier : str
-        Of the layer.
+        Identifier of the layer.
     title : str
-        Of the group.
+        Title of the group.
     """
 
     def move() -> None:
@@ -66,44 +66,42 @@ def gather(identifier: str, title: str) -> None:
         group = None if node is None else group_of(title)
         if node is None or group is None or node.parent() == group:
             return
-        number = sum(1 for one in group.findLayers() if not _below(one.layer(), node.layer()))
+        # Insert the layer above the layers of its height and below the others.
+        height = _height(node.layer())
+        layers = [child.layer() for child in group.findLayers()]
+        number = sum(1 for layer in layers if layer is None or _height(layer) < height)
         group.insertChildNode(number, node.clone())
         node.parent().removeChildNode(node)
 
     QTimer.singleShot(0, move)
 
 
-# What belongs above what, so that nothing is painted over: points, then lines, then areas. What
-# is blended with what is below lies below its like.
-HEIGHT = {0: 0, 1: 1, 2: 2}
-
-
-def _below(there: QgsVectorLayer, new: QgsVectorLayer) -> bool:
-    """Tell whether a layer that is there belongs below a new one."""
-    if there is None or new is None:
-        return False
-    return _height(there) >= _height(new)
+LOWEST = 3
 
 
 def _height(layer: Any) -> float:  # noqa: ANN401 - any kind of layer
+    """Return the place of a layer from above: points 0, lines 1, areas 2, others below.
+
+    Blended layers are below other layers of the same geometry, so that nothing is hidden.
+    """
     if not isinstance(layer, QgsVectorLayer):
-        return len(HEIGHT) + 1
+        return LOWEST + 1
     kind = layer.geometryType()
-    height = HEIGHT.get(int(getattr(kind, "value", kind)), len(HEIGHT))
+    height = min(int(getattr(kind, "value", kind)), LOWEST)
     if layer.blendMode() == QPainter.CompositionMode.CompositionMode_SourceOver:
         return height
     return height + 0.5
 
 
 def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN401 - a function
-    """Show an answer of the workbench as two layers, which take the place of the last answer's.
+    """Show an answer of the workbench as two layers, which replace the previous answer.
 
     Parameters
     ----------
     answer : dict
         See `semsig_gis.serve.drawing.answer_drawing`.
     load_style : callable
-        Takes a layer and the name of its style.
+        Called with a layer and the name of its style.
     """
     estimate = answer["estimate"]
     ring = [QgsPointXY(lon, lat) for lat, lon in estimate["ellipse"]]
@@ -115,12 +113,17 @@ def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN40
         "heading": estimate["heading"],
     }
     rows: list[tuple[QgsGeometry, dict[str, Any]]] = []
-    for one in answer["candidates"]:
-        lat, lon = one["place"]
-        point = QgsGeometry.fromPointXY(QgsPointXY(lon, lat))
-        row = {"rank": one["rank"], "rank_high": one["rank"], "cell_id": one["cell"]}
-        types = one["types"]
-        rows.append((point, {**row, "types": types, "length": len(types), "chance": one["chance"]}))
+    for candidate in answer["candidates"]:
+        lat, lon = candidate["place"]
+        values = {
+            "rank": candidate["rank"],
+            "rank_high": candidate["rank"],
+            "cell_id": candidate["cell"],
+            "types": candidate["types"],
+            "length": len(candidate["types"]),
+            "chance": candidate["chance"],
+        }
+        rows.append((QgsGeometry.fromPointXY(QgsPointXY(lon, lat)), values))
     polygon = QgsGeometry.fromPolygonXY([ring])
     for name, title, kind, fields, contents in (
         ("place", tr("Place"), "Polygon", PLACE_FIELDS, [(polygon, place)]),
@@ -138,13 +141,13 @@ def _layer(
     fields: dict[str, str],
     load_style: Any,  # noqa: ANN401
 ) -> QgsVectorLayer:
-    """Return the layer of ours that is there, or a new one in the group of answers."""
+    """Return the existing layer of an answer, or a new one in the group of answers."""
     project = QgsProject.instance()
     for layer in project.mapLayers().values():
         if layer.customProperty(KEY) == name:
             return layer
-    told = "&".join(f"field={field}:{type_}" for field, type_ in fields.items())
-    layer = QgsVectorLayer(f"{kind}?crs={WGS84}&{told}", title, "memory")
+    query = "&".join(f"field={field}:{type_}" for field, type_ in fields.items())
+    layer = QgsVectorLayer(f"{kind}?crs={WGS84}&{query}", title, "memory")
     layer.setCustomProperty(KEY, name)
     layer.setCustomProperty("skipMemoryLayersCheck", 1)
     load_style(layer, name)
@@ -154,6 +157,7 @@ def _layer(
 
 
 def _fill(layer: QgsVectorLayer, contents: Iterable[tuple[QgsGeometry, dict[str, Any]]]) -> None:
+    """Replace the features of a layer."""
     provider = layer.dataProvider()
     provider.truncate()
     features = []

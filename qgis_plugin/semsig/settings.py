@@ -1,4 +1,4 @@
-"""What is set in QGIS: where the engine is or comes from, the servers, the proxy."""
+"""The settings in QGIS: the command, the installation of the engine, the server, the proxy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from qgis.PyQt.QtGui import QIcon
 
 from .command import clean_environment, find_command
 from .engine import Engine, Wishes, proxy_variables
-from .words import tr
+from .translation import tr
 
 __all__ = [
     "COMMAND",
@@ -40,7 +40,7 @@ HERE = Path(__file__).parent
 
 
 def icon_path() -> str:
-    """Return where the icon is."""
+    """Return the path of the icon."""
     return str(HERE / "icon.svg")
 
 
@@ -58,13 +58,13 @@ def add_settings() -> None:
 
 
 def remove_settings() -> None:
-    """Take the settings away."""
+    """Remove the settings."""
     for name in (COMMAND, PYTHON, WHEELS, OVERPASS):
         ProcessingConfig.removeSetting(name)
 
 
 def value(name: str) -> str:
-    """Return what a setting says, or nothing.
+    """Return the value of a setting.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def value(name: str) -> str:
     Returns
     -------
     str
-        What it says, without blanks around it.
+        The value without surrounding blanks; empty if not set.
     """
     return str(ProcessingConfig.getSetting(name) or "").strip()
 
@@ -87,7 +87,7 @@ def set_value(name: str, text: str) -> None:
     name : str
         Its name.
     text : str
-        What it shall say.
+        The new value.
     """
     ProcessingConfig.setSettingValue(name, text)
 
@@ -101,7 +101,7 @@ def engine() -> Engine:
 
 
 def command() -> str:
-    """Return the command; `CommandError` where there is none."""
+    """Return the path of the command; raise CommandError if there is none."""
     return find_command(value(COMMAND), os.environ, own=engine().command)
 
 
@@ -111,17 +111,18 @@ def environment() -> dict[str, str]:
 
 
 def wishes() -> Wishes:
-    """Return how the engine shall be installed."""
+    """Return the options for the installation of the engine."""
     return Wishes(python=value(PYTHON), wheels=value(WHEELS), proxies=_proxies())
 
 
 def _proxies() -> dict[str, str]:
+    """Return the environment variables for the proxy of QGIS."""
     settings = QgsSettings()
     names = ("proxyEnabled", "proxyType", "proxyHost", "proxyPort", "proxyUser", "proxyPassword")
-    told = {name: str(settings.value(f"proxy/{name}", "") or "") for name in names}
+    proxy_settings = {name: str(settings.value(f"proxy/{name}", "") or "") for name in names}
     if settings.value("proxy/authcfg", ""):  # the login is in the locked store of QGIS
         proxy = QgsNetworkAccessManager.instance().fallbackProxy()
-        told.update(proxyUser=proxy.user(), proxyPassword=proxy.password())
-    without = settings.value("proxy/noProxyUrls", []) or []
-    told["noProxyUrls"] = without if isinstance(without, str) else ",".join(map(str, without))
-    return proxy_variables(told)
+        proxy_settings.update(proxyUser=proxy.user(), proxyPassword=proxy.password())
+    excluded = settings.value("proxy/noProxyUrls", []) or []
+    urls = [excluded] if isinstance(excluded, str) else map(str, excluded)
+    return proxy_variables({**proxy_settings, "noProxyUrls": ",".join(urls)})

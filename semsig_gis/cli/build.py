@@ -1,4 +1,4 @@
-"""`semsig build`, `update`, `merge`, `info` and `clean`: street objects become a database."""
+"""`semsig build`, `update`, `merge`, `info` and `clean`: signature databases."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
     from semsig_gis.database import Companion
+    from semsig_gis.objects import StreetObjects
 
 MB = 1e6
 
@@ -64,7 +65,7 @@ def build(
     viewpoints: Annotated[
         Literal["all", "outdoor", "streets"],
         typer.Option(
-            help="Look from every cell, outside --buildings, or along --streets and outside them."
+            help="Viewpoints: every cell, outdoor cells or cells near streets (needs --streets)."
         ),
     ] = "all",
     street_width: Annotated[
@@ -98,20 +99,21 @@ def build(
     if streets is not None and viewpoints != "streets":
         raise InputError("--streets is used only with --viewpoints streets; give both or neither.")
     keep_inputs(out, read=(objects, buildings, streets, area))
-    specs: dict[str, Any] = {
-        "grid": GridSpec(step, tuple(numbers(origin, "--origin"))),  # type: ignore[arg-type]
-        "spec": SignatureSpec(radius, levels),
-        "viewpoints": ViewpointSpec(
-            mode=viewpoints,
-            width=street_width / 2,
-            area=None
-            if area is None
-            else read_area(area, crs=open_objects(objects, box=EMPTY_BOX).crs),
-        ),
-    }
-    if tile is None and not workers and scheduler is None:
+    grid = GridSpec(step, tuple(numbers(origin, "--origin")))  # type: ignore[arg-type]
+    spec = SignatureSpec(radius, levels)
+    in_tiles = tile is not None or workers or scheduler is not None
+    if not in_tiles:
         require_suffix(".parquet", out)
-        cells, entries = _build_whole(objects, out, buildings, streets, specs)
+    # The objects of tiles are read tile by tile; here only their CRS is needed.
+    opened = open_objects(objects, box=EMPTY_BOX if in_tiles else None)
+    polygons = None if area is None else read_area(area, crs=opened.crs)
+    specs: dict[str, Any] = {
+        "grid": grid,
+        "spec": spec,
+        "viewpoints": ViewpointSpec(mode=viewpoints, width=street_width / 2, area=polygons),
+    }
+    if not in_tiles:
+        cells, entries = _build_whole(opened, out, buildings, streets, specs)
     else:
         from semsig_gis.database import TileSpec, build_tiles
 
@@ -137,15 +139,18 @@ def build(
 
 
 def _build_whole(
-    objects: Path, out: Path, buildings: Path | None, streets: Path | None, specs: dict[str, Any]
+    objects: StreetObjects,
+    out: Path,
+    buildings: Path | None,
+    streets: Path | None,
+    specs: dict[str, Any],
 ) -> tuple[int, int]:
-    """Build a database in one piece, and the object store beside it; return cells and entries."""
+    """Write a database in one file with its object store; return its cells and entries."""
     from semsig_gis.database import ObjectStore, build_database, save_with_store
-    from semsig_gis.objects import open_objects, read_surroundings
+    from semsig_gis.objects import read_surroundings
 
-    opened = open_objects(objects)
     notes: list[str] = []
-    read = partial(read_surroundings, crs=opened.crs, tell=notes.append)
+    read = partial(read_surroundings, crs=objects.crs, tell=notes.append)
     houses = None if buildings is None else read(buildings, role="buildings")
     lines = None if streets is None else read(streets, role="streets")
     if houses is not None and (invalid := int((~houses.is_valid).sum())):
@@ -154,12 +159,12 @@ def _build_whole(
         )
     for note in notes:
         remark(note)
-    opened = replace(opened, notes=(*opened.notes, *notes))
+    objects = replace(objects, notes=(*objects.notes, *notes))
     with progress("building") as advance:
         database = build_database(
-            opened, footprints=houses, streets=lines, progress=advance, **specs
+            objects, footprints=houses, streets=lines, progress=advance, **specs
         )
-    save_with_store(database, ObjectStore.of(opened, footprints=houses, streets=lines), out)
+    save_with_store(database, ObjectStore.of(objects, footprints=houses, streets=lines), out)
     return len(database), len(database.codes)
 
 
@@ -168,7 +173,7 @@ def update(
     database: Database,
     *,
     objects: Annotated[
-        Path, typer.Option(help="New street objects; their layers replace those of the database.")
+        Path, typer.Option(help="New street objects; their layers replace layers of the database.")
     ],
     out: Annotated[Path | None, typer.Option(help="Database to write; default: in place.")] = None,
     workers: Workers = 0,
@@ -263,9 +268,8 @@ def info(database: Database, *, as_json: AsJson = False) -> None:
     columns = known_identifiability(city)
     if columns is not None:
         print_tables(identifiability_tables(columns, object_counts=counts))
-    beside = companions(database)
-    if beside:
-        print_rows("Beside the database", ("File", "What", "MB"), map(_companion_row, beside))
+    if files := companions(database):
+        print_rows("Files of the database", ("File", "What", "MB"), map(_companion_row, files))
     for line in city.licenses:
         say(line)
 
@@ -279,12 +283,12 @@ def _info(path: Path) -> dict[str, Any]:
     columns = known_identifiability(city)
     if columns is not None:
         summary["identifiability"] = columns.summary(object_counts=counts)
-    summary["beside"] = [one.to_dict() for one in companions(path)]
+    summary["beside"] = [file.to_dict() for file in companions(path)]
     return summary
 
 
-def _companion_row(one: Companion) -> tuple[str, str, str]:
-    return one.path.name, one.what, f"{one.bytes / MB:,.1f}"
+def _companion_row(file: Companion) -> tuple[str, str, str]:
+    return file.path.name, file.what, f"{file.bytes / MB:,.1f}"
 
 
 @app.command()
@@ -303,21 +307,21 @@ def clean(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Remove leftover files beside a database.
+    """Remove leftover files next to a database.
 
     Older versions and interrupted runs leave them; the database is not changed.
     """
     from semsig_gis.database import remove_companions
 
     removed = remove_companions(database, objects=objects, dry_run=dry_run)
-    total = sum(one.bytes for one in removed)
+    total = sum(file.bytes for file in removed)
     if as_json:
         print_json(
-            {"dry_run": dry_run, "bytes": total, "removed": [one.to_dict() for one in removed]}
+            {"dry_run": dry_run, "bytes": total, "removed": [file.to_dict() for file in removed]}
         )
         return
     if not removed:
-        say(f"There is nothing to remove beside {database}.")
+        say(f"There is nothing to remove next to {database}.")
         return
     title = "Would be removed" if dry_run else "Removed"
     print_rows(title, ("File", "What", "MB"), map(_companion_row, removed))

@@ -1,8 +1,7 @@
-"""All commands."""
+"""All commands, registered by the imports below in the order of the help."""
 
 from semsig_gis.cli.console import app
 
-# The order of these imports is that of the help.
 # isort: off
 from semsig_gis.cli import (  # noqa: F401
     demo,

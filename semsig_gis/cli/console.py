@@ -1,4 +1,4 @@
-"""The command itself, and what several of its subcommands share."""
+"""The typer application, its output, and options and checks that several commands share."""
 
 from __future__ import annotations
 
@@ -42,30 +42,31 @@ VARIABLE = "SEMSIG_SUPERVISED"
 
 
 def supervised() -> bool:
-    """Tell whether another program watches this one."""
+    """Whether another program supervises this one."""
     return bool(os.environ.get(VARIABLE))
 
 
 def progress_line(label: str, percent: int) -> str:
-    """Return what a supervisor reads of the progress: ``semsig progress 40% building``."""
+    """Return a line of progress for a supervisor: ``semsig progress 40% building``."""
     return f"semsig progress {percent}% {label}"
 
 
 def stop_with_supervisor() -> None:
-    """From now on, be interrupted when the standard input ends."""
-    # A program that was itself started in the background hands on that interrupts be ignored.
+    """Interrupt this program when its standard input ends."""
+    # A background process may have inherited that interrupts are ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    # A copy, with nothing in the place of the original: on Windows, a library that asks for the
-    # kind of the standard input while it is loaded would wait for the read to end.
-    watched, nothing = os.dup(0), os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    threading.Thread(target=_interrupt_at_end_of, args=(watched,), daemon=True).start()
+    # Read a copy and replace the original with the null device: on Windows, a library that checks
+    # the type of the standard input while it is imported would wait for the read to end.
+    standard_input, null = os.dup(0), os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.close(null)
+    threading.Thread(target=_interrupt_at_end_of, args=(standard_input,), daemon=True).start()
 
 
-def _interrupt_at_end_of(watched: int) -> None:
-    # Not a file object, whose lock would be held when the interpreter ends.
-    while os.read(watched, 1):
+def _interrupt_at_end_of(descriptor: int) -> None:
+    """Interrupt the main thread when a file descriptor has no more data."""
+    # os.read, since a file object would hold its lock when the interpreter ends.
+    while os.read(descriptor, 1):
         pass
     if sys.platform == "win32":
         signal.raise_signal(signal.SIGINT)
@@ -73,45 +74,44 @@ def _interrupt_at_end_of(watched: int) -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
-# A bar appears for work that takes longer than this.
-PATIENCE_S = 2.0
+PATIENCE_S = 2.0  # a progress bar appears only if the work takes longer
 
 _AMOUNT = r"[-+±]?(?:\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|infinite)(?: ?(?:°|%|m|km|km²|m²|MB|s|ms))?"
 NUMBER = re.compile(rf"{_AMOUNT}(?:(?:-| to ){_AMOUNT})?")
-"""A number as tables have it, with its unit, or two that are the ends of an interval."""
+"""A number in a table with its unit, or the two ends of an interval."""
 
-# Whole numbers from here on are identifiers, which read better without separators.
-LARGEST_COUNT = 10**9
+LARGEST_COUNT = 10**9  # larger whole numbers are identifiers and get no thousands separators
 
 
 def say(text: object, *, err: bool = False, end: str = "\n") -> None:
-    """Print text on standard output, or on standard error; nothing in it moves the cursor.
+    """Print text on standard output or standard error, with escape sequences made visible.
 
-    Names and messages from elsewhere may hold escape sequences, which are shown (see `visible`).
+    Names and messages from files may contain them (see `visible`).
     """
-    typer.echo(visible_lines([str(text)])[0] + end, err=err, nl=False)  # noqa: TID251 - the one place
+    shown = visible_lines([str(text)])[0] + end
+    typer.echo(shown, err=err, nl=False)  # noqa: TID251 - the only place
 
 
 Talk = Literal["quiet", "plain", "verbose"]
 talk: ContextVar[Talk] = ContextVar("talk", default="plain")
-"""How much is told beside the results, by `--quiet` and `--verbose` of the command that runs."""
+"""How much is printed in addition to results, from `--quiet` and `--verbose`."""
 
 
 def remark(text: str) -> None:
-    """Say one sentence on standard error, after the name of the command, unless it is quiet."""
+    """Print a sentence on standard error after ``semsig:``, unless `--quiet` was given."""
     if talk.get() != "quiet":
         complain(text)
 
 
 def complain(text: str) -> None:
-    """Say one sentence on standard error in any case: why the command ends."""
+    """Print a sentence on standard error in any case: why the command ends."""
     say(f"semsig: {visible(text)}", err=True)
 
 
 def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 - any JSON
     """Print plain values without NaN or infinity as JSON on standard output.
 
-    ``indent=None`` gives a single line. Characters that the output cannot hold are escaped.
+    ``indent=None`` gives a single line. Characters that the output cannot encode are escaped.
     """
     dump = functools.partial(json.dumps, value, indent=indent, allow_nan=False)
     text = dump(ensure_ascii=False)
@@ -123,9 +123,9 @@ def print_json(value: Any, *, indent: int | None = 2) -> None:  # noqa: ANN401 -
 
 
 def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Print a table on standard output; text from data is neither markup nor moves the cursor.
+    """Print a table on standard output; markup and escape sequences in it have no effect.
 
-    Whole numbers get thousands separators. Columns of nothing but numbers stand to the right.
+    Whole numbers get thousands separators. Columns with only numbers are right-aligned.
     """
     from rich.console import Console
     from rich.table import Table
@@ -133,17 +133,18 @@ def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object
 
     table = Table(title=Text(visible(title)), title_justify="left")
     cells = [[_cell_text(cell) for cell in row] for row in rows]
+    # Escape all cells in one call, which is faster.
     shown = iter(visible_lines(text for row in cells for text in row))
     texts = [[next(shown) for _ in row] for row in cells]
     for number, name in enumerate(visible_lines(header)):
-        column = [one[number] for one in texts if number < len(one) and one[number]]
+        column = [row[number] for row in texts if number < len(row) and row[number]]
         right = bool(column) and all(map(NUMBER.fullmatch, column))
         table.add_column(Text(name), overflow="fold", justify="right" if right else "left")
     for row in texts:
         table.add_row(*map(Text, row))
     console = Console(file=sys.stdout)
     if not console.is_terminal:
-        # A file or a pipe has no width to fold to.
+        # A file or a pipe has no width; make the table as wide as it needs.
         wide = Console(file=sys.stdout, width=10_000)
         width = max(wide.measure(table).maximum, wide.measure(title).maximum)
         console = Console(file=sys.stdout, width=width)
@@ -159,20 +160,20 @@ def _cell_text(cell: object) -> str:
 def progress(
     label: str, *, unit: Literal["steps", "bytes"] = "steps"
 ) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on standard error once the work in the block takes a while.
+    """Show a progress bar on standard error if the work in the block takes a while.
 
-    The block gets a function, to be called with how much is done and how much there is in all. A
-    program that supervises this one gets lines instead (see `cli.console`), and who wants to know
-    every step gets a line when it begins and one when it is done.
+    The block gets a function to call with the amount of finished work and the total. A program
+    that supervises this one gets lines instead. With `--verbose`, a line is printed at the
+    beginning and at the end of the work.
     """
     if supervised():
         yield _progress_lines(label)
         return
     if talk.get() == "quiet":
-        yield lambda _done, _total: None
+        yield lambda _count, _total: None
         return
-    told = talk.get() == "verbose"
-    if told:
+    verbose = talk.get() == "verbose"
+    if verbose:
         remark(f"{label} ...")
     start = time.perf_counter()
     from rich import progress as parts
@@ -194,9 +195,9 @@ def progress(
     )
     task = bar.add_task(label, total=None, count="")
 
-    def advance(done: int, total: int) -> None:
-        count = f"{done:,} of {total:,}" if total else f"{done:,}"
-        bar.update(task, completed=done, total=total or None, count=count)
+    def advance(completed: int, total: int) -> None:
+        count = f"{completed:,} of {total:,}" if total else f"{completed:,}"
+        bar.update(task, completed=completed, total=total or None, count=count)
 
     patience = threading.Timer(PATIENCE_S, bar.start)
     patience.daemon = True
@@ -205,22 +206,22 @@ def progress(
         yield advance
     finally:
         patience.cancel()
-        # Stopping a bar that never showed, or shows nowhere, would print an empty line.
+        # Stopping a bar that was never shown would print an empty line.
         if bar.live.is_started:
             bar.stop()
-    if told:
+    if verbose:
         remark(f"{label}: {time.perf_counter() - start:.1f} s")
 
 
 def _progress_lines(label: str) -> Callable[[int, int], None]:
-    """Return what prints a line for every percent of the work."""
-    told = -1
+    """Return a function that prints a line for every percent of the work."""
+    last_percent = -1
 
-    def advance(done: int, total: int) -> None:
-        nonlocal told
-        percent = done * 100 // total if total else 0
-        if percent != told:
-            told = percent
+    def advance(completed: int, total: int) -> None:
+        nonlocal last_percent
+        percent = completed * 100 // total if total else 0
+        if percent != last_percent:
+            last_percent = percent
             say(progress_line(label, percent), err=True)
 
     advance(0, 1)
@@ -236,7 +237,7 @@ Verbose = Annotated[
 
 
 class Commands(typer.Typer):
-    """The commands, each of which can be told to be quiet or verbose."""
+    """A typer application that adds `--quiet` and `--verbose` to each command."""
 
     def command(  # type: ignore[override]
         self,
@@ -244,7 +245,7 @@ class Commands(typer.Typer):
         *,
         help: str | None = None,  # noqa: A002 - as typer's
     ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-        """Register a function as a command with the two options more."""
+        """Return a decorator that registers a function as a command with these two options."""
         register = super().command(name, help=help)
 
         def wrap(function: Callable[..., None]) -> Callable[..., None]:
@@ -259,21 +260,20 @@ class Commands(typer.Typer):
                     talk.reset(before)
 
             hints = get_type_hints(function, include_extras=True)
-            told = inspect.signature(function)
-            own = [
-                one.replace(
-                    annotation=hints.get(one.name, one.annotation),
+            parameters = [
+                parameter.replace(
+                    annotation=hints.get(parameter.name, parameter.annotation),
                     kind=inspect.Parameter.KEYWORD_ONLY,
                 )
-                for one in told.parameters.values()
+                for parameter in inspect.signature(function).parameters.values()
             ]
-            more = [
+            parameters += [
                 inspect.Parameter(
                     name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option
                 )
                 for name, option in (("quiet", Quiet), ("verbose", Verbose))
             ]
-            run.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
+            run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
             register(run)
             return function
 
@@ -288,8 +288,8 @@ app = Commands(
 )
 
 
-def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
-    if wanted:
+def _version(value: bool) -> None:  # noqa: FBT001 - typer calls it so
+    if value:
         say(f"semsig {__version__}")
         raise typer.Exit
 
@@ -321,7 +321,7 @@ Paper = Annotated[
     bool, typer.Option("--paper", help=f"Rank as the paper does: --method {PAPER_METHOD}.")
 ]
 
-# The ranges of numbers are those of the core (`core.ranges` and the specs), which loads slowly.
+# The same limits as in `core` and the specs, which are slow to import.
 MOST_SEED, MOST_METRES, MOST_WORKERS, MOST_QUERIES = 10**18, 1_000_000, 1024, 10_000_000
 
 Workers = Annotated[
@@ -331,45 +331,45 @@ Scheduler = Annotated[str | None, typer.Option(help="Dask scheduler, as tcp://HO
 
 
 def chosen_method(method: str | None, *, paper: bool) -> str:
-    """Return the text of the method that the options name."""
+    """Return the name of the method from --method and --paper."""
     if method is not None and paper:
         raise InputError(f"--paper was given with --method {method}; give one of them.")
     return PAPER_METHOD if paper else method or DEFAULT_METHOD
 
 
 def command_line() -> str:
-    """Return the command that is run, as a shell would read it."""
+    """Return this command as a line for a shell."""
     return shlex.join(["semsig", *sys.argv[1:]])
 
 
 def city_name(database: Path) -> str:
-    """Return what a city is called in headings, by the name of its file."""
+    """Return the name of a city for headings, from the name of its file."""
     return database.stem.replace("_", " ").capitalize()
 
 
 def keep_inputs(*written: Path | None, read: Iterable[str | Path | None]) -> None:
-    """Refuse to write over a file that is read, or two results to one file."""
-    taken = {os.path.realpath(path) for path in read if path is not None}
+    """Raise InputError if an input file would be overwritten, or a file written twice."""
+    used = {os.path.realpath(path) for path in read if path is not None}
     for path in written:
         if path is None:
             continue
-        if os.path.realpath(path) in taken:
+        if os.path.realpath(path) in used:
             raise InputError(
                 f"{path} would be written, but this command uses it for something else as "
                 "well; give another name."
             )
-        taken.add(os.path.realpath(path))
+        used.add(os.path.realpath(path))
 
 
 def require_suffix(suffix: str, *written: Path | None) -> None:
-    """Refuse a name that says that a file is of another kind than it will be."""
+    """Raise InputError if the name of a file to write has another suffix."""
     for path in written:
         if path is not None and path.suffix.lower() != suffix and not path.is_dir():
             raise InputError(f"{path} cannot be written; the name must end in {suffix}.")
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers of an option, which stand between commas."""
+    """Return the numbers of an option that are separated by commas."""
     try:
         return [float(part) for part in text.split(",")] if text.strip() else []
     except ValueError as error:
@@ -379,7 +379,7 @@ def numbers(text: str, option: str) -> list[float]:
 
 
 def known_identifiability(city: City) -> Identifiability | None:
-    """Return what the columns of a database tell; None, and say so, where they do not fit it."""
+    """Return the columns of `semsig identify`; None if missing, with a remark if outdated."""
     try:
         if not city.has_columns:
             return None
@@ -391,8 +391,8 @@ def known_identifiability(city: City) -> Identifiability | None:
         return None
 
 
-def tell_if_online(offline: bool, *, tiles: str | None = None) -> None:  # noqa: FBT001
-    """Remark that a map needs a network, where it does."""
+def warn_if_online(offline: bool, *, tiles: str | None = None) -> None:  # noqa: FBT001
+    """Print a remark if a map needs a network."""
     if not offline:
         what = "Leaflet" if tiles is None else "its tiles"
         remark(f"the map takes {what} from the web, so it needs a network to be displayed")

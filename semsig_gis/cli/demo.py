@@ -1,4 +1,4 @@
-"""`semsig demo`, `semsig synthesize`: made-up cities."""
+"""`semsig demo` and `semsig synthesize`: made-up cities."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from semsig_gis.cli.console import (
     progress,
     remark,
     say,
-    tell_if_online,
+    warn_if_online,
 )
 
 
@@ -52,8 +52,8 @@ def demo(
         evaluation = run(database, queries=queries, seed=seed, progress=advance)
     save_evaluation(evaluation, out / "evaluation")
     with progress("drawing the map"):
-        drawn = objects_map(objects, map_=evaluation_map(evaluation, database))
-        offline = save_map(drawn, out / "map.html")
+        map_ = objects_map(objects, map_=evaluation_map(evaluation, database))
+        offline = save_map(map_, out / "map.html")
     with progress("writing the GeoPackage") as advance:
         export_database(
             database,
@@ -66,7 +66,7 @@ def demo(
     say(f"map:        {out / 'map.html'}  (open it in a browser)")
     say(f"GeoPackage: {out / 'city.gpkg'}  (open it in QGIS)")
     say(f"database:   {out / 'city.parquet'}")
-    tell_if_online(offline)
+    warn_if_online(offline)
 
 
 @app.command()

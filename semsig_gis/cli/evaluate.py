@@ -1,4 +1,4 @@
-"""`semsig evaluate`, `experiment`, `compare`, `reproduce`: queries of known places."""
+"""`semsig evaluate`, `experiment`, `compare`, `reproduce` and `identify`: accuracy of answers."""
 
 from __future__ import annotations
 
@@ -92,12 +92,12 @@ def evaluate(
     keep_inputs(report, read=[database, drift_report])
     ranking = chosen_method(method, paper=paper)
     if ranking != LIKELIHOOD:
-        given = {
+        likelihood_options = {
             "--noise": noise != "generic",
             "--map-age": map_age,
             "--drift-report": drift_report,
         }
-        for option in (name for name, value in given.items() if value):
+        for option in (name for name, value in likelihood_options.items() if value):
             raise InputError(
                 f"{option} works only with the likelihood method, not with {ranking!r}; leave it "
                 "out."
@@ -110,17 +110,17 @@ def evaluate(
     from semsig_gis.localization import Method, build_index
     from semsig_gis.reports import evaluation_headline, evaluation_tables
 
-    if report is not None:  # what draws, and is missed before the work rather than after it
+    if report is not None:  # if matplotlib is missing, fail before the work instead of after it
         from semsig_gis.reports import evaluation_page, write_page
     chain = [
         dataclasses.replace(
-            one,
-            resort=one.resort and not keep_order,
-            false_class=false_class or one.false_class,
+            step,
+            resort=step.resort and not keep_order,
+            false_class=false_class or step.false_class,
         )
-        if isinstance(one, Distortion)
-        else one
-        for one in parse_chain(distortion)
+        if isinstance(step, Distortion)
+        else step
+        for step in parse_chain(distortion)
     ]
     city = open_city(database)
     measured = (
@@ -160,7 +160,7 @@ def evaluate(
         say(f"report: {report}  (open it in a browser)")
 
 
-Results = Annotated[Path, typer.Argument(help="Folder of an experiment or of an evaluation.")]
+Result = Annotated[Path, typer.Argument(help="Folder of an experiment or of an evaluation.")]
 
 
 @app.command()
@@ -193,7 +193,7 @@ def experiment(
 
 
 @app.command()
-def compare(first: Results, second: Results, *, as_json: AsJson = False) -> None:
+def compare(first: Result, second: Result, *, as_json: AsJson = False) -> None:
     """Compare two results of queries from the same places."""
     from semsig_gis.evaluation import (
         changed_successes,
@@ -260,7 +260,7 @@ def reproduce(
     with contextlib.ExitStack() as bar:
 
         def show(label: str) -> Callable[[int, int], None]:
-            bar.close()  # one at a time
+            bar.close()  # only one bar at a time
             return bar.enter_context(progress(label))
 
         reproduction = run(
@@ -285,18 +285,20 @@ def reproduce(
     if as_json:
         print_json(
             [
-                {"section": section.name, **{key: getattr(one, key) for key in NUMBER_KEYS}}
-                for section, one in numbers
+                {"section": section.name, **{key: getattr(number, key) for key in NUMBER_KEYS}}
+                for section, number in numbers
             ]
         )
         return
     rows = [
         (
-            *(section.title, one.row, one.column, _number(one.ours)),
-            "" if one.low is None or one.high is None else f"{one.low:.4g} to {one.high:.4g}",
-            _number(one.paper),
+            *(section.title, number.row, number.column, _number(number.ours)),
+            ""
+            if number.low is None or number.high is None
+            else f"{number.low:.4g} to {number.high:.4g}",
+            _number(number.paper),
         )
-        for section, one in numbers
+        for section, number in numbers
     ]
     say(report.headline)
     print_rows(report.title, ("Section", "What", "", "Ours", "95 %", "Paper"), rows)
@@ -348,7 +350,7 @@ def identify(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Predict how well each cell can be found, before any query.
+    """Predict how well queries from each cell will be located.
 
     Adds columns to the database, which `semsig info`, `map` and `export` show.
     """
@@ -367,8 +369,9 @@ def identify(
     columns = known_identifiability(city)
     settings = (model, radius, view, seed)
     if columns is not None:
-        known = (columns.noise, columns.radius, columns.view, columns.seed)
-        columns = columns if known == settings else None
+        # Columns in the database are used again if they have the same settings.
+        stored_settings = (columns.noise, columns.radius, columns.view, columns.seed)
+        columns = columns if stored_settings == settings else None
     workers = (os.cpu_count() or 1) if threads is None else threads
     if columns is None or check is not None:
         index = build_index(city.database, model)
@@ -379,7 +382,7 @@ def identify(
             )
         save_identifiability(columns, database)
     else:
-        remark("The database has these columns already; they are kept.")
+        remark("The database already has these columns; they are used again.")
     verification = None
     if check is not None:
         with progress("checking") as advance:
@@ -387,7 +390,7 @@ def identify(
                 columns, index, queries=check, threads=workers, progress=advance
             )
     if out is not None and verification is not None:
-        from semsig_gis.reports import write_report  # it loads what draws
+        from semsig_gis.reports import write_report  # imports matplotlib
 
         page = identifiability_page(
             columns,
@@ -410,9 +413,9 @@ def identify(
 
 
 def _require_check(check: int | None, out: Path | None) -> None:
-    """Refuse a folder for a report of a check that is not made, or that cannot be drawn."""
+    """Raise an error if --out is given without --check, or no report can be drawn."""
     if out is None:
         return
     if check is None:
         raise InputError("--out was given without --check; give both or neither.")
-    from semsig_gis.reports import draw_plot  # noqa: F401 - before the work, which takes long
+    from semsig_gis.reports import draw_plot  # noqa: F401 - matplotlib may be missing

@@ -1,4 +1,4 @@
-"""`semsig export` and `import`: results for other programs, and back."""
+"""`semsig export` and `import`: files for other programs, and databases from them."""
 
 from __future__ import annotations
 
@@ -85,14 +85,14 @@ def export(
         from semsig_gis.evaluation import open_evaluation
 
         queries = open_evaluation(evaluation)
-    # Hexagons count the objects that the database was built from, where they lie beside it.
-    seen = city.objects if h3 is not None and objects is None else None
+    # Hexagons count the objects that the database was built from, if they are stored with it.
+    stored_objects = city.objects if h3 is not None and objects is None else None
     with progress(f"writing {out.name}") as advance:
         export_database(
             city.database,
             out,
             layers=layer or (),
-            objects=seen if objects is None else open_objects(objects),
+            objects=stored_objects if objects is None else open_objects(objects),
             evaluation=queries,
             identifiability=known_identifiability(city),
             geometry=geometry,

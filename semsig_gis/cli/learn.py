@@ -1,4 +1,4 @@
-"""`semsig learn` and `semsig calibrate`: what detections of known places teach."""
+"""`semsig learn` and `semsig calibrate`: noise models and answer rules from known places."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def learn(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn how a detector fails from detections of known places.
+    """Learn the errors of a detector from detections of known places.
 
     Missed and false objects that the age of the map explains do not count.
     """
@@ -77,7 +77,7 @@ def learn(
     rows = read_samples(samples, taxonomy=city.database.taxonomy, radius=city.database.spec.radius)
     with progress("learning"):
         estimate = _estimate(city, rows, objects)
-    # How far the places were known is no matter of the detector.
+    # The uncertainty of the sample places is not an error of the detector.
     learnt = replace(estimate.spec, position_sigma=0.0, name=out.stem)
     noise = fresh_noise(learnt, map_age, database=city.database, drift=change)
     save_noise(noise, out)
@@ -86,11 +86,11 @@ def learn(
         print_json(estimate.to_dict())
         return
     skipped = estimate.skipped
-    nowhere = f"; {skipped} samples lie where nothing is in sight" if skipped else ""
+    skipped_text = f"; {skipped} samples are at places that see nothing" if skipped else ""
     print_rows(
         f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
-        f"{estimate.objects:,} objects{nowhere}",
-        ("quantity", "class", "value", "its own samples say", "95% interval", "samples"),
+        f"{estimate.objects:,} objects{skipped_text}",
+        ("quantity", "class", "value", "own samples only", "95% interval", "samples"),
         _rates(estimate.rates),
     )
     if map_age:
@@ -104,6 +104,7 @@ def learn(
 
 
 def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
+    """Estimate the noise from street objects if there are some, else from the cells."""
     import numpy as np
 
     from semsig_gis.localization import Sample, learn_noise
@@ -112,8 +113,9 @@ def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> No
     places = _places(database, samples)
     store = object_store(city, objects, needed=False)
     if store is None:
-        away = places - database.grid.viewpoints(*database.grid.cells_at(places))
-        sigma = math.sqrt(float(np.mean(away**2)))
+        # Each sample is compared with the centre of its cell, so this offset is an error as well.
+        offsets = places - database.grid.viewpoints(*database.grid.cells_at(places))
+        sigma = math.sqrt(float(np.mean(offsets**2)))
         return learn_noise(samples, database, position_sigma=sigma)
     placed = [
         Sample(signature=sample.signature, xy=(x, y))
@@ -140,15 +142,15 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
 
 
 def _rates(rates: pd.DataFrame) -> list[list[str]]:
-    """Return rates as rows of a table; those of classes far away are in the file alone."""
+    """Return rates as rows of a table; fading by class is only in the file."""
     from semsig_gis.localization import ALL
 
-    told = rates[(rates["quantity"] != "fading") | (rates["class"] == ALL)]
-    return [_rate(row) for row in told.to_dict("records")]
+    selected = rates[(rates["quantity"] != "fading") | (rates["class"] == ALL)]
+    return [_rate(row) for row in selected.to_dict("records")]
 
 
 def _rate(row: dict[Hashable, Any]) -> list[str]:
-    """Return a rate as a row of a table; a class without samples has nothing of its own."""
+    """Return a rate as a row of a table; own values are empty without samples."""
     samples = f"{row['samples']:.0f}"
     high = min(row["high_95"], 180.0)  # no error of a bearing is larger
     own = (
@@ -179,7 +181,7 @@ def calibrate(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose how likely a place must be to be given as an answer."""
+    """Choose from which chance on a place is given as an answer."""
     from dataclasses import asdict
 
     import numpy as np
@@ -205,7 +207,7 @@ def calibrate(
     places = _places(city.database, rows)
     with progress("answering") as advance:
         for number, sample in enumerate(rows):
-            if len(sample.signature):  # what saw nothing cannot be told
+            if len(sample.signature):  # a view of nothing has no answer
                 location = locator.locate(sample.signature)
                 masses[number] = location.answer.mass
                 position = location.estimate.x, location.estimate.y
@@ -220,14 +222,14 @@ def calibrate(
     if rule.answered:
         say(
             f"Answers from a chance of {rule.threshold:.4f} that the place is within {radius:g} m: "
-            f"{rule.answered:,} of {rule.queries:,} samples ({percent(rule.coverage)}), of which "
-            f"{rule.wrong:,} wrong; {percent(precision, 0)} right with a confidence of "
-            f"{percent(rule.confidence, 0)}."
+            f"{rule.answered:,} of {rule.queries:,} samples ({percent(rule.coverage)}) are "
+            f"answered, {rule.wrong:,} of them wrongly; {percent(precision, 0)} are right with a "
+            f"confidence of {percent(rule.confidence, 0)}."
         )
     else:
         say(
-            f"No chance is proven to be right {percent(precision, 0)} of the time by these "
-            f"{rule.queries:,} samples, so nothing is answered; give more samples, or a lower "
-            "--precision."
+            f"These {rule.queries:,} samples do not prove for any chance that "
+            f"{percent(precision, 0)} of the answers are right, so nothing is answered; give more "
+            "samples, or a lower --precision."
         )
     say(f"rule: {out}")

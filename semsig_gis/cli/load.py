@@ -1,4 +1,4 @@
-"""`semsig load` and `semsig fetch`: open data become street objects."""
+"""`semsig load`, `fetch`, `draft` and `sources`: street objects from open data."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def _catalogs(incomplete: str) -> list[str]:
-    """Return the catalogues whose names begin so, for a shell that completes a line."""
+    """Return the names of catalogues with this beginning, for completion in a shell."""
     from semsig_gis.sources import catalog_names
 
     return [name for name in catalog_names() if name.startswith(incomplete)]
@@ -135,8 +135,8 @@ def load(
     keep_inputs(out, buildings, streets, read=[*files, *(names or ()), clip])
     require_suffix(".parquet", out, buildings, streets)
     if not names:
-        told, lines = detect_catalogs(files)
-        names = list(told)
+        detected, lines = detect_catalogs(files)
+        names = list(detected)
         for line in lines:
             remark(line)
     catalog = combine_catalogs([load_catalog(name) for name in names])
@@ -146,9 +146,10 @@ def load(
         selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
         surroundings=bool(buildings or streets),
     )
+    # Layers that are in files read anyway: their objects are counted, to say what is left out.
     others = layers_in_same_extracts(catalog, specs)
     with progress("reading") as advance:
-        found, absent = read_files(
+        layers, absent = read_files(
             [*specs, *others],
             files,
             filters=filters,
@@ -156,7 +157,7 @@ def load(
             area=None if clip in {None, BOX} else parse_area(clip),
             progress=advance,
         )
-        found += read_small_layers(catalog, [*specs, *others], files, filters=filters, crs=crs)
+        layers += read_small_layers(catalog, [*specs, *others], files, filters=filters, crs=crs)
     notes = [
         f"layer {spec.name!r} has no file here ({', '.join(spec.files) or 'it names none'}); it is "
         "left out"
@@ -164,16 +165,16 @@ def load(
         if spec not in others
     ]
     if clip is not None:
-        found = clip_layers(found, clip)
+        layers = clip_layers(layers, clip)
         notes.append(AT_THE_EDGE)
     with progress("joining the objects"):
         loaded = assemble(
-            [layer for layer in found if layer.spec in specs],
+            [layer for layer in layers if layer.spec in specs],
             catalog,
             metric_crs=metric_crs,
             collapse=collapse,
             merge=merge,
-            counted=[layer for layer in found if layer.spec not in specs],
+            counted=[layer for layer in layers if layer.spec not in specs],
             max_distortion=max_distortion,
             notes=notes,
         )
@@ -240,19 +241,19 @@ def fetch(
         selection=_selection(all_layers=all_layers, paper_classes=paper_classes),
         surroundings=bool(buildings or streets),
     )
-    kept, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
+    store, http = open_cache(cache, offline=offline, deadline_s=timeout, tell=remark)
     unit: Literal["steps", "bytes"] = "bytes" if catalog.reader == "opendatasoft" else "steps"
     hosts = ", ".join(dict.fromkeys(urlsplit(url).netloc for url in catalog.endpoints))
     if not offline:
         layers_ = f"{len(specs)} layer{'' if len(specs) == 1 else 's'}"
         remark(f"asking {hosts} for {layers_} of {area}, attempt 1 of {http.attempts}")
     with progress(f"fetching from {hosts}", unit=unit) as advance:
-        place = find_area(area, catalog, cache=kept, http=http)
+        place = find_area(area, catalog, cache=store, http=http)
         layers = fetch_layers(
             specs,
             catalog,
             area=place,
-            cache=kept,
+            cache=store,
             http=http,
             filters=filters,
             progress=advance,
@@ -297,7 +298,7 @@ def _save_loaded(
     else:
         from semsig_gis.reports import quality_tables
 
-        # The notes are said below the tables, where they are seen, and not twice.
+        # The notes are printed below the tables only.
         print_tables(quality_tables(replace(report, notes=())))
         say(f"street objects: {out}")
     for note in notes:
@@ -337,7 +338,7 @@ def sources(
     from semsig_gis.sources import READERS, catalog_names, load_catalog
 
     if name is None:
-        catalogs = [load_catalog(known) for known in catalog_names()]
+        catalogs = [load_catalog(catalog_name) for catalog_name in catalog_names()]
         readers = sorted({*READERS, *installed_readers(reserved=READERS)})
         if as_json:
             print_json({"catalogs": [_listed(c) for c in catalogs], "readers": readers})
@@ -366,7 +367,7 @@ def sources(
     if as_json:
         print_json(dataclasses.asdict(catalog))
         return
-    # What every layer of objects leaves out is said once.
+    # An exclusion that all layers of objects share is printed once.
     rules = {spec.exclusions for spec in catalog.layers if spec.role == "objects"}
     common = rules.pop() if len(rules) == 1 else ()
     print_rows(
@@ -395,7 +396,7 @@ def sources(
 
 
 def _listed(catalog: Catalog) -> dict[str, object]:
-    """Return what a program may want to know of a catalogue before it is loaded."""
+    """Return the row of a catalogue in `semsig sources --json`."""
     live = bool(catalog.endpoints)
     return {
         "name": catalog.name,
@@ -410,7 +411,7 @@ def _listed(catalog: Catalog) -> dict[str, object]:
 
 
 def _needs_text(catalog: Catalog) -> str:
-    """Say what has to be given for a catalogue."""
+    """Return the inputs that a catalogue needs, as text."""
     if not catalog.endpoints:
         return "files"
     if catalog.token is None:
@@ -425,14 +426,14 @@ def _class_text(spec: LayerSpec) -> str:
 
 
 def _origin_text(spec: LayerSpec) -> str:
-    """Say what a layer is made from: tags, a dataset of a portal, or files."""
+    """Return the origin of a layer: tags, a dataset of a portal, or files."""
     if spec.tags:
         tags = " or ".join(
             " and ".join(f"{key}={'/'.join(values)}" for key, values in tags) for tags in spec.tags
         )
         return tags if spec.dataset is None else f"{spec.dataset}: {tags}"
-    files, asked = ", ".join(spec.files), spec.dataset or spec.server_where
-    return files if asked is None else f"{asked} ({files})"
+    files, dataset = ", ".join(spec.files), spec.dataset or spec.server_where
+    return files if dataset is None else f"{dataset} ({files})"
 
 
 def _filter_text(spec: LayerSpec, common: Rules) -> str:

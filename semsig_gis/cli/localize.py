@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,7 +22,7 @@ from semsig_gis.cli.console import (
     remark,
     require_suffix,
     say,
-    tell_if_online,
+    warn_if_online,
 )
 from semsig_gis.cli.maps import draw_ground
 from semsig_gis.cli.options import (
@@ -167,10 +165,7 @@ def localize(options: LocalizeOptions) -> None:
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
-    # The database is read while another core loads what answers; what fails there fails here, too.
-    answering = "likelihood.kernels" if method is None else "distance.search"
-    module = f"semsig_gis.localization.{answering}"
-    ThreadPoolExecutor(1).submit(importlib.import_module, module)
+
     # Queries are read before the index, which takes much longer than to find a slip in a query.
     north = seen_north(city, options.north, options.date)
 
@@ -272,7 +267,7 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
             else:
                 map_ = localization_map(answer, city.database)
             draw_ground(map_, city)
-            tell_if_online(save_map(map_, options.map_))
+            warn_if_online(save_map(map_, options.map_))
     result = answer.to_dict()
     if options.out is not None:
         searched = _write(options, options.out, city, answer, locator)

@@ -1,4 +1,4 @@
-"""`semsig map`, and the streets and buildings below every map."""
+"""`semsig map`, and the streets and buildings in the background of every map."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from semsig_gis.cli.console import (
     remark,
     require_suffix,
     say,
-    tell_if_online,
+    warn_if_online,
 )
 from semsig_gis.cli.options import Smooth
 from semsig_gis.core import DatabaseError, EmptyResultError, InputError
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from semsig_gis.database import City
 
 
-AROUND_M = 100.0
+MARGIN_M = 100.0  # around the cells
 
 
 def draw_ground(
-    drawn: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
+    map_: folium.Map, city: City, *, buildings: Path | None = None, streets: Path | None = None
 ) -> None:
-    """Add streets and buildings to a map: those of files, else of the store of the database."""
+    """Add streets and buildings to a map, from files or else from the object store."""
     from semsig_gis.maps import ground_map
     from semsig_gis.objects import read_surroundings
 
@@ -43,40 +43,28 @@ def draw_ground(
     houses = None if buildings is None else read_surroundings(buildings, role="buildings", crs=crs)
     lines = None if streets is None else read_surroundings(streets, role="streets", crs=crs)
     if houses is None or lines is None:
-        with contextlib.suppress(DatabaseError):  # a map may do without
+        with contextlib.suppress(DatabaseError):  # a map does not need them
             houses = city.store.footprints if houses is None else houses
             lines = city.store.streets if lines is None else lines
     if houses is None and lines is None:
         return
     xy = city.database.xy
-    low, high = xy.min(axis=0) - AROUND_M, xy.max(axis=0) + AROUND_M
+    low, high = xy.min(axis=0) - MARGIN_M, xy.max(axis=0) + MARGIN_M
     try:
         box = (*low.tolist(), *high.tolist())
-        ground_map(buildings=houses, streets=lines, box=box, map_=drawn)
+        ground_map(buildings=houses, streets=lines, box=box, map_=map_)
     except EmptyResultError:
         if buildings is not None or streets is not None:
             raise
 
 
 def _dates(city: City, newer: City) -> dict[str, Any]:
-    """Return the later database, and the street objects of both where there are."""
+    """Return the newer database and the street objects of both, for `city_map`."""
     objects = {"objects_before": city.objects, "objects_after": newer.objects}
     if None in objects.values():
         remark("street objects of both databases were not found; drawing cells only")
         objects = {}
     return {"newer": newer.database, **objects}
-
-
-def _require_content(evaluation: Path | None, smooth: float | None, *, other: bool) -> None:
-    if evaluation is None and not other:
-        raise InputError(
-            "there is nothing to show on the map; give --evaluation, --ambiguity, "
-            "--identifiability, --drift, --location or --objects, or several of them."
-        )
-    if smooth is not None and evaluation is None:
-        raise InputError(
-            "--smooth works only with an evaluation; give --evaluation as well, or leave it out."
-        )
 
 
 @app.command(name="map")
@@ -108,11 +96,11 @@ def map_(
     ] = None,
     buildings: Annotated[
         Path | None,
-        typer.Option(help="Footprints to draw below the map; default: those of the database."),
+        typer.Option(help="Footprints to draw below the map; default: from the database."),
     ] = None,
     streets: Annotated[
         Path | None,
-        typer.Option(help="Centre lines to draw below the map; default: those of the database."),
+        typer.Option(help="Centre lines to draw below the map; default: from the database."),
     ] = None,
     tiles: Annotated[
         str | None,
@@ -139,42 +127,49 @@ def map_(
     from semsig_gis.maps import RASTERS, city_map, save_map
     from semsig_gis.objects import open_objects
 
-    others = (drift, location, objects)
-    cells = identifiability or ambiguity
-    _require_content(evaluation, smooth, other=cells or others != (None, None, None))
+    paths = (evaluation, drift, location, objects)
+    if not (identifiability or ambiguity or any(path is not None for path in paths)):
+        raise InputError(
+            "there is nothing to show on the map; give --evaluation, --ambiguity, "
+            "--identifiability, --drift, --location or --objects, or several of them."
+        )
+    if smooth is not None and evaluation is None:
+        raise InputError(
+            "--smooth works only with an evaluation; give --evaluation as well, or leave it out."
+        )
     keep_inputs(out, read=(database, drift, location, objects, buildings, streets))
     require_suffix(".html", out)
     results = None if evaluation is None else open_evaluation(evaluation)
     city = open_city(database)
     opened = city.database
-    known = known_identifiability(city) if identifiability or ambiguity else None
-    if identifiability and known is None:
+    columns = known_identifiability(city) if identifiability or ambiguity else None
+    if identifiability and columns is None:
         raise InputError(
             f"{database} has no columns of semsig identify; run semsig identify first."
         )
-    seen = None if objects is None else open_objects(objects)
+    street_objects = None if objects is None else open_objects(objects)
     newer = None if drift is None else open_city(drift)
     dates = {} if newer is None else _dates(city, newer)
     answer: dict[str, Any] = {}
     if location is not None:
         raster = location.suffix.lower() in RASTERS
         answer = {"posterior": open_posterior(location, opened)} if raster else {"answer": location}
-    if seen is not None:
-        places = shapely.get_coordinates(seen.table.geometry.to_crs(opened.crs).array)
+    if street_objects is not None:
+        places = shapely.get_coordinates(street_objects.table.geometry.to_crs(opened.crs).array)
         require_same_place(opened, places, "street objects")
     with progress("drawing the map"):
-        drawn = city_map(
+        page = city_map(
             opened,
             evaluation=results,
             smooth=smooth,
             ambiguity=ambiguity,
-            identifiability=known,
-            objects=seen,
+            identifiability=columns,
+            objects=street_objects,
             tiles=tiles,
             **answer,
             **dates,
         )
-        draw_ground(drawn, city, buildings=buildings, streets=streets)
-        offline = save_map(drawn, out, title=title or city_name(database))
+        draw_ground(page, city, buildings=buildings, streets=streets)
+        offline = save_map(page, out, title=title or city_name(database))
     say(f"map: {out}")
-    tell_if_online(offline, tiles=tiles)
+    warn_if_online(offline, tiles=tiles)

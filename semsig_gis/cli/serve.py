@@ -1,4 +1,4 @@
-"""`semsig serve`: the workbench, a page in the browser to ask a city with."""
+"""`semsig serve`: the workbench, a page in the browser to locate photos."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def serve(
     city = open_city(database)
     model = read_noise(noise, city.database)
     store = object_store(city, objects, needed=False)
-    noises = {noise: model} | {name: one for name, one in NOISES.items() if name != noise}
+    # The chosen noise comes first, since the page selects the first one.
+    noises = {noise: model} | {name: other for name, other in NOISES.items() if name != noise}
     options = [str(database), *(["--objects", str(objects)] if objects is not None else [])]
     bench = Workbench(city=city, store=store, noises=noises, options=options)
     token = secrets.token_urlsafe(32)

@@ -1,4 +1,4 @@
-"""`semsig view`: from what detectors write to views, which the other commands take as queries."""
+"""`semsig view`: convert the output of object detectors to queries for the other commands."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def view(
         Path | None,
         typer.Option(
             help="Folder of the pictures, to read focal length and heading from EXIF.  "
-            "[default: that of the files]"
+            "[default: the folder of the files]"
         ),
     ] = None,
     photos: Annotated[
@@ -108,8 +108,8 @@ def view(
     place: Annotated[
         Literal["each", "gps", "all"],
         typer.Option(
-            help="Pictures to join into one view: none (each), those of one GPS position within "
-            "5 m, or all; a place in --photos takes precedence."
+            help="Pictures to join into one view: none (each), pictures with GPS positions "
+            "within 5 m (gps), or all; a place in --photos takes precedence."
         ),
     ] = "each",
     min_score: Annotated[
@@ -136,7 +136,7 @@ def view(
             "pictures."
         )
     taxonomy = _taxonomy(database)
-    known = Shot(
+    shot = Shot(
         camera=camera,
         fov=fov,
         heading=heading,
@@ -145,23 +145,26 @@ def view(
         roll=roll,
         size=_size(size),
     )
-    around = [file if file.is_dir() else file.parent for file in files]
-    beside = [
-        one for folder in around for one in (folder, folder / "images", folder.parent / "images")
+    # Pictures are next to the detections, or in a folder "images" there or one level above.
+    folders = [file if file.is_dir() else file.parent for file in files]
+    default_folders = [
+        candidate
+        for folder in folders
+        for candidate in (folder, folder / "images", folder.parent / "images")
     ]
     detector = ViewBuilder(
         labels=LabelMap.open(labels or (), taxonomy),
         taxonomy=taxonomy,
         min_score=min_score,
-        shot=known,
+        shot=shot,
         shots={} if photos is None else read_shots(photos),
-        folders=beside if images is None else [images],
+        folders=default_folders if images is None else [images],
     )
     views, tally = detector.views(read_pictures(files), places=place)
     rows: list[dict[str, Any]] = []
-    for name, one in views:
+    for name, built_view in views:
         time = {"time": tally.times[name]} if name in tally.times else {}
-        rows.append({"id": name, **time, **one.to_dict(taxonomy)})
+        rows.append({"id": name, **time, **built_view.to_dict(taxonomy)})
     lines = [json.dumps(row) + "\n" for row in rows]
     write_whole(out, "".join(lines))
     if as_json:
@@ -171,11 +174,11 @@ def view(
         f"{out}: {_many(len(views), 'view')} of {_many(tally.photos, 'picture')} with "
         f"{_many(tally.objects, 'object')}, {tally.ranges:,} with a range."
     )
-    _tell(tally)
+    _print_remarks(tally)
 
 
 def _taxonomy(database: Path | None) -> Taxonomy:
-    """Return the classes that are meant; built-in ones are as tall as elsewhere, if not said."""
+    """Return the classes of a database, with default heights, or all built-in classes."""
     if database is None:
         from semsig_gis.sources import built_in_taxonomy
 
@@ -187,6 +190,7 @@ def _taxonomy(database: Path | None) -> Taxonomy:
 
 
 def _size(text: str | None) -> tuple[int, int] | None:
+    """Return width and height in pixels from a text such as 1920x1080."""
     if text is None:
         return None
     if not (match := re.fullmatch(r"(\d{1,7})[xX](\d{1,7})", text)):
@@ -196,8 +200,8 @@ def _size(text: str | None) -> tuple[int, int] | None:
     return int(match[1]), int(match[2])
 
 
-def _tell(tally: Tally) -> None:
-    """Remark on what was left out, and on what is not known."""
+def _print_remarks(tally: Tally) -> None:
+    """Print what was left out and which headings are unknown."""
     if tally.below_min_score:
         remark(f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score")
     if tally.no_boxes:
@@ -222,8 +226,9 @@ def _tell(tally: Tally) -> None:
         remark(f"measured from {north} north: {headings}; localize with --north {north}")
 
 
-def _many(number: int, one: str, several: str = "") -> str:
-    return f"{number:,} {one if number == 1 else several or one + 's'}"
+def _many(number: int, noun: str, plural: str = "") -> str:
+    """Return a number with a noun: 1 box, 2 boxes."""
+    return f"{number:,} {noun if number == 1 else plural or noun + 's'}"
 
 
 def _listed(labels: Counter[str]) -> str:

@@ -1,4 +1,4 @@
-"""What the command line prints, and the command as a part of another program."""
+"""Output of the command line, and the command as a part of another program."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from conftest import Run
 
 
-# --- What is printed ---------------------------------------------------------------------------
+# --- Output -------------------------------------------------------------------------------------
 
 
-def test_rows_are_shown_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_are_printed_without_markup_or_folding(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [("[red]a[/red]", 1234567, 7652000627500), ("x" * 300, -1, 0)]
     console.print_rows("[b]title[/b]", ("name", "count", "id"), rows)
     out = capsys.readouterr().out
@@ -39,7 +39,7 @@ def test_rows_are_shown_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
 HOSTILE = "a\x1b[2J\x1b]0;title\x07\u009b31m\u202eb\r\ud83d"
 
 
-def test_numbers_stand_to_the_right(capsys: pytest.CaptureFixture[str]) -> None:
+def test_columns_of_numbers_are_right_aligned(capsys: pytest.CaptureFixture[str]) -> None:
     header = ("name", "count", "share", "range", "mixed", "none")
     rows = [
         ("a", 7, "0.5 %", "1-20", "3", ""),
@@ -52,9 +52,16 @@ def test_numbers_stand_to_the_right(capsys: pytest.CaptureFixture[str]) -> None:
     assert cells == ["a   ", "     7", " 0.5 %", f"{'1-20':>16}", "3    ", "    "]
 
 
-@pytest.mark.parametrize(("option", "told"), [("", "a\n"), ("--quiet", ""), ("-v", "steps")])
-def test_how_much_is_told_is_said_in_one_way(
-    option: str, told: str, run: Run, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("option", "expected"),
+    [
+        ("", "semsig: a\n"),
+        ("--quiet", ""),
+        ("-v", r"semsig: a\nsemsig: digging \.\.\.\nsemsig: digging: 0\.\d s\n"),
+    ],
+)
+def test_quiet_and_verbose_change_the_remarks(
+    option: str, expected: str, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def draft(_: Path, *, crs: str | None) -> str:  # noqa: ARG001
         console.remark("a")
@@ -62,13 +69,10 @@ def test_how_much_is_told_is_said_in_one_way(
             advance(1, 2)
         return "draft\n"
 
-    monkeypatch.setattr("semsig_gis.objects.draft.draft_catalog", draft)
+    monkeypatch.setattr("semsig_gis.objects.draft_catalog", draft)
     code, out, err = run(f"draft x.gpkg {option}")
     assert (code, out) == (0, "draft\n")
-    if told == "steps":
-        assert re.fullmatch(r"semsig: a\nsemsig: digging \.\.\.\nsemsig: digging: 0\.\d s\n", err)
-    else:
-        assert err == (told and f"semsig: {told}")
+    assert re.fullmatch(expected, err)
     assert console.talk.get() == "plain"
     sentence(run("draft x.gpkg --quiet --verbose"), "--quiet and --verbose", "give one")
 
@@ -80,10 +84,10 @@ def test_how_much_is_told_is_said_in_one_way(
         ("semsig load --catalog open", {"opendata_paris", "openstreetmap"}),
         ("semsig fetch overt", {"overture"}),
         ("semsig localize --paper --exp", {"--explain"}),
-        ("semsig info ci", set()),  # files are for the shell
+        ("semsig info ci", set()),  # the shell completes files
     ],
 )
-def test_a_shell_completes_lines(
+def test_shell_completion(
     line: str, offered: set[str], run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("_SEMSIG_COMPLETE", "source_bash")
@@ -97,7 +101,7 @@ def test_a_shell_completes_lines(
     assert (code, set(out.split())) == (0, offered)
 
 
-def test_nothing_from_elsewhere_moves_the_cursor(capsys: pytest.CaptureFixture[str]) -> None:
+def test_escape_sequences_are_made_visible(capsys: pytest.CaptureFixture[str]) -> None:
     console.remark(f"{HOSTILE}\nsemsig: all is well")
     console.say(HOSTILE)
     console.print_rows(HOSTILE, (HOSTILE,), [(HOSTILE,), ("two\nlines",)])
@@ -112,7 +116,7 @@ def test_nothing_from_elsewhere_moves_the_cursor(capsys: pytest.CaptureFixture[s
     assert json.loads(out) == {HOSTILE: HOSTILE}
 
 
-def test_json_keeps_letters_and_refuses_infinity(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_keeps_accents_and_refuses_infinity(capsys: pytest.CaptureFixture[str]) -> None:
     console.print_json({"title": "Défibrillateur"})
     out = capsys.readouterr().out
     assert "Défibrillateur" in out
@@ -121,7 +125,7 @@ def test_json_keeps_letters_and_refuses_infinity(capsys: pytest.CaptureFixture[s
         console.print_json({"error": float("inf")})
 
 
-def test_progress_stays_silent_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_prints_nothing_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with console.progress("working") as advance:
         advance(1, 2)
     assert capsys.readouterr() == ("", "")
@@ -132,7 +136,7 @@ def test_progress_stays_silent_without_a_terminal(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(("patience_s", "shown"), [(3600.0, False), (0.0, True)])
-def test_progress_shows_on_a_terminal_when_work_takes_a_while(
+def test_progress_bar_appears_on_a_terminal_after_a_while(
     patience_s: float,
     shown: bool,  # noqa: FBT001
 ) -> None:
@@ -144,15 +148,15 @@ def test_progress_shows_on_a_terminal_when_work_takes_a_while(
         "    advance(3, 7)\n"
         "    for thread in threading.enumerate():\n"
         f"        if {shown} and isinstance(thread, threading.Timer):\n"
-        "            thread.join()  # as work does that takes longer than the patience\n"
+        "            thread.join()  # like work that takes longer than the patience\n"
         "print('result')"
     )
     ours, theirs = pty.openpty()
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=theirs, text=True, check=True
     )
     os.close(theirs)
-    seen = b""
+    screen = b""
     os.set_blocking(ours, False)
     while True:
         try:
@@ -161,11 +165,11 @@ def test_progress_shows_on_a_terminal_when_work_takes_a_while(
             break
         if not part:
             break
-        seen += part
+        screen += part
     os.close(ours)
-    assert done.stdout == "result\n"
-    assert (b"digging" in seen) is shown
-    assert (b"3 of 7" in seen) is shown
+    assert process.stdout == "result\n"
+    assert (b"digging" in screen) is shown
+    assert (b"3 of 7" in screen) is shown
 
 
 # --- In another program -----------------------------------------------------------------------
@@ -201,7 +205,7 @@ def start(*arguments: object, **variables: str) -> Any:  # noqa: ANN401 - its pi
 
 
 @pytest.mark.parametrize("work", WORK.values(), ids=WORK)
-def test_the_end_of_the_input_ends_the_work_and_cleans_up(work: str, tmp_path: Path) -> None:
+def test_end_of_input_ends_the_work_and_cleans_up(work: str, tmp_path: Path) -> None:
     with start("-c", WRITES.replace("{work}", work), tmp_path / "out.txt") as process:
         assert process.stdout.readline() == "begun\n"
         assert list(tmp_path.iterdir()) != []
@@ -211,7 +215,7 @@ def test_the_end_of_the_input_ends_the_work_and_cleans_up(work: str, tmp_path: P
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
-def test_it_ends_even_where_interrupts_are_ignored(tmp_path: Path) -> None:
+def test_end_of_input_works_if_interrupts_are_ignored(tmp_path: Path) -> None:
     ignoring = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
     code = ignoring + WRITES.replace("{work}", WORK["asleep"])
     with start("-c", code, tmp_path / "out.txt") as process:
@@ -221,14 +225,14 @@ def test_it_ends_even_where_interrupts_are_ignored(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_input_that_stays_open_does_not_keep_the_program(tmp_path: Path) -> None:
+def test_open_input_does_not_delay_the_exit(tmp_path: Path) -> None:
     with start("-c", WRITES.replace("{work}", "pass"), tmp_path / "out.txt") as process:
         assert process.wait(PATIENCE_S) == 0
         assert process.stderr.read() == ""
     assert (tmp_path / "out.txt").read_text() == "half"
 
 
-def test_the_command_tells_its_progress_and_ends(tmp_path: Path) -> None:
+def test_supervised_command_prints_progress_and_ends(tmp_path: Path) -> None:
     command = ("-m", "semsig_gis.cli", "synthesize", "--out", tmp_path / "city")
     with start(*command, **{VARIABLE: "1"}) as process:
         line = process.stderr.readline()
@@ -243,8 +247,8 @@ def test_progress_is_a_line_for_every_percent(
 ) -> None:
     monkeypatch.setenv(VARIABLE, "1")
     with console.progress("digging") as advance:
-        for done in range(1, 1001):
-            advance(done, 1000)
+        for count in range(1, 1001):
+            advance(count, 1000)
         advance(0, 0)
     printed = capsys.readouterr()
     assert printed.out == ""

@@ -1,4 +1,4 @@
-"""The door of the command line: what goes wrong ends in one sentence and a fitting exit code."""
+"""The outermost handler of the command line: one sentence and an exit code for each error."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ COMMAND = [sys.executable, "-m", "semsig_gis.cli"]
 def failing(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[[BaseException], list[object]]:
-    """Run a command in which an error is raised."""
+    """Return a function that runs a command which raises an error."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def call(error: BaseException) -> list[object]:
         def suggest(*_: object, **__: object) -> str:
             raise error
 
-        monkeypatch.setattr("semsig_gis.objects.draft.draft_catalog", suggest)
+        monkeypatch.setattr("semsig_gis.objects.draft_catalog", suggest)
         return [*run("draft x.gpkg")]
 
     return call
 
 
-def test_a_fault_of_ours_is_written_down(
+def test_bug_is_written_to_a_log_file(
     failing: Callable[[BaseException], list[object]],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -59,7 +59,7 @@ def test_a_fault_of_ours_is_written_down(
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "said"),
+    ("error", "code", "message"),
     [
         (KeyboardInterrupt(), 130, "semsig: interrupted\n"),
         (BrokenPipeError(errno.EPIPE, "Broken pipe"), 141, ""),
@@ -69,13 +69,13 @@ def test_a_fault_of_ours_is_written_down(
         (OSError("no reason"), 1, "semsig: a fault in semsig"),
     ],
 )
-def test_each_end_has_a_code(
-    error: BaseException, code: int, said: str, failing: Callable[[BaseException], list[object]]
+def test_each_kind_of_error_has_an_exit_code(
+    error: BaseException, code: int, message: str, failing: Callable[[BaseException], list[object]]
 ) -> None:
-    found, out, err = failing(error)
-    assert (found, out) == (code, "")
-    assert str(err).startswith(said)
-    assert str(err).count("\n") == bool(said)
+    exit_code, out, err = failing(error)
+    assert (exit_code, out) == (code, "")
+    assert str(err).startswith(message)
+    assert str(err).count("\n") == bool(message)
 
 
 CALLBACK = """
@@ -99,44 +99,42 @@ cli.main()
 
 
 @pytest.mark.parametrize(
-    ("error", "seconds", "code", "said"),
+    ("error", "seconds", "code", "message"),
     [
         ("KeyboardInterrupt", 60, 130, "semsig: interrupted\n"),
         ("ValueError('x')", 0, 0, "semsig: a library ignored an error (ValueError: x)\n"),
     ],
 )
-def test_what_a_library_cannot_raise(error: str, seconds: int, code: int, said: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", CALLBACK.format(error=error, seconds=seconds)],
+def test_error_in_a_callback_is_reported(error: str, seconds: int, code: int, message: str) -> None:
+    assert outcome(CALLBACK.format(error=error, seconds=seconds)) == (code, message)
+
+
+def outcome(code: str) -> tuple[int, str]:
+    """Run a program; return its exit code and what it prints on standard error."""
+    process = subprocess.run(
+        [sys.executable, "-c", code],
         capture_output=True,
         check=False,
         text=True,
         timeout=PATIENCE_S,
     )
-    assert (done.returncode, done.stderr) == (code, said)
+    return process.returncode, process.stderr
 
 
-TIDYING = """
+AT_EXIT = """
 import atexit, signal
 from semsig_gis import cli
 from semsig_gis.cli import run as command
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
-atexit.register(signal.raise_signal, signal.SIGINT)  # as when Python closes what is open
+atexit.register(signal.raise_signal, signal.SIGINT)  # during the clean-up of Python
 command.run = lambda: 0
 cli.main()
 """
 
 
-def test_an_interrupt_after_the_work_is_done() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", TIDYING],
-        capture_output=True,
-        check=False,
-        text=True,
-        timeout=PATIENCE_S,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+def test_interrupt_at_exit_is_ignored() -> None:
+    assert outcome(AT_EXIT) == (0, "")
 
 
 @pytest.mark.parametrize(
@@ -151,7 +149,7 @@ def test_an_interrupt_after_the_work_is_done() -> None:
         (f"draft {'n' * 300}", ["File name too long"]),
     ],
 )
-def test_what_cannot_be_meant_is_refused(
+def test_invalid_command_lines_are_refused(
     line: str, words: list[str], run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -159,7 +157,7 @@ def test_what_cannot_be_meant_is_refused(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a folder in use cannot be removed")
-def test_a_working_folder_that_is_gone(
+def test_missing_working_folder_is_refused(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "gone").mkdir()
@@ -168,23 +166,23 @@ def test_a_working_folder_that_is_gone(
     sentence(run("sources"), "working folder", "change to another")
 
 
-def test_a_terminal_without_the_letters() -> None:
-    done = subprocess.run(
+def test_characters_that_the_terminal_cannot_show_are_escaped() -> None:
+    process = subprocess.run(
         [*COMMAND, "sources", "opendata_paris"],
         env=os.environ | {"PYTHONIOENCODING": "ascii"},
         capture_output=True,
         check=True,
     )
-    assert b"les-arbres" in done.stdout
-    assert done.stderr == b""
+    assert b"les-arbres" in process.stdout
+    assert process.stderr == b""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device")
-def test_output_that_nobody_takes() -> None:
-    def outcome(reader: object) -> tuple[int, str]:
+def test_closed_output_and_full_disk_have_an_exit_code() -> None:
+    def run_into(output: object) -> tuple[int, str]:
         command = subprocess.Popen(
             [*COMMAND, "--version"],
-            stdout=reader,  # type: ignore[call-overload]
+            stdout=output,  # type: ignore[call-overload]
             stderr=subprocess.PIPE,
             text=True,
         )
@@ -193,7 +191,7 @@ def test_output_that_nobody_takes() -> None:
         with command:
             return command.wait(), command.stderr.read()
 
-    assert outcome(subprocess.PIPE) == (141, "")
+    assert run_into(subprocess.PIPE) == (141, "")
     with Path("/dev/full").open("w", encoding="utf-8") as full:
-        code, said = outcome(full)
-    assert (code, said.count("\n"), "No space left" in said) == (2, 1, True)
+        code, message = run_into(full)
+    assert (code, message.count("\n"), "No space left" in message) == (2, 1, True)

@@ -1,6 +1,6 @@
-"""A session with QGIS, played by its own Python: `qgis_session.py FOLDER CATALOGUE QUERY`.
+"""A session in the Python of QGIS: `qgis_session.py FOLDER CATALOGUE QUERY`.
 
-The last line that is printed is JSON with what happened. This is not a module of the tests.
+Its last line of output is JSON with the results. This is not a module of tests.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DATABASE = str(PLACE / "session.parquet")
 TEMPORARY = "TEMPORARY_OUTPUT"
 EVERYWHERE = QgsRenderContext()
 
-application = QgsApplication([], True)  # noqa: FBT003 - with a screen, which need not be real
+application = QgsApplication([], True)  # noqa: FBT003 - with a screen, which may be virtual
 application.initQgis()
 sys.path += [
     str(Path(application.pkgDataPath(), "python", "plugins")),
@@ -41,7 +41,7 @@ from processing.gui.Postprocessing import handleAlgorithmResults  # noqa: E402
 
 
 class Feedback(QgsProcessingFeedback):
-    """Keeps what it is told; cancels at the first sign of progress if it shall."""
+    """Records messages and progress; can cancel at the first step of a build."""
 
     def __init__(self, *, cancelling: bool = False) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class Feedback(QgsProcessingFeedback):
         self.errors: list[str] = []
         self.infos: list[str] = []
         self.percents: list[float] = []
-        self.ended: list[bool] = []  # well, or not
+        self.ended: list[bool] = []  # whether it succeeded
         self.results: dict[str, Any] = {}
 
     def setProgress(self, percent: float) -> None:  # noqa: N802
@@ -72,18 +72,18 @@ def algorithm(name: str) -> Any:  # noqa: ANN401
 
 
 def run(name: str, *, cancelling: bool = False, **parameters: Any) -> Feedback:  # noqa: ANN401
-    """Run an algorithm as its dialog does, and load what it gives."""
+    """Run an algorithm as its dialog does, and load its layers."""
     feedback = Feedback(cancelling=cancelling)
     context = QgsProcessingContext()
     context.setProject(QgsProject.instance())
     ready = algorithm(name)
     task = QgsProcessingAlgRunnerTask(ready, parameters, context, feedback)
 
-    def keep(successful: bool, results: dict[str, Any]) -> None:  # noqa: FBT001 - as Qt calls it
+    def end(successful: bool, results: dict[str, Any]) -> None:  # noqa: FBT001 - as Qt calls it
         feedback.results = results
         feedback.ended.append(successful)
 
-    task.executed.connect(keep)
+    task.executed.connect(end)
     QgsApplication.taskManager().addTask(task)
     while not feedback.ended:
         application.processEvents()
@@ -93,7 +93,7 @@ def run(name: str, *, cancelling: bool = False, **parameters: Any) -> Feedback: 
     return feedback
 
 
-def run_well(name: str, **parameters: Any) -> Feedback:  # noqa: ANN401
+def run_ok(name: str, **parameters: Any) -> Feedback:  # noqa: ANN401
     """Run an algorithm on the database, which must succeed."""
     feedback = run(name, DATABASE=DATABASE, **parameters)
     if not feedback.ended[0]:
@@ -102,12 +102,12 @@ def run_well(name: str, **parameters: Any) -> Feedback:  # noqa: ANN401
 
 
 def shown(place: str = TEMPORARY) -> QgsProcessingOutputLayerDefinition:
-    """Return an output that is loaded, a temporary one by default."""
+    """Return an output that is loaded into the project, a temporary one by default."""
     return QgsProcessingOutputLayerDefinition(place, QgsProject.instance())
 
 
-def held() -> dict[str, Any]:
-    """Return what the layers hold that are shown, by name: rows, extent and columns."""
+def layer_contents() -> dict[str, Any]:
+    """Return rows, extent and columns of all layers of the project, by name."""
     layers: dict[str, Any] = {}
     for layer in QgsProject.instance().mapLayers().values():
         rows = len(list(layer.getFeatures()))
@@ -117,10 +117,10 @@ def held() -> dict[str, Any]:
 
 
 def show_twice() -> dict[str, Any]:
-    """Write the same files twice while their layers are shown, and return what each time held."""
+    """Write the same files twice while their layers are shown; return both contents."""
     layers = {}
     regions = str(PLACE / "regions.gpkg")
-    # The layer is called like its file, which holds another one.
+    # The layer has the name of its file, which contains another layer as well.
     area = f"{regions}|layername=regions"
     files = {
         "CANDIDATES": shown(str(PLACE / "new" / "candidates.gpkg")),
@@ -131,21 +131,21 @@ def show_twice() -> dict[str, Any]:
         ("first", {"TYPES": "D", "TOP": 20, "METHOD": "edit+edit"}),
         ("second", {"TYPES": "DDB", "TOP": 3, "SHARE": 0.5, "AREA": area}),
     ):
-        feedback = run_well("localize", **files, **query)
-        layers[time_] = {**held(), "infos": feedback.infos}
+        feedback = run_ok("localize", **files, **query)
+        layers[time_] = {**layer_contents(), "infos": feedback.infos}
     QgsProject.instance().clear()
     return layers
 
 
 def show(query: dict[str, str]) -> dict[str, Any]:
-    """Run what gives layers, and return what is told of it and how each layer is drawn."""
+    """Run the tools that write layers; return their outputs and the renderer of each layer."""
 
     def file(name: str) -> str:
         return str(PLACE / name)
 
     places = {name: shown(file(f"{name}.gpkg")) for name in ("CANDIDATES", "PLACE", "REGIONS")}
-    run_well("localize", TOP=3, METHOD="likelihood", MAP=file("place.html"), **places, **query)
-    evaluated = run_well(
+    run_ok("localize", TOP=3, METHOD="likelihood", MAP=file("place.html"), **places, **query)
+    evaluated = run_ok(
         "evaluate",
         QUERIES=20,
         DISTORTION="light",
@@ -156,14 +156,14 @@ def show(query: dict[str, str]) -> dict[str, Any]:
         MAP=file("evaluation.html"),
     )
     cells = shown(file("cells.gpkg"))
-    identified = run_well("identify", NOISE="light", CELLS=cells, MAP=file("cells.html"))
-    run_well("export", OBJECTS=file("objects.parquet"), OUTPUT=shown())
+    identified = run_ok("identify", NOISE="light", CELLS=cells, MAP=file("cells.html"))
+    run_ok("export", OBJECTS=file("objects.parquet"), OUTPUT=shown())
     layers = QgsProject.instance().mapLayers().values()
-    drawn = {
+    renderers = {
         layer.name(): [layer.renderer().type(), *layer.renderer().usedAttributes(EVERYWHERE)]
         for layer in layers
     }
-    return {"evaluated": evaluated.results, "identified": identified.results, "shown": drawn}
+    return {"evaluated": evaluated.results, "identified": identified.results, "shown": renderers}
 
 
 def groups() -> dict[str, list[str]]:
@@ -171,38 +171,40 @@ def groups() -> dict[str, list[str]]:
     for _ in range(10):
         application.processEvents()
     root = QgsProject.instance().layerTreeRoot()
-    return {group.name(): [one.name() for one in group.findLayers()] for group in root.findGroups()}
+    return {
+        group.name(): [layer.name() for layer in group.findLayers()] for group in root.findGroups()
+    }
 
 
 def others() -> dict[str, Any]:
-    """Run the tools that are not of the six, but for those that download."""
+    """Run the tools without a number, except the downloads."""
     tiff, toml = str(PLACE / "ambiguity.tif"), str(PLACE / "draft.toml")
     updated, objects = str(PLACE / "updated.parquet"), str(PLACE / "objects.parquet")
-    run_well("ambiguity", OUTPUT=tiff, MAP=str(PLACE / "ambiguity.html"))
+    run_ok("ambiguity", OUTPUT=tiff, MAP=str(PLACE / "ambiguity.html"))
     run("update", DATABASE=str(PLACE / "city.parquet"), OBJECTS=objects, OUTPUT=updated)
-    run_well("draft", FILE=str(PLACE / "lamps.geojson"), OUTPUT=toml)
-    run_well("demo", OUTPUT=str(PLACE / "demo"), QUERIES=5)
+    run_ok("draft", FILE=str(PLACE / "lamps.geojson"), OUTPUT=toml)
+    run_ok("demo", OUTPUT=str(PLACE / "demo"), QUERIES=5)
     nowhere = run("fetch", OUTPUT=str(PLACE / "nowhere.parquet")).errors
-    there = {path.name for path in PLACE.iterdir()}
-    written = {"ambiguity.tif", "ambiguity.html", "updated.parquet", "draft.toml", "demo"}
-    return {"missing": sorted(written - there), "nowhere": nowhere, "groups": groups()}
+    existing = {path.name for path in PLACE.iterdir()}
+    expected = {"ambiguity.tif", "ambiguity.html", "updated.parquet", "draft.toml", "demo"}
+    return {"missing": sorted(expected - existing), "nowhere": nowhere, "groups": groups()}
 
 
-def speak() -> dict[str, list[str]]:
-    """Return all that is translated, in each language."""
-    told = {}
+def translations() -> dict[str, list[str]]:
+    """Return the translations of all texts, by language."""
+    texts = {}
     sources = json.loads((PLACE / "sources.json").read_text("utf-8"))
     for language in ("de", "fr"):
         translator = QTranslator()
         translator.load(str(Path(semsig.__file__).with_name("i18n") / f"semsig_{language}.qm"))
         QCoreApplication.installTranslator(translator)
-        told[language] = [QCoreApplication.translate("Semsig", source) for source in sources]
+        texts[language] = [QCoreApplication.translate("Semsig", source) for source in sources]
         QCoreApplication.removeTranslator(translator)
-    return told
+    return texts
 
 
 def refuse() -> list[list[str]]:
-    """Return the errors of what cannot be."""
+    """Return the errors of runs with invalid parameters."""
     objects, later = str(PLACE / "objects.parquet"), str(PLACE / "later.parquet")
     area = f"{PLACE / 'regions.gpkg'}|layername=regions"
     query = {"TYPES": "DDB", "METHOD": "types:edit", "CANDIDATES": shown()}
@@ -222,7 +224,7 @@ def refuse() -> list[list[str]]:
 
 
 def stop(name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
-    """Run what does not end well, and return what is told and left."""
+    """Run an algorithm that fails; return its messages and new files."""
     log = PLACE / "processes"
     before = {*PLACE.rglob("*"), log}
     feedback = run(name, **parameters)
@@ -236,14 +238,14 @@ def stop(name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
 
 
 def play() -> dict[str, Any]:
-    """Play all scenes, and return what each happened."""
+    """Run all parts, and return their results."""
     registry = QgsApplication.processingRegistry()
     provider = registry.providerById("semsig")
-    listed = sorted((one.displayName(), one.name()) for one in provider.algorithms())
+    listed = sorted((item.displayName(), item.name()) for item in provider.algorithms())
     objects = str(PLACE / "objects.parquet")
     lamps, loaded = [str(PLACE / "lamps.geojson")], str(PLACE / "session_lamps.parquet")
     cancelled = {"OUTPUT": str(PLACE / "cancelled.parquet"), "CELLS": shown()}
-    happened = {
+    results = {
         "listed": [name for _, name in listed],
         "help": algorithm("localize").shortHelpString(),
         "loaded": run("load", FILES=lamps, CATALOG_FILE=sys.argv[2], OUTPUT=loaded).ended[0],
@@ -256,19 +258,19 @@ def play() -> dict[str, Any]:
             "build", cancelling=True, OBJECTS=objects, STEP=1.0, RADIUS=100.0, **cancelled
         ),
     }
-    happened["spoken"] = speak()
+    results["translations"] = translations()
     QgsProject.instance().clear()
-    happened["others"] = others()
-    happened["refused"] = refuse()
+    results["others"] = others()
+    results["refused"] = refuse()
     ProcessingConfig.setSettingValue("SEMSIG_COMMAND", "")
-    _, happened["lost"] = algorithm("build").canExecute()
-    return happened
+    _, results["lost"] = algorithm("build").canExecute()
+    return results
 
 
 Processing.initialize()
 plugin = semsig.classFactory(None)
 plugin.initGui()
 ProcessingConfig.setSettingValue("SEMSIG_COMMAND", str(PLACE / "semsig of this test"))
-happened = play()
+output = play()
 plugin.unload()
-print(json.dumps(happened), flush=True)  # noqa: T201 - that is its purpose
+print(json.dumps(output), flush=True)  # noqa: T201 - read by the tests

@@ -38,22 +38,22 @@ from semsig_gis.sources import catalog_names, load_catalog
 unix = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
 
 
-# A program begins with this.
+# The beginning of each program.
 SAY = "import sys\nsay = lambda text: print(text, file=sys.stderr, flush=True)\n"
 
 
 @dataclass
 class Log:
-    """What a watcher hears, in order; it cancels at the first of it if it shall."""
+    """Runs programs and records what a watcher receives; can cancel at its first line."""
 
     cancelling: bool = False
-    heard: list[object] = field(default_factory=list)
+    lines: list[object] = field(default_factory=list)
 
     def run(self, *command: object, written: str | None = None) -> str:
         watcher = Watcher(
-            lambda *progress: self.heard.append(progress),
-            self.heard.append,
-            lambda: self.cancelling and bool(self.heard),
+            lambda *progress: self.lines.append(progress),
+            self.lines.append,
+            lambda: self.cancelling and bool(self.lines),
         )
         arguments = [str(part) for part in command]
         return run_command(arguments, clean_environment(os.environ), watcher, written=written)
@@ -71,7 +71,7 @@ def program(folder: Path, name: str = "semsig") -> str:
 
 
 @unix
-def test_what_was_chosen_comes_first_then_the_path_then_the_usual_places(tmp_path: Path) -> None:
+def test_command_is_from_the_settings_then_the_path_then_usual_folders(tmp_path: Path) -> None:
     preferred = program(tmp_path / "chosen", "semsig-of-mine")
     on_path, usual = program(tmp_path / "path"), program(tmp_path / "py3.12" / "bin")
     path, places = {"PATH": f"{tmp_path}/path"}, (f"{tmp_path}/none", f"{tmp_path}/py3.*/bin")
@@ -82,17 +82,17 @@ def test_what_was_chosen_comes_first_then_the_path_then_the_usual_places(tmp_pat
 
 
 @unix
-def test_the_usual_places_are_in_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_usual_folders_are_in_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     expected = program(tmp_path / ".local" / "bin")
     assert find_command("", {"PATH": ""}) == expected
-    for folder in ("Scripts", "bin"):  # those of the environment of the documentation
+    for folder in ("Scripts", "bin"):  # of the environment in the documentation
         first = program(tmp_path / "semsig" / folder)
         assert find_command("", {"PATH": ""}) == first
     assert find_command("~/.local/bin/semsig", {}) == expected
 
 
-def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
+def test_missing_command_is_an_error(tmp_path: Path) -> None:
     with refused(
         CommandError, "Plugins > Semantic signatures > Engine...", "Settings > Options > Processing"
     ):
@@ -105,7 +105,7 @@ def test_a_command_that_is_nowhere(tmp_path: Path) -> None:
         Log().run(tmp_path / "text")
 
 
-def test_nothing_of_qgis_is_handed_on() -> None:
+def test_variables_of_qgis_are_removed() -> None:
     foreign = dict.fromkeys(
         (
             *("PYTHONPATH", "PYTHONHOME", "PythonPath", "GDAL_DATA", "GDAL_DRIVER_PATH"),
@@ -119,7 +119,7 @@ def test_nothing_of_qgis_is_handed_on() -> None:
     assert clean_environment(foreign | own) == own | {"PYTHONUTF8": "1", VARIABLE: "1"}
 
 
-def test_results_progress_and_remarks_are_told_apart() -> None:
+def test_results_progress_and_remarks_are_separated() -> None:
     log = Log()
     printed = log.run_code(
         "say('semsig: a remark')\n"
@@ -131,8 +131,8 @@ def test_results_progress_and_remarks_are_told_apart() -> None:
         "print('x' * 300_000)\n"
     )
     assert printed == "Défibrillateur ┃ 1\n" + "x" * 300_000 + "\n"
-    # A remark is not held back until the end.
-    assert log.heard == ["a remark", (0, "digging"), (40, "filling"), "a bare line about 40%"]
+    # Only the last remark waits for the end.
+    assert log.lines == ["a remark", (0, "digging"), (40, "filling"), "a bare line about 40%"]
 
 
 FAILED, SILENT = "The semsig command failed with exit code", "did not say why."
@@ -151,7 +151,7 @@ def test_a_failure_is_reported_once(code: str, message: str) -> None:
     with pytest.raises(CommandError) as caught:
         log.run_code(code)
     assert str(caught.value) == message
-    assert [one for one in log.heard if isinstance(one, str)] == ["a"]
+    assert [line for line in log.lines if isinstance(line, str)] == ["a"]
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_a_failure_is_reported_once(code: str, message: str) -> None:
     ],
 )
 @pytest.mark.parametrize("old", [False, True])
-def test_another_program_than_the_command(tmp_path: Path, code: str, why: str, old: bool) -> None:  # noqa: FBT001
+def test_another_program_is_reported(tmp_path: Path, code: str, why: str, old: bool) -> None:  # noqa: FBT001
     place = tmp_path / "city.parquet"
     if old:
         place.write_text("from an earlier run")
@@ -173,7 +173,7 @@ def test_another_program_than_the_command(tmp_path: Path, code: str, why: str, o
         Log().run_code(code, written=str(place))
 
 
-def test_a_file_that_was_written_anew(tmp_path: Path) -> None:
+def test_file_that_is_written_again_is_recognized(tmp_path: Path) -> None:
     place = tmp_path / "city.parquet"
     code = (
         "from pathlib import Path; part, place = map(Path, sys.argv[1:]); "
@@ -184,7 +184,7 @@ def test_a_file_that_was_written_anew(tmp_path: Path) -> None:
     assert place.read_text() == "city"
 
 
-def test_a_cancel_ends_the_command_by_the_end_of_its_input(tmp_path: Path) -> None:
+def test_cancelling_closes_the_input_of_the_command(tmp_path: Path) -> None:
     code = (
         "say('semsig progress 0% waiting')\n"
         "try: sys.stdin.read()\n"
@@ -196,7 +196,7 @@ def test_a_cancel_ends_the_command_by_the_end_of_its_input(tmp_path: Path) -> No
 
 
 @unix
-def test_a_command_that_does_not_end_is_ended_with_all_it_started(
+def test_command_that_does_not_end_is_killed_with_its_children(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("semsig.command.PATIENCE_S", 0.3)
@@ -215,7 +215,7 @@ def test_a_command_that_does_not_end_is_ended_with_all_it_started(
 
 
 def assert_ended(process: int) -> None:
-    """Check that a process has ended; one that nobody waited for may be left as a zombie."""
+    """Check that a process has ended; it may remain as a zombie if nobody waited for it."""
     status = Path(f"/proc/{process}/stat")
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
@@ -226,10 +226,10 @@ def assert_ended(process: int) -> None:
         if status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z":
             return
         time.sleep(0.1)
-    pytest.fail(f"process {process} is still there")
+    pytest.fail(f"process {process} is still running")
 
 
-def test_a_watcher_that_fails_ends_the_command_too() -> None:
+def test_error_in_a_watcher_ends_the_command() -> None:
     def fail(_percent: int, _label: str) -> None:
         raise ZeroDivisionError
 
@@ -238,7 +238,7 @@ def test_a_watcher_that_fails_ends_the_command_too() -> None:
         run_command(command, clean_environment(os.environ), Watcher(fail, print, lambda: False))
 
 
-def test_the_command_understands_any_value() -> None:
+def test_command_line_quotes_any_value() -> None:
     nasty = ["--out=x", "-", "--", "a b", "=", "é \u202e'\"`$(x)\\", "*", "\n"]
     line = command_line(
         "load", *nasty, catalog=nasty, out=nasty[0], crs=nasty[5], layer=[], filter=True, merge=None
@@ -252,12 +252,12 @@ def test_the_command_understands_any_value() -> None:
     assert not values["layer"]
 
 
-def test_methods_and_other_names_are_those_of_the_command() -> None:
+def test_names_match_the_command() -> None:
     assert set(arguments.CATALOGS) == set(catalog_names())
-    asked = {name for name in catalog_names() if load_catalog(name).endpoints}
-    assert set(arguments.SERVICES) == asked
+    services = {name for name in catalog_names() if load_catalog(name).endpoints}
+    assert set(arguments.SERVICES) == services
     assert set(arguments.NOISES) == set(NOISES)
-    assert arguments.METHODS[0] == DEFAULT_METHOD  # what a dialog begins with
+    assert arguments.METHODS[0] == DEFAULT_METHOD  # the default of the dialog
     for method in arguments.METHODS:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))
     fusions = {method for method in arguments.METHODS if "+" in method and ":" not in method}
@@ -301,7 +301,7 @@ def test_outputs_are_checked_before_the_work(
     stretch=st.floats(1.0, 5.0),
     bearing=st.floats(0.0, 180.0),
 )
-def test_an_ellipse_has_its_axes_and_its_middle(
+def test_ring_has_the_axes_and_centre_of_the_ellipse(
     centre: tuple[float, float], shorter: float, stretch: float, bearing: float
 ) -> None:
     corners = ring(centre, shorter * stretch, shorter, bearing)
@@ -310,12 +310,12 @@ def test_an_ellipse_has_its_axes_and_its_middle(
     assert max(distances) == pytest.approx(shorter * stretch, rel=1e-6)
     assert min(distances) == pytest.approx(shorter, rel=1e-6)
     far = corners[distances.index(max(distances))]
-    seen = math.degrees(math.atan2(far[0] - centre[0], far[1] - centre[1]))
+    direction = math.degrees(math.atan2(far[0] - centre[0], far[1] - centre[1]))
     if stretch > 1.01:
-        assert math.cos(2 * math.radians(seen - bearing)) == pytest.approx(1, abs=1e-6)
+        assert math.cos(2 * math.radians(direction - bearing)) == pytest.approx(1, abs=1e-6)
 
 
-def test_rows_have_the_fields_that_they_say() -> None:
+def test_candidate_rows_match_their_fields() -> None:
     common = {"cell_id": 7, "types": "DD", "length": 2, "x": 1.0, "y": 2.0}
     ranked = {**common, "rank_low": 1, "rank_high": 20, "distance": 0.3}
     likely = {**common, "rank": 2, "chance": 0.5}
@@ -326,7 +326,7 @@ def test_rows_have_the_fields_that_they_say() -> None:
     assert place_row({"candidates": []}) is None
 
 
-def test_what_there_is_to_say_of_an_answer() -> None:
+def test_answer_lines_report_ties_place_and_regions() -> None:
     ranked = {"candidates": [{"rank_high": 1}], "tied_beyond": 1}
     assert answer_lines(ranked) == [
         "The best cell ties with no other.",
@@ -348,7 +348,7 @@ def test_what_there_is_to_say_of_an_answer() -> None:
 
 
 @pytest.mark.parametrize("printed", ["", "{}", "[]", "3", '{"crs": 1}', "{"])
-def test_something_else_than_an_answer(printed: str) -> None:
+def test_output_that_is_not_an_answer_is_an_error(printed: str) -> None:
     with refused(CommandError, "same version"):
         parse_answer(printed)
     assert parse_answer(json.dumps({"crs": "EPSG:2154", "candidates": []}))["crs"] == "EPSG:2154"

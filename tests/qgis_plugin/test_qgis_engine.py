@@ -1,4 +1,4 @@
-"""The engine that the QGIS plugin installs: from which Python, and what a failure leaves."""
+"""The installation of the engine by the QGIS plugin."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sentences import refused
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the stand-ins are shell scripts")
 
-# A Python with its own venv and pip, as far as the plugin can tell.
+# A script in place of a Python with venv and pip.
 PYTHON = """#!/bin/sh
 case "$1 $2" in
 "-c "*) echo python {version} {complete} ;;
@@ -33,7 +33,7 @@ esac
 
 
 def python(folder: Path, version: str = "3 11", *, complete: bool = True, pip: str = "true") -> str:
-    """Write a Python that is none, and return the program."""
+    """Write a script in place of a Python, and return its path."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "python3"
     file.write_text(PYTHON.format(version=version, complete=complete, pip=pip, log=folder / "log"))
@@ -42,8 +42,8 @@ def python(folder: Path, version: str = "3 11", *, complete: bool = True, pip: s
 
 
 @dataclass
-class Heard:
-    """What a watcher hears; it cancels once it hears a word."""
+class Log:
+    """Records what a watcher receives; cancels at a line with a certain word."""
 
     until: str = "never"
     lines: list[str] = field(default_factory=list)
@@ -57,11 +57,11 @@ class Heard:
         )
 
 
-def install(engine: Engine, wishes: Wishes, until: str = "never") -> Heard:
-    heard = Heard(until)
+def install(engine: Engine, wishes: Wishes, until: str = "never") -> Log:
+    log = Log(until)
     environment = {**os.environ, "PYTHONPATH": "of QGIS", "HOME": "/nowhere"}
-    assert engine.install(wishes, environment, heard.watcher()) == engine.command
-    return heard
+    assert engine.install(wishes, environment, log.watcher()) == engine.command
+    return log
 
 
 @pytest.fixture
@@ -69,22 +69,22 @@ def engine(tmp_path: Path) -> Engine:
     return Engine(tmp_path / "profile" / "semsig", "1.0")
 
 
-def test_an_engine_is_installed_and_installed_again(engine: Engine, tmp_path: Path) -> None:
+def test_engine_is_installed_updated_and_removed(engine: Engine, tmp_path: Path) -> None:
     assert (engine.command, engine.current) == ("", False)
     proxies = {"HTTPS_PROXY": "http://proxy:3128"}
-    heard = install(engine, Wishes(python(tmp_path / "py"), "", proxies))
+    log = install(engine, Wishes(python(tmp_path / "py"), "", proxies))
     assert Path(engine.command).is_relative_to(engine.root)
     assert engine.current
-    percents = [percent for percent, _ in heard.stages]
+    percents = [percent for percent, _ in log.stages]
     assert percents == sorted(percents)
     assert {"gathering numpy", "gathering rtree", "installing 2 packages"} <= {
-        label for _, label in heard.stages
+        label for _, label in log.stages
     }
-    told = (tmp_path / "py" / "log").read_text()
-    assert "--constraint=" in told
-    assert told.splitlines()[0].endswith("semsig_gis[raster,serve]==1.0")
-    assert "HTTPS_PROXY=http://proxy:3128" in told
-    assert "of QGIS" not in told
+    calls = (tmp_path / "py" / "log").read_text()
+    assert "--constraint=" in calls
+    assert calls.splitlines()[0].endswith("semsig_gis[raster,serve]==1.0")
+    assert "HTTPS_PROXY=http://proxy:3128" in calls
+    assert "of QGIS" not in calls
     first = engine.command
     newer = Engine(engine.root, "1.1")
     assert (newer.command, newer.current) == (first, False)
@@ -96,7 +96,7 @@ def test_an_engine_is_installed_and_installed_again(engine: Engine, tmp_path: Pa
     assert (newer.command, list(newer.root.iterdir())) == ("", [])
 
 
-def test_a_folder_of_wheels_takes_the_place_of_the_network(engine: Engine, tmp_path: Path) -> None:
+def test_folder_of_wheels_replaces_the_network(engine: Engine, tmp_path: Path) -> None:
     wheels = tmp_path / "wheels"
     with refused(CommandError, "wheels is not a folder", "Settings > Options"):
         install(engine, Wishes(wheels=str(wheels)))
@@ -108,11 +108,11 @@ def test_a_folder_of_wheels_takes_the_place_of_the_network(engine: Engine, tmp_p
         install(engine, Wishes(python(tmp_path / "py"), str(wheels)))
 
 
-def test_what_fails_or_is_cancelled_leaves_what_was_there(engine: Engine, tmp_path: Path) -> None:
+def test_failed_or_cancelled_installation_keeps_the_engine(engine: Engine, tmp_path: Path) -> None:
     broken = Wishes(python(tmp_path / "broken", pip="echo 'ERROR: No network.'; exit 1"))
     slow = Wishes(python(tmp_path / "slow", pip="sleep 60"))
-    for there in (False, True):
-        if there:
+    for existing in (False, True):
+        if existing:
             install(engine, Wishes(python(tmp_path / "py")))
         before = engine.command
         with refused(CommandError, "cannot be installed: No network;", "press Install again"):
@@ -120,7 +120,7 @@ def test_what_fails_or_is_cancelled_leaves_what_was_there(engine: Engine, tmp_pa
         with pytest.raises(Cancelled):
             install(engine, slow, until="Processing")
         assert engine.command == before
-        assert len([*engine.root.glob("?")]) == there
+        assert len([*engine.root.glob("?")]) == existing
     warned = "echo \"WARNING: Retrying after ProxyError('refused')\"; echo 'ERROR: None.'; exit 1"
     with refused(CommandError, "the proxy cannot be reached, or refuses;"):
         install(engine, Wishes(python(tmp_path / "proxy", pip=warned)))
@@ -128,7 +128,7 @@ def test_what_fails_or_is_cancelled_leaves_what_was_there(engine: Engine, tmp_pa
     assert engine.command == ""
 
 
-def test_a_python_is_found_or_it_is_said_what_to_do(
+def test_python_is_found_or_the_error_gives_advice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("semsig.engine.PYTHONS", ())
@@ -138,13 +138,13 @@ def test_a_python_is_found_or_it_is_said_what_to_do(
     text.write_text("no program")
 
     def path(*folders: str) -> dict[str, str]:
-        return {"PATH": os.pathsep.join(["/bin", *(str(tmp_path / one) for one in folders)])}
+        return {"PATH": os.pathsep.join(["/bin", *(str(tmp_path / folder) for folder in folders)])}
 
     monkeypatch.setattr("semsig.engine.PROGRAMS", ("python3",))
     monkeypatch.setattr(
         "semsig.engine.shutil.which",
         lambda name, path: next(
-            (f"{one}/{name}" for one in path.split(os.pathsep) if str(tmp_path) in one), None
+            (f"{place}/{name}" for place in path.split(os.pathsep) if str(tmp_path) in place), None
         ),
     )
     assert find_python(good, path()) == find_python("", path("good")) == good
@@ -172,15 +172,15 @@ def test_a_python_is_found_or_it_is_said_what_to_do(
         ({"proxyHost": ""}, None),
     ],
 )
-def test_the_proxy_of_qgis_is_handed_on(changes: dict[str, str], address: str | None) -> None:
-    told = {
+def test_proxy_of_qgis_becomes_variables(changes: dict[str, str], address: str | None) -> None:
+    settings = {
         "proxyEnabled": "true",
         "proxyType": "HttpProxy",
         "proxyHost": "proxy",
         "proxyPort": "3128",
         "noProxyUrls": "http://maps.town/wms, inside",
     }
-    variables = proxy_variables({**told, **changes})
+    variables = proxy_variables({**settings, **changes})
     assert variables.get("https_proxy") == variables.get("HTTPS_PROXY") == address
     if address is not None:
         assert variables["NO_PROXY"] == "localhost,127.0.0.1,maps.town,inside"

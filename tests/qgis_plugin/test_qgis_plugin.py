@@ -1,4 +1,4 @@
-"""The QGIS plugin: its zip file, and what it does in a real QGIS."""
+"""The QGIS plugin: its zip file, its translations, and its tools in a real QGIS."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ pytestmark = pytest.mark.skipif(not PLUGIN.is_dir(), reason="the tests do not ru
 
 @pytest.fixture(scope="module")
 def package() -> SimpleNamespace:
-    """Return what the program defines that makes the zip file."""
+    """Return the functions of `package.py`."""
     return SimpleNamespace(**runpy.run_path(str(ROOT / "qgis_plugin" / "package.py")))
 
 
-def test_the_zip_file_is_always_the_same_and_holds_what_a_plugin_needs(
+def test_zip_file_is_reproducible_and_contains_the_plugin(
     package: SimpleNamespace, tmp_path: Path
 ) -> None:
     first, second = package.write_zip(tmp_path / "a"), package.write_zip(tmp_path / "b")
@@ -62,21 +62,14 @@ def test_the_zip_file_is_always_the_same_and_holds_what_a_plugin_needs(
         assert names == sorted(names)
         assert {name.partition("/")[0] for name in names} == {"semsig"}
         assert {"semsig/__init__.py", "semsig/metadata.txt", "semsig/LICENSE"} <= set(names)
-        assert {Path(name).suffix for name in names} == {
-            ".py",
-            ".txt",
-            ".svg",
-            ".qml",
-            ".qm",
-            ".md",
-            "",
-        }
+        suffixes = {".py", ".txt", ".svg", ".qml", ".qm", ".md", ""}
+        assert {Path(name).suffix for name in names} == suffixes
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         code = {name for name in names if name.endswith(".py")}
-    assert code == {f"semsig/{path.name}" for path in PLUGIN.glob("*.py")}
+    assert code == {path.relative_to(PLUGIN.parent).as_posix() for path in PLUGIN.rglob("*.py")}
 
 
-def test_the_official_repository_would_take_it(
+def test_official_repository_would_accept_the_zip_file(
     package: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("SEMSIG_REPOSITORY", raising=False)
@@ -85,10 +78,10 @@ def test_the_official_repository_would_take_it(
     monkeypatch.setenv("SEMSIG_REPOSITORY", "https://a.org/semsig/")
     plugin = package.write_zip(tmp_path, email="a@a.org")
     assert package.faults(plugin) == []
-    told = configparser.ConfigParser()
+    metadata = configparser.ConfigParser()
     with zipfile.ZipFile(plugin) as archive:
-        told.read_string(archive.read("semsig/metadata.txt").decode())
-    assert {name: told["general"][name] for name in ("email", *package.ADDRESSES)} == {
+        metadata.read_string(archive.read("semsig/metadata.txt").decode())
+    assert {name: metadata["general"][name] for name in ("email", *package.ADDRESSES)} == {
         "email": "a@a.org",
         "homepage": "https://a.org/semsig",
         "repository": "https://a.org/semsig",
@@ -97,10 +90,10 @@ def test_the_official_repository_would_take_it(
 
 
 def shown_texts() -> set[str]:
-    """Return what the windows and the toolbox show, with the help of the tools."""
-    found = set()
+    """Return all texts of the windows, the toolbox and the help of the tools."""
+    texts: set[str] = set()
     kinds = {"choice", "number", "whole_number", "layers_to_write", "file_to_read", "file_to_write"}
-    for path in PLUGIN.glob("*.py"):
+    for path in PLUGIN.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             values: list[ast.expr] = []
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -116,41 +109,43 @@ def shown_texts() -> set[str]:
                     values.append(node.value)
                 elif name == "HELP":
                     parts = str(ast.literal_eval(node.value)).split("\n\n")
-                    found |= {" ".join(part.split()) for part in parts}
+                    texts |= {" ".join(part.split()) for part in parts}
                 elif name == "OUTPUTS":
-                    found |= {text for _, *shown in ast.literal_eval(node.value) for text in shown}
-            texts = [one.value for one in values if isinstance(one, ast.Constant)]
-            found |= {one for one in texts if isinstance(one, str)}
-    return found - {""}
+                    texts |= {text for _, *shown in ast.literal_eval(node.value) for text in shown}
+            constants = [value.value for value in values if isinstance(value, ast.Constant)]
+            texts |= {text for text in constants if isinstance(text, str)}
+    return texts - {""}
 
 
 @pytest.mark.parametrize("language", ["de", "fr"])
-def test_what_is_shown_is_translated(package: SimpleNamespace, language: str) -> None:
-    words = package.read_words(ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts")
-    assert shown_texts() - set(words) == set()
-    for source, text in words.items():
+def test_all_texts_are_translated(package: SimpleNamespace, language: str) -> None:
+    file = ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts"
+    translations = package.read_translations(file)
+    # The title of a layer, in a dictionary.
+    assert shown_texts() | {"From the true to the best place"} == set(translations)
+    for source, text in translations.items():
         assert set(re.findall(r"{\w*}", source)) == set(re.findall(r"{\w*}", text)), text
-    # Any file that Qt reads begins so; what it reads from it is tested in QGIS.
-    assert package.compiled(words)[:4] == bytes.fromhex("3cb86418")
+    # The header of Qt; the contents are tested in QGIS.
+    assert package.compiled(translations)[:4] == bytes.fromhex("3cb86418")
 
 
 QT = re.compile(r"^(Q[A-Z]\w*|Qt|Qgs\w+)$")
-# What is no member of an enumeration, but a class or an enumeration itself.
+# Classes and enumerations, not members of enumerations.
 NO_MEMBERS = {"QgsProcessingContext.LayerDetails", "QgsFileWidget.StorageMode"}
 
 
-def test_the_code_fits_the_qt_of_qgis_3_and_of_4() -> None:
-    for path in PLUGIN.glob("*.py"):
+def test_code_works_with_qt_5_and_qt_6() -> None:
+    for path in PLUGIN.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         nodes = [*ast.walk(ast.parse(text))]
         for node in nodes:
             if isinstance(node, ast.ImportFrom | ast.Import):
-                told = ast.unparse(node)
-                assert "PyQt" not in told.replace("qgis.PyQt", ""), f"{path.name}: {told}"
-                # Qt 6 has them in another module than Qt 5.
-                assert not re.search(r"\b(QAction|QActionGroup|QShortcut)\b", told), path.name
-                assert "QVariant" not in told, path.name
-        # Qt 6 knows the members of an enumeration by its name alone: Qt.Key.Key_A.
+                imported = ast.unparse(node)
+                assert "PyQt" not in imported.replace("qgis.PyQt", ""), f"{path.name}: {imported}"
+                # Qt 6 has these classes in another module than Qt 5.
+                assert not re.search(r"\b(QAction|QActionGroup|QShortcut)\b", imported), path.name
+                assert "QVariant" not in imported, path.name
+        # Qt 6 accepts members of an enumeration only with its name: Qt.Key.Key_A.
         scopes = {id(node.value) for node in nodes if isinstance(node, ast.Attribute)}
         members = {
             ast.unparse(node)
@@ -165,7 +160,7 @@ def test_the_code_fits_the_qt_of_qgis_3_and_of_4() -> None:
         assert ".exec_(" not in text, path.name
 
 
-def test_the_metadata_is_that_of_the_package() -> None:
+def test_metadata_matches_the_package() -> None:
     metadata = configparser.ConfigParser()
     metadata.read(PLUGIN / "metadata.txt", encoding="utf-8")
     general = metadata["general"]
@@ -176,15 +171,15 @@ def test_the_metadata_is_that_of_the_package() -> None:
 
 
 @pytest.mark.parametrize("path", [*PLUGIN.rglob("*.qml"), *PLUGIN.rglob("*.svg")], ids=str)
-def test_styles_and_the_icon_are_sound(path: Path) -> None:
+def test_styles_and_icon_are_valid(path: Path) -> None:
     root = ET.parse(path).getroot()  # noqa: S314 - our own file
-    symbols = {one.get("name") for one in root.iterfind("renderer-v2/symbols/symbol")}
-    used = {one.get("symbol") for one in root.iter() if one.get("symbol")}
+    symbols = {symbol.get("name") for symbol in root.iterfind("renderer-v2/symbols/symbol")}
+    used = {element.get("symbol") for element in root.iter() if element.get("symbol")}
     assert used == symbols
 
 
-def test_the_plugin_runs_on_an_old_python() -> None:
-    for path in PLUGIN.glob("*.py"):
+def test_plugin_has_the_syntax_of_python_3_9() -> None:
+    for path in PLUGIN.rglob("*.py"):
         ast.parse(path.read_text(encoding="utf-8"), path.name, feature_version=(3, 9))
 
 
@@ -210,9 +205,9 @@ class Qgis:
     def run(self, algorithm: str, **parameters: object) -> dict[str, str]:
         """Run an algorithm with `qgis_process`, and return its outputs."""
         values = [f"{name}={value}" for name, value in parameters.items()]
-        done = self.process(self.program, "run", f"semsig:{algorithm}", "--", *values)
-        assert done.returncode == 0, done.stdout + done.stderr
-        results = done.stdout.rpartition("Results\n")[2].splitlines()
+        process = self.process(self.program, "run", f"semsig:{algorithm}", "--", *values)
+        assert process.returncode == 0, process.stdout + process.stderr
+        results = process.stdout.rpartition("Results\n")[2].splitlines()
         return dict(line.split(":\t", 1) for line in results if ":\t" in line)
 
 
@@ -228,7 +223,7 @@ def qgis(
     profile = place / "profile" / "profiles" / "default"
     with zipfile.ZipFile(package.write_zip(place)) as archive:
         archive.extractall(profile / "python" / "plugins")
-    # The command is chosen in the settings of the provider; it is not on the path of QGIS.
+    # The command is in the settings of the provider, not on the path of QGIS.
     command = place / "semsig of this test"
     (place / "run.py").write_text(QUICK)
     command.write_text(
@@ -242,59 +237,59 @@ def qgis(
     settings.write_text(
         f"[Processing]\nConfiguration\\SEMSIG_COMMAND={command}\n[PythonPlugins]\nsemsig=true\n"
     )
-    place.chmod(0o700)  # as Qt wishes its runtime folder to be
+    place.chmod(0o700)  # required by Qt for its runtime folder
     environment = {**qgis_variables(place), "GDAL_DATA": "/usr/share/gdal"}
     return Qgis(place, environment, qgis_process)
 
 
-def test_load_and_build(qgis: Qgis) -> None:
+def test_load_and_build_write_their_outputs(qgis: Qgis) -> None:
     objects = qgis.place / "lamps.parquet"
     files = {"OUTPUT": objects, "BUILDINGS": qgis.place / "no_buildings.parquet"}
-    done = qgis.run("load", FOLDER=qgis.place, CATALOG_FILE=qgis.place / "town.toml", **files)
-    assert done == {"OUTPUT": str(objects)}
+    outputs = qgis.run("load", FOLDER=qgis.place, CATALOG_FILE=qgis.place / "town.toml", **files)
+    assert outputs == {"OUTPUT": str(objects)}
     assert len(open_objects(objects)) == 3
     files = {"OUTPUT": qgis.place / "lamps_city.parquet", "CELLS": qgis.place / "lamps.gpkg"}
-    done = qgis.run("build", OBJECTS=objects, RADIUS=20, **files)
-    database = open_database(done["OUTPUT"])
+    outputs = qgis.run("build", OBJECTS=objects, RADIUS=20, **files)
+    database = open_database(outputs["OUTPUT"])
     assert database.spec.radius == 20.0
-    assert done["CELLS"] == f"{files['CELLS']}|layername=cells"
+    assert outputs["CELLS"] == f"{files['CELLS']}|layername=cells"
     assert len(gpd.read_file(files["CELLS"], layer="cells")) == len(database)
 
 
 @pytest.fixture(scope="module")
 def session(qgis: Qgis, package: SimpleNamespace) -> dict[str, Any]:
-    """Play `qgis_session.py` in QGIS's own Python, and return what it tells."""
+    """Run `qgis_session.py` in the Python of QGIS, and return its results."""
     python = shutil.which("python3", path=os.defpath) or "python3"
     shutil.copy(qgis.place / "city.parquet", qgis.place / "session.parquet")
-    words = package.read_words(ROOT / "qgis_plugin" / "i18n" / "semsig_de.ts")
-    (qgis.place / "sources.json").write_text(json.dumps(sorted(words)), "utf-8")
+    translations = package.read_translations(ROOT / "qgis_plugin" / "i18n" / "semsig_de.ts")
+    (qgis.place / "sources.json").write_text(json.dumps(sorted(translations)), "utf-8")
     database, _ = small_city()
     cell = int(database.lengths.argmax())
     bearings = database.signature(cell).bearings
     assert bearings is not None
     turned = ",".join(f"{bearing:.1f}" for bearing in bearings)
     query = json.dumps({"TYPES": database.types(cell), "BEARINGS": turned})
-    done = qgis.process(python, SCRIPT, qgis.place, qgis.place / "town.toml", query)
-    if "No module named 'qgis'" in done.stderr:
+    process = qgis.process(python, SCRIPT, qgis.place, qgis.place / "town.toml", query)
+    if "No module named 'qgis'" in process.stderr:
         unavailable("qgis", f"{python} does not have QGIS's modules")
-    assert done.returncode == 0, done.stdout + done.stderr
-    happened: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return happened
+    assert process.returncode == 0, process.stdout + process.stderr
+    results: dict[str, Any] = json.loads(process.stdout.splitlines()[-1])
+    return results
 
 
-def test_qgis_lists_the_algorithms_and_loads_a_file(session: dict[str, Any], qgis: Qgis) -> None:
+def test_algorithms_are_listed_and_files_are_loaded(session: dict[str, Any], qgis: Qgis) -> None:
     six = ["load", "build", "localize", "evaluate", "identify", "export"]
     others = ["ambiguity", "demo", "fetchcanvas", "fetch", "draft", "update"]
     assert session["listed"] == [*six, *others]
     assert session["loaded"] is True
     assert len(open_objects(qgis.place / "session_lamps.parquet")) == 3
     text = session["help"]
-    assert "<p>Tells where in the city a view was taken from: what is seen, clockwise" in text
+    assert "<p>Finds where in the city a view was taken from: what is seen, clockwise" in text
     assert "?&lt;=10" in text
 
 
 @pytest.mark.usefixtures("session")
-def test_what_is_localized_is_written_with_its_styles(qgis: Qgis) -> None:
+def test_answer_is_written_with_styles(qgis: Qgis) -> None:
     database, _ = small_city()
     names = ("CANDIDATES", "PLACE", "REGIONS")
     candidates, place, regions = (qgis.place / f"{name}.gpkg" for name in names)
@@ -302,31 +297,31 @@ def test_what_is_localized_is_written_with_its_styles(qgis: Qgis) -> None:
         styles = gpd.read_file(file, layer="layer_styles")
         assert styles["styleName"].tolist() == [name]
         assert styles["useAsDefault"].all()
-    best, here, where = (gpd.read_file(file, layer=0) for file in (candidates, place, regions))
+    best, ellipse, area = (gpd.read_file(file, layer=0) for file in (candidates, place, regions))
     assert best["rank"].tolist() == [1, 2, 3]
     assert best["cell_id"][0] == database.cell_ids[database.lengths.argmax()]
     assert best["chance"].is_monotonic_decreasing
     assert best["distance"].isna().all()
     assert best.crs == database.crs
-    assert here["answered"].tolist() == ["yes"]
-    assert where.geometry[0].distance(best.geometry[0]) == 0
-    assert here.geometry[0].centroid.distance(best.geometry[0]) < 10
+    assert ellipse["answered"].tolist() == ["yes"]
+    assert area.geometry[0].distance(best.geometry[0]) == 0
+    assert ellipse.geometry[0].centroid.distance(best.geometry[0]) < 10
     assert "<html" in (qgis.place / "place.html").read_text(encoding="utf-8")[:200].lower()
 
 
-def test_what_is_evaluated_is_written(session: dict[str, Any], qgis: Qgis) -> None:
+def test_evaluation_is_written(session: dict[str, Any], qgis: Qgis) -> None:
     folder, layers, map_ = (qgis.place / f"evaluation{end}" for end in ("", ".gpkg", ".html"))
-    done = session["evaluated"]
-    assert 0 < float(done["WITHIN_50_M"]) <= 1
-    asked = json.loads((folder / "evaluation.json").read_text("utf-8"))["settings"]
-    assert (asked["queries"], asked["distortions"]) == (20, ["light", "compass:5"])
-    assert done["LAYERS"] == f"{layers}|layername=evaluation"
+    outputs = session["evaluated"]
+    assert 0 < float(outputs["WITHIN_50_M"]) <= 1
+    settings = json.loads((folder / "evaluation.json").read_text("utf-8"))["settings"]
+    assert (settings["queries"], settings["distortions"]) == (20, ["light", "compass:5"])
+    assert outputs["LAYERS"] == f"{layers}|layername=evaluation"
     assert len(gpd.read_file(layers, layer="evaluation")) == 20
-    assert done["MAP"] == str(map_)
+    assert outputs["MAP"] == str(map_)
     assert map_.is_file()
 
 
-def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
+def test_layers_are_shown_with_styles(session: dict[str, Any]) -> None:
     assert session["shown"] == {
         "Candidates": ["graduatedSymbol", "rank"],
         "Place": ["categorizedSymbol", "answered"],
@@ -341,26 +336,27 @@ def test_layers_are_shown_with_their_styles(session: dict[str, Any]) -> None:
 
 
 def test_qgis_reads_the_translations(session: dict[str, Any], package: SimpleNamespace) -> None:
-    for language, told in session["spoken"].items():
-        words = package.read_words(ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts")
-        assert told == [words[source] for source in sorted(words)]
+    for language, texts in session["translations"].items():
+        file = ROOT / "qgis_plugin" / "i18n" / f"semsig_{language}.ts"
+        translations = package.read_translations(file)
+        assert texts == [translations[source] for source in sorted(translations)]
 
 
-def test_layers_come_in_groups_points_above_areas(session: dict[str, Any]) -> None:
+def test_layers_are_in_groups_with_points_above_areas(session: dict[str, Any]) -> None:
     assert session["groups"]["Localize a query"] == ["Candidates", "Place", "Regions to search"]
     assert session["groups"]["Export cells"] == ["Street objects", "Cells"]
 
 
-def test_the_other_tools_do_their_work(session: dict[str, Any]) -> None:
-    told = session["others"]
-    assert told["missing"] == []
-    assert told["nowhere"] == ["No place was given; type a name, or choose a layer of polygons."]
-    assert set(told["groups"]["Demo city"]) == {
+def test_other_tools_write_their_outputs(session: dict[str, Any]) -> None:
+    others = session["others"]
+    assert others["missing"] == []
+    assert others["nowhere"] == ["No place was given; type a name, or choose a layer of polygons."]
+    assert set(others["groups"]["Demo city"]) == {
         *("Queries", "From the true to the best place", "Street objects", "Cells")
     }
 
 
-def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> None:
+def test_second_run_into_the_same_files_updates_the_layers(session: dict[str, Any]) -> None:
     first, second = session["first"], session["second"]
     for name in ("Candidates", "Regions to search"):
         ((rows, extent, _),), ((new_rows, new_extent, _),) = first[name], second[name]
@@ -378,7 +374,7 @@ def test_a_second_run_into_the_same_files_is_shown(session: dict[str, Any]) -> N
     assert searched.startswith("To search: ")
 
 
-def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> None:
+def test_invalid_parameters_are_refused(session: dict[str, Any]) -> None:
     expected = (
         ("--heading and --area work only with the likelihood method",),
         ("Place was given with the method types:edit",),
@@ -395,7 +391,7 @@ def test_what_cannot_be_is_refused_before_the_work(session: dict[str, Any]) -> N
 
 def test_cells_are_identified_and_exported(session: dict[str, Any], qgis: Qgis) -> None:
     assert set(session["identified"]) == {"CELLS", "MAP"}
-    source = qgis.place / "session.parquet"  # of which everything is known by now
+    source = qgis.place / "session.parquet"  # with the columns of the session
     cells = gpd.read_file(qgis.place / "cells.gpkg", layer="cells")
     assert cells["chance_found"].between(0, 1).all()
     assert (qgis.place / "cells.html").is_file()
@@ -405,7 +401,7 @@ def test_cells_are_identified_and_exported(session: dict[str, Any], qgis: Qgis) 
     assert layers["cells"] == layers["objects"] == "Point"
 
 
-def test_a_run_that_fails_or_is_cancelled_says_so_and_leaves_nothing(
+def test_failed_or_cancelled_run_reports_it_and_leaves_no_files(
     session: dict[str, Any],
 ) -> None:
     run = session["failed"]

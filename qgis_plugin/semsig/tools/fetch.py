@@ -1,4 +1,4 @@
-"""Street objects are downloaded: of the canvas, or of a city."""
+"""Download the street objects in the extent of the canvas, or of a city."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from qgis.core import (
     QgsProcessingParameterString,
 )
 
-from . import settings
-from .algorithm import SemsigAlgorithm, area, choice, described, file_to_write
-from .arguments import SERVICES, command_line
-from .command import CommandError
+from .. import settings
+from ..algorithm import SemsigAlgorithm, area, choice, described, file_to_write
+from ..arguments import SERVICES, command_line
+from ..command import CommandError
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["FetchCanvas", "FetchCity"]
 
@@ -44,7 +44,7 @@ class _Fetch(SemsigAlgorithm):
     """`semsig fetch`."""
 
     def definitions(self) -> Definitions:
-        """Return what goes out."""
+        """Return the parameters of the outputs."""
         return tuple(
             file_to_write(name, title, text, optional=name != "OUTPUT")
             for name, title, text in OUTPUTS
@@ -57,7 +57,7 @@ class _Fetch(SemsigAlgorithm):
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        """Download what a catalogue has of an area."""
+        """Download the objects of a catalogue in an area."""
         catalog, where = place
         written = {name: self.file_out(parameters, name, context) for name, _, _ in OUTPUTS}
         server = settings.value(settings.OVERPASS) if catalog == OPENSTREETMAP else ""
@@ -70,7 +70,7 @@ class _Fetch(SemsigAlgorithm):
             buildings=written["BUILDINGS"],
             streets=written["STREETS"],
         )
-        self.tell(line, feedback, written["OUTPUT"])
+        self.execute(line, feedback, written["OUTPUT"])
         return {name: path for name, path in written.items() if path and Path(path).is_file()}
 
 
@@ -89,9 +89,9 @@ The server is a setting: Settings > Options > Processing > Providers > Semantic 
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         extent = QgsProcessingParameterExtent("EXTENT", "Extent", _canvas())
-        text = "What is downloaded; that of the canvas by default."
+        text = "The extent to download; by default the extent of the canvas."
         return (described(extent, text), *super().definitions())
 
     def work(
@@ -112,7 +112,7 @@ The server is a setting: Settings > Options > Processing > Providers > Semantic 
 
 
 def _canvas() -> str | None:
-    """Return the extent of the canvas, where there is one."""
+    """Return the extent of the canvas as a parameter; None without a canvas."""
     if utils.iface is None:
         return None
     canvas = utils.iface.mapCanvas()
@@ -133,7 +133,7 @@ from where: OpenStreetMap has every place; a city's own portal has more of that 
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         place = QgsProcessingParameterString("PLACE", "Place", optional=True)
         return (
             choice(
@@ -155,8 +155,8 @@ from where: OpenStreetMap has every place; a city's own portal has more of that 
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
         """Run `semsig fetch`."""
-        named = self.text(parameters, "PLACE", context)
-        where = self.polygons(parameters, "AREA", context, feedback) or named
+        place = self.text(parameters, "PLACE", context)
+        where = self.polygons(parameters, "AREA", context, feedback) or place
         if not where:
             message = "No place was given; type a name, or choose a layer of polygons."
             raise CommandError(message)

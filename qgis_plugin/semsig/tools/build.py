@@ -1,10 +1,10 @@
-"""Street objects become a signature database."""
+"""Build a signature database from street objects."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .algorithm import (
+from ..algorithm import (
     SemsigAlgorithm,
     advanced,
     area,
@@ -15,13 +15,13 @@ from .algorithm import (
     number,
     whole_number,
 )
-from .arguments import command_line
+from ..arguments import command_line
 from .export import CELLS, OBJECTS, export_layers
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["Build"]
 
@@ -33,15 +33,15 @@ class Build(SemsigAlgorithm):
     TITLE = "2. Build signature database"
     TAGS = ("cells", "grid", "visibility", "occlusion", "viewpoints")
     HELP = """
-Divides the city into square cells and notes for each which street objects are seen from its
-centre, clockwise from north: its signature. That is what queries are compared with.
+Divides the city into square cells and stores for each which street objects are seen from its
+centre, clockwise from north: its signature. Queries are compared with these signatures.
 
-Cells that see nothing are left out. Beside the database a folder appears with the street objects,
-ready to be searched; keep it there.
+Cells that see nothing are left out. A folder with the street objects, ready to be searched, is
+written next to the database; keep it there.
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         any_vector = "Vector files (*.parquet *.gpkg *.shp *.geojson *.zip)"
         return (
             file_to_read("OBJECTS", "Street objects", "The file that “Load street objects” wrote."),
@@ -50,19 +50,20 @@ ready to be searched; keep it there.
                 "Side of a cell (m)",
                 10.0,
                 (1.0, 1000.0),
-                "The paper of Weng, Gouet-Brunet and Soheilian has 10 m.",
+                "The paper of Weng, Gouet-Brunet and Soheilian uses 10 m.",
             ),
             number(
                 "RADIUS",
                 "Visibility range (m)",
                 30.0,
                 (1.0, 1000.0),
-                "From how far an object is seen, unless the catalogue says it of its class.",
+                "Largest distance from which an object is seen, unless the catalogue gives one for"
+                " its class.",
             ),
             file_to_read(
                 "BUILDINGS",
                 "Buildings",
-                "Footprints: what they hide is not seen.",
+                "Building footprints; objects behind them are not seen.",
                 kind=any_vector,
                 optional=True,
             ),
@@ -70,7 +71,7 @@ ready to be searched; keep it there.
                 "VIEWPOINTS",
                 "Viewpoints",
                 ("all", "outdoor", "streets"),
-                "Every cell, those outside the buildings, or along the streets and outside them.",
+                "Every cell, outdoor cells, or outdoor cells near streets.",
             ),
             file_to_read(
                 "STREETS",
@@ -86,8 +87,9 @@ ready to be searched; keep it there.
                     "Angle levels",
                     16,
                     (2, 180),
-                    "In how many equal sectors the methods of the paper compare bearings. More of "
-                    "them tell cells apart better, and forgive less where bearings are off.",
+                    "Number of equal sectors in which the methods of the paper compare bearings. "
+                    "More sectors distinguish cells better, but tolerate smaller errors of "
+                    "bearings.",
                 )
             ),
             file_to_write(
@@ -112,7 +114,7 @@ ready to be searched; keep it there.
         """Run `semsig build`, and `semsig export` where layers are wished for."""
         objects = self.file(parameters, "OBJECTS", context)
         written = self.file_out(parameters, "OUTPUT", context)
-        self.tell(
+        self.execute(
             command_line(
                 "build",
                 objects,

@@ -1,4 +1,4 @@
-"""Many distorted queries, and how far off the answers are."""
+"""Measure how far the answers to distorted queries are from the true places."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from qgis.core import (
     QgsProcessingParameterString,
 )
 
-from .algorithm import (
+from ..algorithm import (
     SemsigAlgorithm,
     advanced,
     choice,
@@ -22,7 +22,7 @@ from .algorithm import (
     map_to_write,
     whole_number,
 )
-from .arguments import (
+from ..arguments import (
     DISTORTIONS,
     LIKELIHOOD,
     METHOD_HELP,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         QgsProcessingFeedback,
     )
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["Evaluate"]
 
@@ -57,18 +57,18 @@ Measures how often answers are right. Cells are drawn as queries, their signatur
 a bad detector would (objects missed, made up or misnamed, bearings off), and the best answer is
 compared with the true place.
 
-The log has a table of the results; the folder has them for other programs, the layers and the
-map page for the eye.
+The log has a table of the results; the folder contains them for other programs, and the layers and
+the map page show them.
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         more = QgsProcessingParameterString("MORE", "Further distortions", optional=True)
         folder = QgsProcessingParameterFolderDestination("OUTPUT", "Folder for the results")
         return (
             database(),
             whole_number(
-                "QUERIES", "Number of queries", 500, (1, 1_000_000), "How many are asked."
+                "QUERIES", "Number of queries", 500, (1, 1_000_000), "How many queries are asked."
             ),
             choice(
                 "DISTORTION",
@@ -80,8 +80,8 @@ map page for the eye.
             advanced(
                 described(
                     more,
-                    "What else happens to a query, with commas between, such as "
-                    "compass:10,view:90 (a compass that is off by 10°, a view of 90°).",
+                    "More distortions of a query, separated by commas, such as compass:10,view:90 "
+                    "(a compass that is off by 10°, a view of 90°).",
                 )
             ),
             choice("METHOD", "Method", METHODS, METHOD_HELP),
@@ -97,7 +97,7 @@ map page for the eye.
                 "Best candidates that count",
                 1,
                 (1, 100_000),
-                "A query is right if one of so many is.",
+                "A query counts as right if one of this many candidates is right.",
             ),
             advanced(
                 whole_number(
@@ -118,7 +118,7 @@ map page for the eye.
         )
 
     def initAlgorithm(self, configuration: dict[str, Any] | None = None) -> None:  # noqa: N802
-        """Say what goes in and out."""
+        """Add the parameters and the computed output."""
         super().initAlgorithm(configuration)
         self.addOutput(
             QgsProcessingOutputNumber("WITHIN_50_M", "Chance of an error of 50 m or less")
@@ -130,7 +130,7 @@ map page for the eye.
         context: QgsProcessingContext,
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
-        """Run `semsig evaluate`, then `semsig map` where a page is wished for."""
+        """Run `semsig evaluate`, then `semsig map` if a page is requested."""
         source = self.file(parameters, "DATABASE", context)
         folder = self.file_out(parameters, "OUTPUT", context)
         results = Path(folder, "evaluation.json")
@@ -143,13 +143,13 @@ map page for the eye.
             self.text(parameters, "DISTORTION", context),
             self.text(parameters, "MORE", context),
         ]
-        self.tell(
+        self.execute(
             command_line(
                 "evaluate",
                 source,
                 out=folder,
                 queries=self.parameterAsInt(parameters, "QUERIES", context),
-                distortion=",".join(one for one in distortions if one),
+                distortion=",".join(filter(None, distortions)),
                 method=method,
                 noise=noise if method == LIKELIHOOD else "",
                 top=self.parameterAsInt(parameters, "TOP", context),
@@ -163,8 +163,8 @@ map page for the eye.
         shown = export_layers(
             self, (parameters, "LAYERS", context, feedback), LAYERS, source, evaluation=folder
         )
-        found = {"OUTPUT": folder, "WITHIN_50_M": within, **shown}
+        outputs = {"OUTPUT": folder, "WITHIN_50_M": within, **shown}
         if page:
-            self.tell(command_line("map", source, evaluation=folder, out=page), feedback, page)
-            found["MAP"] = page
-        return found
+            self.execute(command_line("map", source, evaluation=folder, out=page), feedback, page)
+            outputs["MAP"] = page
+        return outputs

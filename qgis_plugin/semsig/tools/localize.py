@@ -1,4 +1,4 @@
-"""A query, and where it was seen from."""
+"""Localize a query."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from qgis.core import (
     QgsWkbTypes,
 )
 
-from .algorithm import (
+from ..algorithm import (
     REGIONS,
     SemsigAlgorithm,
     advanced,
@@ -35,7 +35,7 @@ from .algorithm import (
     style_layer,
     whole_number,
 )
-from .answers import (
+from ..answers import (
     CANDIDATE_FIELDS,
     PLACE_FIELDS,
     answer_lines,
@@ -43,7 +43,7 @@ from .answers import (
     parse_answer,
     place_row,
 )
-from .arguments import (
+from ..arguments import (
     LIKELIHOOD,
     METHOD_HELP,
     METHODS,
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
         QgsProcessingFeedback,
     )
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["Localize"]
 
@@ -73,16 +73,16 @@ class Localize(SemsigAlgorithm):
     TITLE = "3. Localize a query"
     TAGS = ("query", "where", "place", "candidates", "position")
     HELP = """
-Tells where in the city a view was taken from: what is seen, clockwise from north, is compared with
-the signature of every cell. Types alone or bearings alone are fine.
+Finds where in the city a view was taken from: what is seen, clockwise from north, is compared with
+the signature of every cell. Types without bearings, or bearings without types, are enough.
 
-The likelihood method gives each candidate a chance, tells the place between the middles of the
-cells with its uncertainty, and says when it cannot tell. The other methods are those of the paper;
+The likelihood method gives each candidate a chance, estimates the place between the centres of
+cells with its uncertainty, and reports when it cannot decide. The other methods are from the paper;
 they rank cells by a distance, and cells that look the same share a rank.
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         types = QgsProcessingParameterString("TYPES", "Types", optional=True)
         bearings = QgsProcessingParameterString("BEARINGS", "Bearings (°)", optional=True)
         candidates = QgsProcessingParameterFeatureSink(
@@ -102,8 +102,8 @@ they rank cells by a distance, and cells that look the same share a rank.
             ),
             described(
                 bearings,
-                "Where each is seen, in degrees clockwise from north, with commas between them, "
-                "such as 10,80,200,310.",
+                "The direction of each object, in degrees clockwise from north, separated by "
+                "commas, such as 10,80,200,310.",
             ),
             choice("METHOD", "Method", METHODS, METHOD_HELP),
             choice(
@@ -139,16 +139,17 @@ they rank cells by a distance, and cells that look the same share a rank.
             layers_to_write(
                 "REGIONS",
                 "Regions to search",
-                "What of the city must be searched for the query, in a GeoPackage.",
+                "The parts of the city to search for the query, in a GeoPackage.",
                 optional=True,
             ),
             advanced(
                 number(
                     "SHARE",
-                    "Chance that the regions hold",
+                    "Chance that the regions contain",
                     None,
                     (0.01, 1.0),
-                    "With likelihood: they are as large as needed for that, 0.9 by default.",
+                    "With likelihood: the regions are as large as needed to contain this chance, "
+                    "0.9 by default.",
                 )
             ),
             advanced(
@@ -157,7 +158,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                     "Around the regions (m)",
                     0.0,
                     (0.0, 100_000.0),
-                    "So far around their cells is searched too.",
+                    "Distance around their cells that is searched as well.",
                 )
             ),
             map_to_write("A page for the browser with the chances and the candidates."),
@@ -188,7 +189,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                 types=self.text(parameters, "TYPES", context),
                 bearings=self.text(parameters, "BEARINGS", context),
                 method=method,
-                # The command refuses what its other methods do not have.
+                # With other methods, the command refuses this option.
                 noise=noise if method == LIKELIHOOD else "",
                 heading="" if heading == HEADINGS[0] else heading,
                 area=self.polygons(parameters, "AREA", context, feedback),
@@ -205,10 +206,10 @@ they rank cells by a distance, and cells that look the same share a rank.
         answer = parse_answer(printed)
         crs = QgsCoordinateReferenceSystem()
         crs.createFromUserInput(answer["crs"])
-        found: dict[str, Any] = {"MAP": page} if page else {}
+        outputs: dict[str, Any] = {"MAP": page} if page else {}
         if regions:
             titles = {"regions": REGIONS}
-            found["REGIONS"] = show_layers(context, regions, titles, group=self.TITLE)
+            outputs["REGIONS"] = show_layers(context, regions, titles, group=self.TITLE)
         place = place_row(answer)
         if place is not None:
             outline, values = place
@@ -216,18 +217,18 @@ they rank cells by a distance, and cells that look the same share a rank.
             rows = [(QgsGeometry.fromPolygonXY([ring]), values)]
             kind = QgsWkbTypes.Type.Polygon
             sink = self._layer(parameters, "PLACE", context, (PLACE_FIELDS, kind, crs), rows)
-            found.update(sink)
+            outputs.update(sink)
         rows = [
             (QgsGeometry.fromPointXY(QgsPointXY(x, y)), values)
             for x, y, values in candidate_rows(answer)
         ]
         kind = QgsWkbTypes.Type.Point
-        found.update(
+        outputs.update(
             self._layer(parameters, "CANDIDATES", context, (CANDIDATE_FIELDS, kind, crs), rows)
         )
         for line in answer_lines(answer):
             feedback.pushInfo(line)
-        return found
+        return outputs
 
     def _layer(
         self,
@@ -237,9 +238,9 @@ they rank cells by a distance, and cells that look the same share a rank.
         shape: tuple[dict[str, str], Any, QgsCoordinateReferenceSystem],
         rows: list[tuple[QgsGeometry, list[Any]]],
     ) -> dict[str, Any]:
-        """Write a layer, where it is wished for, and return it by the name of its parameter."""
+        """Write a layer, if it is requested, and return it by the name of its parameter."""
         path = self.sink_file(parameters, name, context)
-        if path:  # QGIS makes no folders
+        if path:  # QGIS does not create folders
             Path(path).parent.mkdir(parents=True, exist_ok=True)
         fields, kind, crs = shape
         sink, source = self.parameterAsSink(parameters, name, context, _fields(fields), kind, crs)
@@ -258,6 +259,6 @@ they rank cells by a distance, and cells that look the same share a rank.
 
 
 def _fields(types: dict[str, str]) -> QgsFields:
-    """Return fields by the words that all versions of QGIS know; Qt's own names differ."""
-    described_so = "&".join(f"field={name}:{kind}" for name, kind in types.items())
-    return QgsVectorLayer(f"None?{described_so}", "", "memory").fields()
+    """Return fields by type names that all versions of QGIS accept; Qt's type names differ."""
+    query = "&".join(f"field={name}:{kind}" for name, kind in types.items())
+    return QgsVectorLayer(f"None?{query}", "", "memory").fields()

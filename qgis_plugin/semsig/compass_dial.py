@@ -1,4 +1,4 @@
-"""The wheel of what is seen around a place: drawn, and composed by clicks."""
+"""A compass dial that shows the objects around a place, and takes clicks to edit them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from qgis.PyQt.QtCore import QEvent
     from qgis.PyQt.QtGui import QMouseEvent, QPaintEvent
 
-__all__ = ["Mark", "Sign", "Wheel", "sign_icon"]
+__all__ = ["CompassDial", "Mark", "Sign", "sign_icon"]
 
-MARGIN, DISC = 18.0, 9.0
-RINGS = (0.33, 0.66, 1.0)
+MARGIN, DISC = 18.0, 9.0  # pixels
+RINGS = (0.33, 0.66, 1.0)  # shares of the radius
 
 
 class Sign(NamedTuple):
-    """How a class is drawn."""
+    """The look of a class."""
 
     title: str
     symbol: str
@@ -29,7 +29,7 @@ class Sign(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """One object: its class, degrees clockwise from north, and metres if they are known."""
+    """An object: class, bearing in degrees clockwise from north, distance in metres if known."""
 
     kind: str
     bearing: float
@@ -42,13 +42,13 @@ def paint_sign(painter: QPainter, sign: Sign, place: QPointF, radius: float = DI
     Parameters
     ----------
     painter : QPainter
-        What draws.
+        The painter.
     sign : Sign
         The look of the class.
     place : QPointF
-        Its middle.
+        The centre.
     radius : float, optional
-        In pixels.
+        The radius in pixels.
     """
     painter.setPen(QPen(QColor("white"), 1.5))
     painter.setBrush(QColor(sign.colour))
@@ -76,22 +76,22 @@ def sign_icon(sign: Sign) -> QIcon:
         The icon.
     """
     side = int(2 * DISC) + 4
-    drawn = QPixmap(side, side)
-    drawn.fill(QColor(0, 0, 0, 0))
-    painter = QPainter(drawn)
+    pixmap = QPixmap(side, side)
+    pixmap.fill(QColor(0, 0, 0, 0))
+    painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     paint_sign(painter, sign, QPointF(side / 2, side / 2))
     painter.end()
-    return QIcon(drawn)
+    return QIcon(pixmap)
 
 
-class Wheel(QWidget):
-    """Shows marks around the middle, north up: by their distance, or at the rim where unknown."""
+class CompassDial(QWidget):
+    """Shows marks by bearing, north up, and by distance, or at the rim if it is unknown."""
 
-    pressed = pyqtSignal(float)
-    """A bearing was clicked where no mark is."""
-    taken = pyqtSignal(int)
-    """The mark of this number was clicked."""
+    bearing_clicked = pyqtSignal(float)
+    """A place without a mark was clicked; its bearing."""
+    mark_clicked = pyqtSignal(int)
+    """A mark was clicked; its number."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -102,12 +102,12 @@ class Wheel(QWidget):
         self.setMouseTracking(True)
 
     def show_marks(self, marks: list[Mark]) -> None:
-        """Show other marks.
+        """Replace the marks.
 
         Parameters
         ----------
         marks : list of Mark
-            The marks.
+            The new marks.
         """
         self.marks = marks
         self.update()
@@ -120,7 +120,7 @@ class Wheel(QWidget):
         return QPointF(self.width() / 2, self.height() / 2)
 
     def place(self, mark: Mark) -> QPointF:
-        """Return where a mark is drawn.
+        """Return the place of a mark on the widget.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class Wheel(QWidget):
         Returns
         -------
         QPointF
-            In pixels.
+            The place in pixels.
         """
         share = 1.0 if mark.distance is None else max(0.15, min(1.0, mark.distance / self.reach))
         turn, radius = math.radians(mark.bearing), self._radius() * share
@@ -138,7 +138,7 @@ class Wheel(QWidget):
         return QPointF(middle.x() + radius * math.sin(turn), middle.y() - radius * math.cos(turn))
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - the names are those of Qt
-        """Draw the rings, the directions, and the marks."""
+        """Draw the rings, the axes, and the marks."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, radius = self._middle(), self._radius()
@@ -169,38 +169,38 @@ class Wheel(QWidget):
                 paint_sign(painter, sign, self.place(mark))
         painter.end()
 
-    def _at(self, spot: QPointF) -> int | None:
-        """Return the number of the mark at a place."""
+    def _mark_at(self, spot: QPointF) -> int | None:
+        """Return the number of the uppermost mark at a place; None without one."""
         for number in reversed(range(len(self.marks))):
-            there = self.place(self.marks[number])
-            if math.hypot(there.x() - spot.x(), there.y() - spot.y()) <= DISC + 2:
+            place = self.place(self.marks[number])
+            if math.hypot(place.x() - spot.x(), place.y() - spot.y()) <= DISC + 2:
                 return number
         return None
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
-        """Tell what was clicked."""
+        """Emit the clicked mark or bearing."""
         spot = QPointF(event.pos())
-        number = self._at(spot)
+        number = self._mark_at(spot)
         if number is not None:
-            self.taken.emit(number)
+            self.mark_clicked.emit(number)
             return
         middle = self._middle()
         turn = math.degrees(math.atan2(spot.x() - middle.x(), middle.y() - spot.y()))
-        self.pressed.emit(round(turn % 360.0, 1))
+        self.bearing_clicked.emit(round(turn % 360.0, 1))
 
     def event(self, event: QEvent) -> bool:
-        """Say what a mark is when the pointer rests on it."""
+        """Show a tool tip for the mark below the pointer."""
         if event.type() == event.Type.ToolTip:
-            number = self._at(QPointF(event.pos()))
+            number = self._mark_at(QPointF(event.pos()))
             if number is None:
                 QToolTip.hideText()
             else:
-                QToolTip.showText(event.globalPos(), self.words(self.marks[number]), self)
+                QToolTip.showText(event.globalPos(), self.description(self.marks[number]), self)
             return True
         return bool(super().event(event))
 
-    def words(self, mark: Mark) -> str:
-        """Return a mark in words.
+    def description(self, mark: Mark) -> str:
+        """Return the text for a mark.
 
         Parameters
         ----------

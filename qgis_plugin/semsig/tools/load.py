@@ -1,4 +1,4 @@
-"""Open data become street objects."""
+"""Load street objects from open data."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from qgis.core import (
     QgsProcessingParameterMultipleLayers,
 )
 
-from .algorithm import SemsigAlgorithm, advanced, described, file_to_read, file_to_write
-from .arguments import CATALOGS, command_line
-from .command import CommandError
+from ..algorithm import SemsigAlgorithm, advanced, described, file_to_read, file_to_write
+from ..arguments import CATALOGS, command_line
+from ..command import CommandError
 
 if TYPE_CHECKING:
     from qgis.core import (
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         QgsProcessingFeedback,
     )
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["Load"]
 
@@ -42,11 +42,11 @@ objects, which “Build signature database” takes.
 A catalogue says which file holds what: the open data of Montpellier and of Paris, and
 OpenStreetMap, are built in; for other data, write one (“Suggest a catalogue” drafts it).
 
-The log tells what became of every row: how many are objects, how many were left out, and why.
+The log reports how many rows became objects, how many were left out, and why.
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         files = QgsProcessingParameterMultipleLayers(
             "FILES", "Files", layerType=QgsProcessing.SourceType.TypeFile, optional=True
         )
@@ -73,13 +73,13 @@ The log tells what became of every row: how many are objects, how many were left
             ),
             described(
                 catalogs,
-                "What the files hold. With several, objects that two of them have are merged; the "
-                "first is treated as the best source.",
+                "The catalogues of the files. With several, objects that two of them contain are "
+                "merged; the first is treated as the best source.",
             ),
             file_to_read(
                 "CATALOG_FILE",
                 "Catalogue of your own",
-                "A catalogue file, besides those chosen above or instead of them.",
+                "A catalogue file, in addition to the catalogues chosen above or instead of them.",
                 kind="Catalogue (*.toml)",
                 optional=True,
             ),
@@ -118,12 +118,12 @@ The log tells what became of every row: how many are objects, how many were left
         feedback: QgsProcessingFeedback,
     ) -> dict[str, Any]:
         """Run `semsig load`."""
-        given = [
+        files = [
             *map(str, self.parameterAsFileList(parameters, "FILES", context)),
             self.file(parameters, "FOLDER", context),
         ]
-        given = [path for path in given if path]  # no files are a list of nothing
-        if not given:
+        files = [path for path in files if path]  # without files, QGIS gives an empty text
+        if not files:
             message = "No files were given; choose files, or the folder that holds them."
             raise CommandError(message)
         catalogs = [
@@ -138,10 +138,10 @@ The log tells what became of every row: how many are objects, how many were left
             name: self.file_out(parameters, name, context)
             for name in ("OUTPUT", "BUILDINGS", "STREETS")
         }
-        self.tell(
+        self.execute(
             command_line(
                 "load",
-                *given,
+                *files,
                 catalog=catalogs,
                 crs=_crs_text(self.parameterAsCrs(parameters, "CRS", context)),
                 metric_crs=_crs_text(self.parameterAsCrs(parameters, "METRIC_CRS", context)),
@@ -157,8 +157,8 @@ The log tells what became of every row: how many are objects, how many were left
 
 
 def _crs_text(crs: QgsCoordinateReferenceSystem) -> str:
-    """Return what names a CRS, or nothing where none is given."""
+    """Return the identifier of a CRS, or its WKT; empty if it is not set."""
     if not crs.isValid():
         return ""
-    known = str(crs.authid())
-    return known if known and not known.startswith("USER:") else str(crs.toWkt())
+    identifier = str(crs.authid())
+    return identifier if identifier and not identifier.startswith("USER:") else str(crs.toWkt())

@@ -1,10 +1,10 @@
-"""A signature database becomes layers."""
+"""Export the cells of a signature database as layers."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .algorithm import (
+from ..algorithm import (
     SemsigAlgorithm,
     choice,
     database,
@@ -12,18 +12,18 @@ from .algorithm import (
     layers_to_write,
     show_layers,
 )
-from .arguments import command_line
+from ..arguments import command_line
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["CELLS", "OBJECTS", "Export", "export_layers"]
 
 CELLS = {"cells": "Cells"}
 OBJECTS = {"objects": "Street objects"}
-"""What layers are called."""
+"""Titles of layers."""
 
 
 class Export(SemsigAlgorithm):
@@ -36,11 +36,11 @@ class Export(SemsigAlgorithm):
 Writes the cells of a database to a GeoPackage: what is seen from each, clockwise from north, and
 how many other cells look the same; with the street objects, these become a second layer.
 
-If “Where queries can be placed” was run, what it found goes with the cells.
+If “Where queries can be placed” was run, its results are written with the cells.
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         return (
             database(),
             file_to_read(
@@ -83,32 +83,32 @@ def export_layers(
     database: str,
     **options: str,
 ) -> dict[str, Any]:
-    """Write layers to a GeoPackage, and let them be shown, where that is wished for.
+    """Write layers to a GeoPackage and show them, if this is requested.
 
     Parameters
     ----------
     algorithm : SemsigAlgorithm
-        Who asks.
+        The algorithm that runs.
     run : tuple
-        The values of the parameters, the name of the one that says where to write to, the context
+        The values of the parameters, the name of the parameter with the file to write, the context
         and the feedback of the run.
     titles : dict of str to str
-        The layers to write and to show, and what they are called.
+        Titles of the layers to write and show, by their names.
     database : str
-        Whose layers they are.
+        The signature database.
     **options : str
         Options of `semsig export`.
 
     Returns
     -------
     dict
-        The first layer by the name of its parameter; empty where none is wished for.
+        The first layer by the name of its parameter; empty if no file is requested.
     """
     parameters, name, context, feedback = run
     path = str(algorithm.parameterAsOutputLayer(parameters, name, context) or "")
     if not path:
         return {}
-    algorithm.tell(
+    algorithm.execute(
         command_line("export", database, out=path, layer=list(titles), **options), feedback, path
     )
     return {name: show_layers(context, path, titles, group=algorithm.TITLE)}

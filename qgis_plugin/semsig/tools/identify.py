@@ -1,10 +1,10 @@
-"""Where in a city a query can be placed, before there is one."""
+"""Predict where in a city queries can be located."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .algorithm import (
+from ..algorithm import (
     SemsigAlgorithm,
     advanced,
     choice,
@@ -14,13 +14,13 @@ from .algorithm import (
     number,
     whole_number,
 )
-from .arguments import NOISES, command_line
+from ..arguments import NOISES, command_line
 from .export import CELLS, export_layers
 
 if TYPE_CHECKING:
     from qgis.core import QgsProcessingContext, QgsProcessingFeedback
 
-    from .algorithm import Definitions
+    from ..algorithm import Definitions
 
 __all__ = ["Identify"]
 
@@ -32,17 +32,17 @@ class Identify(SemsigAlgorithm):
     TITLE = "5. Where queries can be placed"
     TAGS = ("identifiability", "ambiguous", "map", "chance", "uniqueness")
     HELP = """
-Tells of every cell, before any query, how likely one from there will be found, and for which other
-cells it will be taken. A street with three lamps looks like thousands of others; here they are.
+Predicts for every cell how likely a query from there will be found, and which other cells it may be
+confused with. A street with three lamps looks like thousands of others; this tool shows them.
 
-The database gets columns that say so, and the cells are shown by their chance. The map page, which
-opens in a browser, shows on a click what a cell is taken for.
+The results become columns of the database, and the cells are shown by their chance. The map page,
+which opens in a browser, shows on a click which cells a cell may be confused with.
 
-A large city takes minutes. What is known already is not computed again.
+A large city takes minutes. Results that exist are not computed again.
 """
 
     def definitions(self) -> Definitions:
-        """Return what goes in and out."""
+        """Return the parameters, inputs first."""
         return (
             database(),
             choice(
@@ -57,7 +57,8 @@ A large city takes minutes. What is known already is not computed again.
                 "Found within (m)",
                 50.0,
                 (1.0, 10_000.0),
-                "A query counts as found if its best place is as near as this to the true one.",
+                "A query counts as found if its best place is at most this far from the true "
+                "place.",
             ),
             advanced(
                 whole_number(
@@ -76,7 +77,7 @@ A large city takes minutes. What is known already is not computed again.
     ) -> dict[str, Any]:
         """Run `semsig identify`, then `semsig export` and `semsig map`."""
         source = self.file(parameters, "DATABASE", context)
-        self.tell(
+        self.execute(
             command_line(
                 "identify",
                 source,
@@ -89,6 +90,8 @@ A large city takes minutes. What is known already is not computed again.
         shown = export_layers(self, (parameters, "CELLS", context, feedback), CELLS, source)
         page = self.file_out(parameters, "MAP", context)
         if page:
-            self.tell(command_line("map", source, identifiability=True, out=page), feedback, page)
+            self.execute(
+                command_line("map", source, identifiability=True, out=page), feedback, page
+            )
             shown["MAP"] = page
         return shown

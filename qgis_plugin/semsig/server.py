@@ -1,6 +1,6 @@
-"""A city that answers at once: `semsig serve` as a process, asked over this machine's own network.
+"""Send requests to `semsig serve`, which runs as a process on this machine.
 
-The command opens the database once, so that a click is answered in a moment.
+The process opens the database once, so that each click is answered quickly.
 """
 
 from __future__ import annotations
@@ -14,44 +14,44 @@ from qgis.PyQt.QtNetwork import QNetworkAccessManager, QNetworkProxy, QNetworkRe
 
 from . import settings
 from .command import CommandError
-from .words import tr
+from .translation import tr
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from qgis.PyQt.QtNetwork import QNetworkReply
 
-__all__ = ["Bench"]
+__all__ = ["CityServer"]
 
 ADDRESS = re.compile(r"(http://127\.0\.0\.1:\d+)/\?token=(\S+)")
 SENTENCE = "semsig: "
 PATIENCE_MS = 3000
 
 
-class Bench(QObject):
-    """Asks a database; one at a time."""
+class CityServer(QObject):
+    """A process that answers requests for one database at a time."""
 
     opened = pyqtSignal(dict)
-    """What is to be known of the city."""
+    """The description of the city."""
     failed = pyqtSignal(str)
-    """Why a city cannot be opened, or a question not be answered."""
+    """The reason why a city cannot be opened or a request not be answered."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.network = QNetworkAccessManager(self)
-        # Whatever proxy QGIS has, this stays on the machine.
+        # Without the proxy of QGIS: the requests stay on this machine.
         self.network.setProxy(QNetworkProxy(QNetworkProxy.ProxyType.NoProxy))
         self.process: QProcess | None = None
         self.address, self.token = "", ""
-        self.said: list[str] = []
+        self.messages: list[str] = []
 
     def open(self, database: str) -> None:
-        """Open a database; `opened` or `failed` tells the end.
+        """Open a database; then `opened` or `failed` is emitted.
 
         Parameters
         ----------
         database : str
-            The file that “Build signature database” wrote.
+            The path of the signature database.
         """
         self.close()
         try:
@@ -64,15 +64,15 @@ class Bench(QObject):
         for name, value in settings.environment().items():
             variables.insert(name, value)
         process.setProcessEnvironment(variables)
-        process.readyReadStandardOutput.connect(lambda: self._listen(process))
-        process.readyReadStandardError.connect(lambda: self._note(process))
+        process.readyReadStandardOutput.connect(lambda: self._read_address(process))
+        process.readyReadStandardError.connect(lambda: self._read_messages(process))
         process.finished.connect(lambda *_: self._end(process))
         process.errorOccurred.connect(lambda _error: self._end(process))
-        self.process, self.said = process, []
+        self.process, self.messages = process, []
         process.start(program, ["serve", "--no-browser", "--", database])
 
     def close(self) -> None:
-        """Close the database; the process ends with its input."""
+        """Close the database; the process ends when its input is closed."""
         process, self.process, self.address = self.process, None, ""
         if process is None:
             return
@@ -82,36 +82,39 @@ class Bench(QObject):
             process.waitForFinished(PATIENCE_MS)
         process.deleteLater()
 
-    def _listen(self, process: QProcess) -> None:
-        told = ADDRESS.search(bytes(process.readAllStandardOutput()).decode("utf-8", "replace"))
-        if told is not None and process is self.process:
-            self.address, self.token = told[1], told[2]
+    def _read_address(self, process: QProcess) -> None:
+        output = bytes(process.readAllStandardOutput()).decode("utf-8", "replace")
+        address = ADDRESS.search(output)
+        if address is not None and process is self.process:
+            self.address, self.token = address[1], address[2]
             self.ask("city", None, self.opened.emit)
 
-    def _note(self, process: QProcess) -> None:
+    def _read_messages(self, process: QProcess) -> None:
         text = bytes(process.readAllStandardError()).decode("utf-8", "replace")
-        self.said += [line for line in text.splitlines() if line.startswith(SENTENCE)]
+        self.messages += [line for line in text.splitlines() if line.startswith(SENTENCE)]
 
     def _end(self, process: QProcess) -> None:
+        """Report that the current process ended, with its last message."""
         if process is not self.process:
             return
         self.process, self.address = None, ""
-        reason = self.said[-1].removeprefix(SENTENCE) if self.said else tr("The engine ended.")
-        self.failed.emit(reason)
+        self.failed.emit(
+            self.messages[-1].removeprefix(SENTENCE) if self.messages else tr("The engine ended.")
+        )
 
     def ask(
-        self, what: str, told: dict[str, Any] | None, then: Callable[[dict[str, Any]], None]
+        self, what: str, question: dict[str, Any] | None, then: Callable[[dict[str, Any]], None]
     ) -> None:
-        """Ask, and hand the answer on when it is there.
+        """Send a request, and pass the answer on when it arrives.
 
         Parameters
         ----------
         what : str
             Such as ``"answer"``, see `semsig_gis.serve.server`.
-        told : dict or None
-            The question; None to ask without one.
+        question : dict or None
+            The body of the request, if it has one.
         then : callable
-            Takes the answer. A refusal goes to `failed` instead.
+            Called with the answer. An error is emitted by `failed` instead.
         """
         if not self.address:
             self.failed.emit(tr("Open a database first."))
@@ -119,10 +122,10 @@ class Bench(QObject):
         request = QNetworkRequest(QUrl(f"{self.address}/api/{what}"))
         request.setRawHeader(b"x-semsig-token", self.token.encode())
         request.setRawHeader(b"Content-Type", b"application/json")
-        if told is None:
+        if question is None:
             reply = self.network.get(request)
         else:
-            reply = self.network.post(request, json.dumps(told).encode())
+            reply = self.network.post(request, json.dumps(question).encode())
         reply.finished.connect(lambda: self._read(reply, then))
 
     def _read(self, reply: QNetworkReply, then: Callable[[dict[str, Any]], None]) -> None:

@@ -1,0 +1,1 @@
+"""The tools of the provider: each module defines one or more algorithms."""
