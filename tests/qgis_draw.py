@@ -40,7 +40,7 @@ def main(out: str, size: str, extent: str, *sources: str) -> None:
         labels = [item.label() for item in renderer.legendSymbolItems()]
         facts = {"valid": layer.isValid(), "renderer": renderer.type(), "labels": labels}
         print(json.dumps({**facts, "features": layer.featureCount()}))
-    # QGIS and Python do not agree on who takes the layers down.
+    # Exit at once: QGIS and Python would both delete the layers.
     sys.stdout.flush()
     os._exit(0)
 

@@ -208,7 +208,7 @@ def test_no_colour_has_two_meanings() -> None:
 def test_colours_of_reports_have_no_other_meaning() -> None:
     # Their curves and the classes, which no picture has together, are both many things of a kind.
     inks = (plots.INK, plots.GROUND, plots.AXIS, plots.TICK, plots.GRID, plots.SOFT)
-    used = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.GROUND}
+    used = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.CELL_GROUND}
     assert used & {*meanings()} == set()
 
 
