@@ -57,8 +57,8 @@ Every step is one command. `semsig COMMAND --help` prints what these pages say.
 API = """# Python names
 
 The most used names are imported from `semsig_gis` and listed here, by the package that defines
-them. Each package exports more names, such as `semsig_gis.localization.search_regions`; `dir` lists them.
-Names that are only in modules may change without notice.
+them. Each package exports more names, such as `semsig_gis.localization.search_regions`; `dir` lists
+them. Names that are only in modules may change without notice.
 
 ```python
 import semsig_gis as sg
