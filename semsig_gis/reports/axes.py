@@ -73,7 +73,7 @@ class ColourSteps(NamedTuple):
 
 _SHADES = [*(f"{low} to {high - 1}" for low, high in pairwise(SHADES)), f"{max(SHADES)} or more"]
 # Columns of the cells, with their names in files.
-COLUMNS: Mapping[str, ColourSteps] = {
+CELL_COLUMNS: Mapping[str, ColourSteps] = {
     "length": ColourSteps("objects seen", SHADES, _SHADES),
     "type_group_size": ColourSteps("cells with the same types", GROUP_COLOURS, group_labels()),
     "angle_group_size": ColourSteps(
@@ -131,17 +131,17 @@ def plot_database(
     """
     if column is None or isinstance(column, str):
         name = column or "length"
-        if name not in COLUMNS:
+        if name not in CELL_COLUMNS:
             raise UnknownNameError(
-                f"{name!r} is not a column of the cells; give {', '.join(COLUMNS)} or a number for "
-                f"each cell{nearest_name(name, COLUMNS)}."
+                f"{name!r} is not a column of the cells; give {', '.join(CELL_COLUMNS)} or a number "
+                f"for each cell{nearest_name(name, CELL_COLUMNS)}."
             )
         # The attributes of the database have the names of the columns in plural.
         values = getattr(database, f"{name}s").astype(np.float64)
-        title = COLUMNS[name].title
+        title = CELL_COLUMNS[name].title
         if not COLOUR_OPTIONS & look.keys():
             axes = map_axes(ax)
-            _draw_steps(axes, database, values, COLUMNS[name], legend=legend, **look)
+            _draw_steps(axes, database, values, CELL_COLUMNS[name], legend=legend, **look)
             axes.set_title(f"{len(database):,} cells, by {title}")
             _frame(axes)
             return axes

@@ -64,7 +64,9 @@ def draw_map(shown: OutcomeMap) -> Picture:
     (left, bottom), (right, top) = (low + high) / 2 - reach, (low + high) / 2 + reach
     height = above + tall + LEGEND
     rows = dict(zip(OUTCOMES, (shown.successful, ~shown.successful), strict=True))
-    options = {outcome: _marker(mark, len(shown.places)) for outcome, mark in OUTCOMES.items()}
+    options = {
+        outcome: _outcome_marker(mark, len(shown.places)) for outcome, mark in OUTCOMES.items()
+    }
     with blank_figure(WIDTH, height) as figure:
         place = (MARGIN / WIDTH, LEGEND / height, inside / WIDTH, tall / height)
         axes = figure.add_axes(place)
@@ -91,7 +93,7 @@ def draw_map(shown: OutcomeMap) -> Picture:
         return saved(figure, title=shown.title, description=description)
 
 
-def _marker(mark: Mark, places: int) -> dict[str, Any]:
+def _outcome_marker(mark: Mark, places: int) -> dict[str, Any]:
     """Return options of matplotlib for the markers of an outcome; many places are smaller."""
     marker, share = MARKERS[mark.shape]
     size = 5.0 if places <= MANY_PLACES / 4 else 3.5 if places <= MANY_PLACES else 2.5

@@ -114,7 +114,7 @@ def _paragraph(text: str) -> str:
     return FIRST_MARKS.sub(r"\1\\\2", _inline(text))
 
 
-FIGURES = "figures"
+FIGURES_FOLDER = "figures"
 NUMBER_COLUMNS = ("section", "row", "column", "unit", "ours", "low", "high", "paper", "difference")
 POINT_COLUMNS = ("source", "label", "x", "y", "low", "high")
 
@@ -163,10 +163,10 @@ def write_report(report: Report, folder: str | Path) -> None:
     for drawing in drawings:
         if isinstance(drawing, Plot):
             points = _csv(POINT_COLUMNS, _points(drawing))
-            write_whole(folder / FIGURES / f"{drawing.name}.csv", points)
+            write_whole(folder / FIGURES_FOLDER / f"{drawing.name}.csv", points)
     for name, picture in pictures.items():
-        write_whole(folder / FIGURES / f"{name}.svg", picture.svg)
-        write_whole(folder / FIGURES / f"{name}.png", picture.png)
+        write_whole(folder / FIGURES_FOLDER / f"{name}.svg", picture.svg)
+        write_whole(folder / FIGURES_FOLDER / f"{name}.png", picture.png)
     numbers = (
         (
             *(section.name, number.row, number.column, number.unit),

@@ -197,7 +197,7 @@ def draw_legend(
 # The numbers of colours, dashes and markers differ, so that their combinations do not repeat.
 DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
 # Each marker with the size at which it looks as large as the others.
-MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
+LINE_MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
 BAND_SHADE, MANY_BANDS = 0.16, 4
 FEW_POINTS = 12
 FEW_TICKS, MANY_TICKS = 6, 9
@@ -213,7 +213,7 @@ TITLE_LINE, LEGEND_LINE = 0.22, 0.2
 BELOW_AXES = 0.52
 TITLE_LETTERS = 55
 # Largest number of letters of a label, and the number of columns of a legend.
-COLUMNS = ((9, 4), (14, 3), (25, 2))
+LEGEND_COLUMNS = ((9, 4), (14, 3), (25, 2))
 LONGEST_LABEL = 54
 
 
@@ -262,7 +262,7 @@ def draw_plot(plot: Plot) -> Picture:
             place = (LEFT / WIDTH, (top + 0.04) / height, (WIDTH - LEFT) / WIDTH)
             columns = _columns(keys)
             draw_legend(figure, keys, place=place, columns=columns, size=9, sign_width=3.2)
-        return saved(figure, title=plot.title, description=_description(plot))
+        return saved(figure, title=plot.title, description=_plot_description(plot))
 
 
 def draw_frame(axes: Axes, plot: Plot) -> None:
@@ -336,7 +336,7 @@ def draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
 
 def _line_options(number: int) -> dict[str, Any]:
     """Return options of matplotlib for the line of a curve."""
-    marker, size = MARKERS[number % len(MARKERS)]
+    marker, size = LINE_MARKERS[number % len(LINE_MARKERS)]
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": DASHES[number % len(DASHES)],
@@ -390,10 +390,10 @@ def _other_keys(plot: Plot) -> Keys:
 
 def _columns(keys: Keys) -> int:
     longest = max((len(text) for _, text in keys), default=0)
-    return next((columns for letters, columns in COLUMNS if longest <= letters), 1)
+    return next((columns for letters, columns in LEGEND_COLUMNS if longest <= letters), 1)
 
 
-def _description(plot: Plot) -> str:
+def _plot_description(plot: Plot) -> str:
     """Return the alternative text: each curve with its ends, or with all its points by tick."""
     lines = [f"{plot.title}.", f"{_capital(plot.y_label)} by {plot.x_label}."]
     names = dict(plot.ticks)

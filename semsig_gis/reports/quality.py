@@ -74,7 +74,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             tuple(
                 (
                     *(item.class_name, item.merged, item.kept, f"{item.count:,}"),
-                    *map(_number_text, (item.radius, item.median_m, item.largest_m)),
+                    *map(_decimal_text, (item.radius, item.median_m, item.largest_m)),
                 )
                 for item in report.conflated
             ),
@@ -103,7 +103,7 @@ def _class_table(report: QualityReport) -> Table:
         tuple(
             (
                 *(item.class_name, f"{item.objects:,}", f"{item.rows:,}"),
-                *map(_number_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
+                *map(_decimal_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
             )
             for item in report.classes
         ),
@@ -136,7 +136,7 @@ def _layer_table(report: QualityReport) -> Table:
     )
 
 
-def _number_text(number: float | None) -> str:
+def _decimal_text(number: float | None) -> str:
     return "" if number is None else f"{number:,.1f}"
 
 

@@ -281,7 +281,9 @@ def draw_scenes(scenes: Sequence[Scene]) -> Picture:
         return saved(
             figure,
             title="; ".join(scene.title for scene in scenes),
-            description=" ".join(_description(column.scene, column.signs) for column in columns),
+            description=" ".join(
+                _scene_description(column.scene, column.signs) for column in columns
+            ),
         )
 
 
@@ -326,7 +328,7 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     lines = [[(0.0, 0.0), (item.east, item.north)] for item in scene.objects]
     axes.add_collection(LineCollection(lines, colors=SOFT, linewidths=0.5, zorder=2))
     for item in scene.others:
-        marker = _marker(signs.get(item.code, UNKNOWN), 5)
+        marker = _class_marker(signs.get(item.code, UNKNOWN), 5)
         axes.plot(item.east, item.north, **marker, alpha=0.25, markeredgewidth=0, zorder=1.5)
     size = 8 if len(scene.objects) > MANY_OBJECTS else 10
     for item in sorted(scene.objects, key=lambda item: -math.hypot(item.east, item.north)):
@@ -341,7 +343,7 @@ def _draw_map(axes: Axes, scene: Scene, signs: dict[int, ClassSign]) -> None:
     draw_scale(axes, reach)
 
 
-def _marker(sign: ClassSign, size: float) -> dict[str, Any]:
+def _class_marker(sign: ClassSign, size: float) -> dict[str, Any]:
     """Return options of matplotlib for the marker of a class."""
     marker, share = MARKERS[sign.shape]
     return {"marker": marker, "markersize": share * size, "color": sign.colour}
@@ -349,7 +351,7 @@ def _marker(sign: ClassSign, size: float) -> dict[str, Any]:
 
 def _draw_object(axes: Axes, item: SceneObject, sign: ClassSign, size: float) -> None:
     edge: dict[str, Any] = {"markeredgecolor": GROUND, "markeredgewidth": 0.7}
-    axes.plot(item.east, item.north, **_marker(sign, size), **edge, zorder=4)
+    axes.plot(item.east, item.north, **_class_marker(sign, size), **edge, zorder=4)
     axes.annotate(
         sign.symbol,
         (item.east, item.north),
@@ -439,7 +441,7 @@ def _legend_keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D
     for code in sorted({*counts, *(item.code for item in scene.others)}):
         sign = signs.get(code, UNKNOWN)
         count = f" ({counts[code]})" if counts[code] else ""
-        key = Line2D([], [], linestyle="", markeredgewidth=0, **_marker(sign, 8))
+        key = Line2D([], [], linestyle="", markeredgewidth=0, **_class_marker(sign, 8))
         key.set_alpha(None if counts[code] else 0.25)
         keys.append((key, f"{sign.symbol} {label(sign.title, CLASS_LETTERS)}{count}"))
     if scene.answer:
@@ -447,7 +449,7 @@ def _legend_keys(scene: Scene, signs: dict[int, ClassSign]) -> list[tuple[Line2D
     return keys
 
 
-def _description(scene: Scene, signs: dict[int, ClassSign]) -> str:
+def _scene_description(scene: Scene, signs: dict[int, ClassSign]) -> str:
     """Return the alternative text of a scene."""
     query = "".join(signs.get(code, UNKNOWN).symbol for code, _ in scene.asked)
     counts = ", ".join(

@@ -124,27 +124,16 @@ def _wide_table(numbers: Sequence[Number], names: dict[str, str], units: Units) 
         ]
         for column in names
     }
-    rows = [
-        [
-            _Cell(one_line(row)),
-            *(
-                cell
-                for column, shown in kinds.items()
-                for cell in _cells(
-                    by_place.get((row, column)),
-                    shown,
-                    with_unit=units[column] is None,
-                    interval_column=single,
-                )
-            ),
-        ]
-        for row in dict.fromkeys(number.row for number in numbers)
-    ]
+    rows = []
+    for row in dict.fromkeys(number.row for number in numbers):
+        cells = [_Cell(one_line(row))]
+        for column, shown in kinds.items():
+            number, with_unit = by_place.get((row, column)), units[column] is None
+            cells += _cells(number, shown, with_unit=with_unit, interval_column=single)
+        rows.append(cells)
+    headings = {} if single else SHORT_HEADINGS
     groups = tuple(
-        (
-            names[column],
-            tuple(shown if single else [SHORT_HEADINGS.get(kind, kind) for kind in shown]),
-        )
+        (names[column], tuple(headings.get(kind, kind) for kind in shown))
         for column, shown in kinds.items()
     )
     columns = [

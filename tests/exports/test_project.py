@@ -172,9 +172,9 @@ def test_every_field_has_an_alias_and_a_description(tmp_path: Path) -> None:
     export_database(CITY, file, objects=OBJECTS)
     with closing(sqlite3.connect(file)) as connection:
         query = "SELECT title, description FROM gpkg_data_columns WHERE column_name = 'bearings'"
-        fields = connection.execute(query).fetchall()
+        titles = connection.execute(query).fetchall()
         query = "SELECT extension_name FROM gpkg_extensions WHERE table_name = ?"
         extensions = connection.execute(query, ["gpkg_data_columns"]).fetchall()
-    assert fields == [("Bearings (°)", "Of the same objects, clockwise from grid north.")]
+    assert titles == [("Bearings (°)", "Of the same objects, clockwise from grid north.")]
     assert extensions == [("gpkg_schema",)]
     assert "qgis_projects" not in pyogrio.list_layers(file)[:, 0]

@@ -83,9 +83,9 @@ def test_curves_and_numbers_agree_with_the_evaluation(run: Callable[[], Evaluati
         groups.plots, (evaluation.by_length(), evaluation.by_ambiguity()), strict=True
     ):
         assert [name for _, name in plot.ticks] == table.iloc[:, 0].tolist()
-        shares = table["p50"].dropna()
-        assert plot.curves[0].x == tuple(map(float, shares.index))
-        assert plot.curves[0].y == tuple(shares)
+        successes = table["p50"].dropna()
+        assert plot.curves[0].x == tuple(map(float, successes.index))
+        assert plot.curves[0].y == tuple(successes)
     assert errors.maps[0].successful.sum() == evaluation.successful.sum()
     assert [len(pair.scenes) for pair in page["failures"].pairs] == [2] * 6
 

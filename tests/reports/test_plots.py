@@ -4,7 +4,7 @@ import dataclasses
 import re
 import struct
 import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import pytest
@@ -204,7 +204,7 @@ def test_plots_with_nan_and_infinity_are_drawn(value: float) -> None:
 @pytest.mark.parametrize("text", [HARM, LONG, "_", "$", ""])
 def test_text_from_data_is_escaped_and_truncated(text: str) -> None:
     curve = Curve(label=text, x=(0.0, 1.0), y=(0.5, 0.6))
-    labels = {"title": text, "x_label": text, "y_label": text}
+    labels: dict[str, Any] = {"title": text, "x_label": text, "y_label": text}
     drawing = draw_plot(Plot(name="a", **labels, curves=(curve,) * 9, paper=((0.5, 0.5, text),)))
     assert b"<script>" not in drawing.svg
     assert max(map(len, texts(drawing.svg))) < 80
