@@ -133,8 +133,8 @@ def plot_database(
         name = column or "length"
         if name not in CELL_COLUMNS:
             raise UnknownNameError(
-                f"{name!r} is not a column of the cells; give {', '.join(CELL_COLUMNS)} or a number "
-                f"for each cell{nearest_name(name, CELL_COLUMNS)}."
+                f"{name!r} is not a column of the cells; give {', '.join(CELL_COLUMNS)} or a "
+                f"number for each cell{nearest_name(name, CELL_COLUMNS)}."
             )
         # The attributes of the database have the names of the columns in plural.
         values = getattr(database, f"{name}s").astype(np.float64)

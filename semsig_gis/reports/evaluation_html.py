@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -168,9 +169,7 @@ def _group_section(evaluation: Evaluation) -> Section:
                 "told apart from them."
             ),
         ),
-        numbers=tuple(
-            number for table, _, _, row in groups for number in _group_numbers(table, row)
-        ),
+        numbers=tuple(itertools.chain(*(_group_numbers(table, row) for table, *_, row in groups))),
         plots=tuple(_group_plot(table, name, x_label) for table, name, x_label, _ in groups),
     )
 

@@ -106,6 +106,15 @@ def identifiability_page(
     """Return the report of the identifiability of a database and its check by new queries."""
     facts = identifiability.summary(object_counts=object_counts)
     query = query_name(facts["view_degrees"])
+    shares = _cell_chances(facts)
+    for band, share in _band_shares(facts).items():
+        shares[f"cells found with a chance of {band}"] = share
+    cells = Section(
+        name="cells",
+        title="Cells",
+        text=("The first three are of a query from the mean cell, the others shares of cells.",),
+        numbers=tuple(Number(row, "share", share) for row, share in shares.items()),
+    )
     return Report(
         title=f"Where a query can be placed in {name}",
         headline=(
@@ -132,7 +141,7 @@ def identifiability_page(
             ("semsig_gis", __version__),
         ),
         sections=(
-            _cell_section(facts),
+            cells,
             _class_section(facts),
             _calibration_section(check),
             _rank_section(check),
@@ -156,18 +165,6 @@ def _band_shares(facts: Mapping[str, Any]) -> dict[str, float]:
     """Return the share of cells in each band of the chance to be found, highest first."""
     bands = reversed(facts["bands"])
     return {f"{band['from']:g} to {band['to']:g}": band["share"] for band in bands}
-
-
-def _cell_section(facts: Mapping[str, Any]) -> Section:
-    shares = _cell_chances(facts)
-    for band, share in _band_shares(facts).items():
-        shares[f"cells found with a chance of {band}"] = share
-    return Section(
-        name="cells",
-        title="Cells",
-        text=("The first three are of a query from the mean cell, the others shares of cells.",),
-        numbers=tuple(Number(row, "share", share) for row, share in shares.items()),
-    )
 
 
 def _class_section(facts: Mapping[str, Any]) -> Section:

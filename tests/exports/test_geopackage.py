@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"
-PROGRAM = Path(__file__).parents[1] / "qgis_draw.py"
+PROGRAM = Path(__file__).parents[1] / "qgis_programs.py"
 FEATURES = ["cells", "objects", "evaluation", "evaluation_lines"]
 LAYERS = [*FEATURES, "evaluation_figures", "layer_styles"]
 FORMULA = '=cmd|"/C calc"!A0 <script>'
@@ -409,7 +409,7 @@ def test_qgis_draws_the_layers_with_their_styles(
 
     def draw(picture: str, *layers: str) -> list[dict[str, Any]]:
         """Draw layers, the uppermost first; return the facts that QGIS reports of each."""
-        program = (qgis_python, PROGRAM, tmp_path / picture, "400x400", extent)
+        program = (qgis_python, PROGRAM, "draw", tmp_path / picture, "400x400", extent)
         output = run(*program, *layers, environment=qgis_environment)
         return [json.loads(line) for line in output.splitlines()]
 

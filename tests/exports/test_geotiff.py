@@ -116,12 +116,13 @@ def test_qgis_draws_rasters_as_the_maps_do(
     field = tmp_path / "field.tif"
     export_database(database, field, layers="field", evaluation=evaluation, smooth=60.0)
     export_answer(small_location(), database, tmp_path / "posterior.tif")
-    program = Path(__file__).parents[1] / "qgis_pixels.py"
+    program = Path(__file__).parents[1] / "qgis_programs.py"
     result = subprocess.run(
-        [qgis_python, program, *(tmp_path / f"{name}.tif" for name in STYLES)],
+        [qgis_python, program, "pixels", *(tmp_path / f"{name}.tif" for name in STYLES)],
         check=True, capture_output=True, timeout=PATIENCE_S, env=qgis_environment,
     )  # fmt: skip
-    for (name, classes), drawing in zip(STYLES.items(), json.loads(result.stdout), strict=True):
+    drawings = map(json.loads, result.stdout.splitlines())
+    for (name, classes), drawing in zip(STYLES.items(), drawings, strict=True):
         assert drawing["labels"] == [label for label, _ in classes.values()]
         with rasterio.open(tmp_path / f"{name}.tif") as read:
             values = read.read(1).astype(np.float64)

@@ -41,7 +41,7 @@ from semsig_gis.objects import Licence
 if TYPE_CHECKING:
     from semsig_gis.localization import Localization, Location
 
-PROGRAM = Path(__file__).parents[1] / "qgis_project.py"
+PROGRAM = Path(__file__).parents[1] / "qgis_programs.py"
 SVG = "{http://www.w3.org/2000/svg}"
 CITY, OBJECTS = small_city()
 CHANCES, EVALUATION = chances_of(CITY), small_evaluation()
@@ -71,7 +71,7 @@ def projects(qgis_python: str, tmp_path_factory: pytest.TempPathFactory) -> dict
     export_answer(LOCALIZATION, CITY, files[2])
     export_hostile_city(files[3])
     result = subprocess.run(
-        (qgis_python, PROGRAM, *files),
+        (qgis_python, PROGRAM, "project", *files),
         check=False,
         capture_output=True,
         text=True,
