@@ -27,11 +27,11 @@ from semsig_gis.sources import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import pandas as pd
 
-    from semsig_gis.sources import FilteredRows
+    from semsig_gis.sources import FilteredRows, RawLayer
 
 
 DATA = Path(__file__).with_name("data")
@@ -210,14 +210,12 @@ def test_missing_name_of_a_street_is_empty() -> None:
     assert names.tolist() == ["Rue É", "", ""]
 
 
-def test_portal_fields_may_have_other_spellings(tmp_path: Path) -> None:
-    path = tmp_path / "voies.csv"
-    path.write_text(
+def test_portal_fields_may_have_other_spellings(read_as: Callable[..., RawLayer]) -> None:
+    text = (
         'Largeur (m);TYPE VOIE;geo_shape\n;Rue;"{""type"": ""LineString"", '
-        '""coordinates"": [[2.3, 48.8], [2.4, 48.8]]}"\n',
-        encoding="utf-8",
+        '""coordinates"": [[2.3, 48.8], [2.4, 48.8]]}"\n'
     )
     by = WidthBy("type_voie", (("Rue", 13.0),))
     spec = street(geometry="line", width_field="largeur_m", width_by=by)
-    (layer,) = reader("opendatasoft")(path, [spec])
+    layer = read_as("voies.csv", text, spec)
     assert layer.table["half_width"].tolist() == [6.5]
