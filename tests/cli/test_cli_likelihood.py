@@ -255,9 +255,9 @@ def test_view_is_given_without_an_option(city: Path, run: Run) -> None:
     # Absent classes, in addition to symbols.
     code, out, _ = run("localize", city, "no bench", *options(VIEW))
     assert (code, "Not there: public bench." in out) == (0, True)
-    sentence(run("localize", city, "no bench", *options(VIEW), "--paper"), "what is not there")
+    sentence(run("localize", city, "no bench", *options(VIEW), "--paper"), "absent objects")
     mixed = run("localize", city, ", ".join([*words[:-1], names[-1]]), "--paper")
-    sentence(mixed, "without a direction", "'edit+edit:5%'")
+    sentence(mixed, "with and without a direction", "'edit+edit:5%'")
 
 
 def test_suggest_prints_questions_by_gain(city: Path, run: Run) -> None:
