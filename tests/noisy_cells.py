@@ -182,6 +182,13 @@ def parts_of(query: Signature) -> tuple[np.ndarray, np.ndarray]:
     return query.codes, query.bearings
 
 
+def column(view: Signature, name: str) -> np.ndarray:
+    """Return an array that a view has, such as its ranges."""
+    values = getattr(view, name)
+    assert isinstance(values, np.ndarray)
+    return values
+
+
 def noisy_town(seed: int) -> World:
     return random_town(seed, count=90, codes=CODES[:5])
 

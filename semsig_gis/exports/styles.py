@@ -167,7 +167,7 @@ def by_rank(column: str, *, geometry: str) -> Style:
         else:
             # A dark edge makes pale places visible on a pale map.
             edge, metres, smallest = RANK_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
-            symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
+            symbols.append(_marker_layer("circle", colour, metres, smallest=smallest, outline=edge))
     entries = _ranges(RANKS, symbols)
     return Style("Rank", _renderer(column, entries, geometry, last_first=True))
 
@@ -189,14 +189,14 @@ def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str) -> Style:
         symbol: tuple[SymbolLayer, ...]
         if geometry == "line":
             line = {"line_color": _rgba(mark.colour, 150), "line_width": 0.26}
-            end = _marker("cross2", mark.colour, 10.0, smallest=1.4, outline=mark.colour)
+            end = _marker_layer("cross2", mark.colour, 10.0, smallest=1.4, outline=mark.colour)
             symbol = (
                 ("SimpleLine", {**line, "line_style": "solid"}),
                 ("MarkerLine", {"placement": "lastvertex", "rotate": 0}, end),
             )
         else:
             shape = CLASS_MARKERS[mark.shape][0]
-            symbol = (_marker(shape, mark.colour, 12.0, smallest=1.8, outline="#222222"),)
+            symbol = (_marker_layer(shape, mark.colour, 12.0, smallest=1.8, outline="#222222"),)
         entries[str(number)] = LegendEntry({"value": value}, value, symbol)
     return Style(name, _renderer(name.lower(), entries, geometry))
 
@@ -211,7 +211,7 @@ def _ranges(classes: Classes, symbols: Sequence[SymbolLayer]) -> dict[str, Legen
     }
 
 
-def _marker(
+def _marker_layer(
     shape: str, colour: str, metres: float, *, smallest: float, outline: str
 ) -> SymbolLayer:
     return "SimpleMarker", {

@@ -55,36 +55,6 @@ def check_north(north_sigma: float) -> None:
         )
 
 
-def _merge_sectors(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
-    """Merge overlapping sectors and sort them clockwise from north; empty for the full turn."""
-    spans = []
-    for start, end in sectors:
-        for value in (start, end):
-            require_number("a sector", value, least=-FULL_TURN, most=2 * FULL_TURN, unit="degrees")
-        width = end - start
-        if width < 0 or width > FULL_TURN:
-            width %= FULL_TURN
-        if width == 0:
-            raise InputError(
-                f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
-            )
-        low = float(wrap_degrees(start))
-        spans.append((low, low + width))
-    # Merge each sector with the last one if they overlap.
-    merged: list[Sector] = []
-    for low, high in sorted(spans):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(high, merged[-1][1])
-        else:
-            merged.append((low, high))
-    # The last sector may extend over north into the first ones.
-    while len(merged) > 1 and merged[-1][1] - FULL_TURN >= merged[0][0]:
-        _, high = merged.pop(0)
-        merged[-1] = merged[-1][0], max(merged[-1][1], high + FULL_TURN)
-    whole = sum(high - low for low, high in merged) >= FULL_TURN
-    return () if whole else tuple(merged)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Photo:
     """The directions of a photograph or a panorama.
@@ -115,7 +85,34 @@ class Photo:
     north_sigma: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        object.__setattr__(self, "sectors", _merge_sectors(self.sectors))
+        spans = []
+        for start, end in self.sectors:
+            for value in (start, end):
+                require_number(
+                    "a sector", value, least=-FULL_TURN, most=2 * FULL_TURN, unit="degrees"
+                )
+            width = end - start
+            if width < 0 or width > FULL_TURN:
+                width %= FULL_TURN
+            if width == 0:
+                raise InputError(
+                    f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
+                )
+            low = float(wrap_degrees(start))
+            spans.append((low, low + width))
+        # Merge each sector with the last one if they overlap.
+        merged: list[Sector] = []
+        for low, high in sorted(spans):
+            if merged and low <= merged[-1][1]:
+                merged[-1] = merged[-1][0], max(high, merged[-1][1])
+            else:
+                merged.append((low, high))
+        # The last sector may extend over north into the first ones.
+        while len(merged) > 1 and merged[-1][1] - FULL_TURN >= merged[0][0]:
+            _, high = merged.pop(0)
+            merged[-1] = merged[-1][0], max(merged[-1][1], high + FULL_TURN)
+        whole = sum(high - low for low, high in merged) >= FULL_TURN
+        object.__setattr__(self, "sectors", () if whole else tuple(merged))
         if self.north_sigma is not None:
             check_north(self.north_sigma)
 

@@ -28,9 +28,9 @@ from .compression import HARMLESS_BYTES as HARMLESS_BYTES
 from .compression import check_compression_ratio as check_compression_ratio
 from .csv_layer import NO_GEOMETRY as NO_GEOMETRY
 from .detect import detect_catalogs as detect_catalogs
-from .fetch import fetch_layers as fetch_layers
-from .fetch import find_area as find_area
-from .fetch import open_cache as open_cache
+from .downloads import fetch_layers as fetch_layers
+from .downloads import find_area as find_area
+from .downloads import open_cache as open_cache
 from .files import MERGING as MERGING
 from .files import PRUNING as PRUNING
 from .files import READERS as READERS

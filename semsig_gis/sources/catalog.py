@@ -311,11 +311,6 @@ def data_folder() -> Traversable:
     return Path(__file__).resolve().parents[2] / "data_sources"
 
 
-@functools.lru_cache
-def _parse_catalog(text: str, where: str) -> Catalog:
-    return _checked_catalog(parse_toml(text, where), where)
-
-
 def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
     check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
@@ -360,6 +355,12 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
         endpoints=texts(content.get("endpoints", []), "endpoints", where),
         conflate=tuple(radii.items()),
     )
+
+
+# The same text is parsed only once.
+_parse_catalog = functools.lru_cache(
+    lambda text, where: _checked_catalog(parse_toml(text, where), where)
+)
 
 
 def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:

@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 import pytest
 import shapely
 from open_cities import CITIES, serve
-from servers import Answer, Server
+from servers import Answer
 from stand_ins import ArcGIS
 from stores import keep_in_bucket
 
@@ -28,7 +28,9 @@ from semsig_gis.sources import catalog as catalogs
 from semsig_gis.sources import data_folder, load_catalog
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
+
+    from servers import Server
 
     from conftest import Run, RunOk
 
@@ -51,12 +53,6 @@ class = "street_light"
 dataset = "Street/FeatureServer/Lamps"
 files = ["lamps*"]
 """
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
 
 
 @pytest.fixture

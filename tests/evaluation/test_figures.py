@@ -121,24 +121,19 @@ def test_queries_are_labelled_by_district() -> None:
 @pytest.mark.parametrize(
     ("values", "percent", "expected"),
     [
-        ([3.0, 1.0, 2.0], 50, 2.0),
-        ([1.0, 2.0], 50, 1.5),
         ([1.0, 2.0, NAN], 50, 1.5),
-        ([5.0], 90, 5.0),
-        (list(range(11)), 90, 9.0),
         ([0.0, 1.0, math.inf, math.inf], 50, math.inf),
         ([0.0, 1.0, math.inf], 50, 1.0),
         ([math.inf, math.inf], 90, math.inf),
+        ([NAN], 50, NAN),
     ],
 )
-def test_percentiles_by_hand(values: list[float], percent: float, expected: float) -> None:
+def test_percentiles_of_missing_and_infinite_values(
+    values: list[float], percent: float, expected: float
+) -> None:
     value, low, high = percentile(np.array(values), percent)
-    assert value == expected
-    assert low <= value <= high
-
-
-def test_percentile_without_values_is_nan() -> None:
-    assert all(math.isnan(value) for value in percentile(np.array([NAN]), 50))
+    assert [value] == pytest.approx([expected], nan_ok=True)
+    assert low <= value <= high or math.isnan(low) is math.isnan(high) is True
 
 
 @given(

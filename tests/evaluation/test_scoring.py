@@ -192,6 +192,8 @@ def test_query_without_objects_is_unlocalized() -> None:
     assert empty["best_cell_id"].isna().all()
     assert by_distance().recall(99.9) < by_distance().recall(100) == 1
     assert by_distance().cdf()[-1] == pytest.approx(1 - len(empty) / 100)
+    with refused(SemsigError, "error of 12 m", "choose from 0, 5"):
+        by_distance().cdf([10, 12])
 
 
 def test_summary_if_all_queries_are_unlocalized() -> None:
@@ -208,16 +210,6 @@ def test_false_objects_have_classes_of_the_database() -> None:
     for distortion in (DISTORTIONS["strong"], rare):
         types = evaluate(DATABASE, queries=60, distortion=distortion).queries["query_types"]
         assert set("".join(types)) == set(DATABASE.taxonomy.decode([1, 2, 3, 4]))
-
-
-def test_figures_by_length() -> None:
-    table = by_distance().by_length()
-    assert table["length"].to_list() == ["1-4", "5-9", "10-19", "20+"]
-    lengths = by_distance().queries["length"]
-    more = (lengths >= 10).sum()
-    assert table["n"].to_list() == [(lengths < 5).sum(), (lengths >= 5).sum() - more, more, 0]
-    assert table.loc[0, "p50"] == pytest.approx(by_distance().queries["p50"][lengths < 5].mean())
-    assert table.loc[3, "p10":].isna().all()
 
 
 def test_progress_counts_queries_and_time_is_measured() -> None:
@@ -381,11 +373,6 @@ def test_invalid_options_are_refused(options: dict[str, Any], words: list[str]) 
         evaluate(DATABASE, **{"queries": 5, **options})
 
 
-def test_threshold_without_stored_probabilities_is_refused() -> None:
-    with refused(SemsigError, "error of 12 m", "choose from 0, 5"):
-        by_distance().cdf([10, 12])
-
-
 FIRST, SECOND = PAIR = tuple(
     evaluate(
         DATABASE, queries=100, method=Method.parse(method), distortion=Distortion(occurrences=2)
@@ -403,20 +390,16 @@ def test_comparison_has_figures_and_their_differences() -> None:
         median = evaluation.summary()["results"]["median_error_m"]
         assert table[number]["error_median"] == median
     assert (table["difference"] == table["second"] - table["first"]).all()
-    assert (table["low"] <= table["difference"]).all()
-    assert (table["difference"] <= table["high"]).all()
+    assert table["difference"].between(table["low"], table["high"]).all()
     assert "coverage" not in table.index
 
 
-def test_swapping_the_evaluations_changes_the_sign() -> None:
+def test_swapping_the_evaluations_changes_the_sign_and_the_changed_successes() -> None:
     table, swapped = compare_evaluations(FIRST, SECOND), compare_evaluations(SECOND, FIRST)
     assert table["difference"].tolist() == (-swapped["difference"]).tolist()
     assert table["low"].tolist() == pytest.approx((-swapped["high"]).tolist(), abs=1e-9)
     itself = compare_evaluations(FIRST, FIRST)
     assert (itself[["difference", "low", "high"]] == 0).all(axis=None)
-
-
-def test_changed_successes_are_counted() -> None:
     gains, losses = changed_successes(FIRST, SECOND)
     assert (losses, gains) == changed_successes(SECOND, FIRST)
     assert gains - losses == SECOND.successful.sum() - FIRST.successful.sum()

@@ -66,12 +66,6 @@ def test_same_object_in_two_sources_is_merged() -> None:
     assert report.count == 1
 
 
-@pytest.mark.parametrize("radii", [{}, {"automatic_wc": 5.0}, {"bench": 5.0}])
-def test_nothing_to_merge_returns_the_objects(radii: dict[str, float]) -> None:
-    objects, report = conflate(world([bench("a", "1", 0)]), radii)
-    assert (content(objects), report.count) == ([(10, "a", "1", 1, "", 0.0, 0.0)], 0)
-
-
 THINGS = st.lists(
     st.tuples(
         st.sampled_from(["bench", "bus_stop", "street_light"]),

@@ -49,9 +49,8 @@ def test_json_lines_and_csv_give_same_queries(
     text = [f"{q['id']},{q['types']},{' '.join(map(str, q['bearings']))}" for q in plain]
     table.write_text("\ufeffid,types,bearings\n" + "\n".join(text))
     first, second = (list(read_queries(path, taxonomy=TAXONOMY)) for path in (lines, table))
-    assert (
-        [line.name for line in first] == [line.name for line in second] == [q["id"] for q in plain]
-    )
+    for lines_read in (first, second):
+        assert [line.name for line in lines_read] == [q["id"] for q in plain]
     for line, same, row in zip(first, second, rows, strict=True):
         codes, bearings = parts_of(signature_of(line))
         assert np.array_equal(parts_of(signature_of(same)), (codes, bearings))
@@ -119,13 +118,7 @@ def test_invalid_row_of_table_does_not_affect_others(tmp_path: Path) -> None:
     result = list(read_queries(tmp_path / "q.csv", taxonomy=TAXONOMY))
     assert [line.line for line in result] == [2, 3, 4, 5, 6]
     assert [line.name for line in result] == ["a", 3, "c", "d", "e"]
-    assert [isinstance(line.query, InputError) for line in result] == [
-        False,
-        True,
-        True,
-        False,
-        True,
-    ]
+    assert [line.line for line in result if isinstance(line.query, InputError)] == [3, 4, 6]
 
 
 def test_route_has_legs_between_views() -> None:

@@ -86,12 +86,8 @@ def test_bearings_are_converted_from_and_to_their_north() -> None:
     answer = locate(index, query, north=north, explained=1)
     assert np.allclose(answer.chances, plain.chances)
     values, expected = answer.to_dict(), plain.to_dict()
-    assert values["north"] == {
-        "name": "magnetic",
-        "turn": 12.0,
-        "spread": 0.0,
-        "date": "2024-05-31",
-    }
+    described = {"name": "magnetic", "turn": 12.0, "spread": 0.0, "date": "2024-05-31"}
+    assert values["north"] == described
     assert values["query"]["bearings"] == parts_of(query)[1].tolist()
     rows, others = (item["candidates"][0]["explanation"]["rows"] for item in (values, expected))
     for name in ("query_bearing", "object_bearing"):

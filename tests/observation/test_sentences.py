@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from noisy_cells import column
 from sentences import refused
 
 from semsig_gis.core import SemsigError
@@ -87,10 +88,10 @@ def test_bearings_in_all_forms_and_beyond_full_turn(bearings: object) -> None:
 
 def test_offsets_without_heading_have_unknown_north() -> None:
     view = read({"see": "bench 20 left, lamp 10 right", "fov": 70})
-    assert view.bearings is not None
-    assert view.bearings.tolist() == [10.0, 340.0]
+    bearings = column(view, "bearings")
+    assert bearings.tolist() == [10.0, 340.0]
     assert view.photos == (Photo.looking(heading=0, fov=70, north_sigma=math.inf),)
-    assert view.photos[0].sees(view.bearings).all()
+    assert view.photos[0].sees(bearings).all()
 
 
 def test_types_are_likeliest_classes_of_scores() -> None:
@@ -99,30 +100,22 @@ def test_types_are_likeliest_classes_of_scores() -> None:
     assert parsed({"detections": items})["types"] == "D?D?"
 
 
-WORDS = {
-    "near": (0.0, 10.0),
-    "middle": (10.0, 20.0),
-    "far": (20.0, 30.0),
-    "within 12 m": (0.0, 12.0),
-}
-
-
-@pytest.mark.parametrize("word", WORDS)
-def test_words_give_mean_and_error_of_uniform_ring(word: str) -> None:
-    low, high = WORDS[word]
+@pytest.mark.parametrize(
+    ("word", "low", "high"),
+    [("near", 0, 10), ("middle", 10, 20), ("far", 20, 30), ("within 12 m", 0, 12)],
+)
+def test_words_give_mean_and_error_of_uniform_ring(word: str, low: int, high: int) -> None:
     rng = np.random.default_rng(0)
     logs = np.log(np.sqrt(rng.uniform(low**2, high**2, 200_000)))
     view = read({"see": f"lamp at 10 {word}"})
-    assert view.ranges is not None
-    assert view.range_errors is not None
-    assert view.ranges[0] == pytest.approx(math.exp(logs.mean()), rel=0.01)
-    assert view.range_errors[0] == pytest.approx(math.hypot(logs.std(), GUESS_ERROR), rel=0.01)
+    assert column(view, "ranges") == pytest.approx(math.exp(logs.mean()), rel=0.01)
+    error = math.hypot(logs.std(), GUESS_ERROR)
+    assert column(view, "range_errors") == pytest.approx(error, rel=0.01)
 
 
 def test_far_depends_on_range_of_class() -> None:
     row = {"types": "DF?", "bearings": [1, 2, 3], "ranges": "far,far,far"}
-    ranges = read(row, radius=60.0).ranges
-    assert ranges is not None
+    ranges = column(read(row, radius=60.0), "ranges")
     # A hydrant is seen from 15 m.
     assert (ranges / ranges[0]).tolist() == pytest.approx([1.0, 0.25, 1.0])
     assert 40.0 < ranges[0] < 60.0
@@ -130,8 +123,7 @@ def test_far_depends_on_range_of_class() -> None:
 
 def test_given_error_has_priority_over_error_of_word() -> None:
     row = {"types": "DDD", "bearings": [1, 2, 3], "ranges": ["near", "far", 5]}
-    errors = read(row | {"range_errors": [0.1, None, None]}).range_errors
-    assert errors is not None
+    errors = column(read(row | {"range_errors": [0.1, None, None]}), "range_errors")
     assert errors[0] == 0.1
     assert errors[1] > GUESS_ERROR
     assert math.isnan(errors[2])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from noisy_cells import column, parts_of
 from sentences import refused
 
 from semsig_gis.core import InputError, Signature
@@ -48,14 +49,12 @@ def test_turned_view_has_turned_photos() -> None:
         photos=(Photo.looking(heading=0, fov=40, north_sigma=math.inf),),
     )
     turned = view.turned(20.0)
-    assert turned.bearings is not None
-    assert turned.codes is not None
-    assert turned.ranges is not None
-    assert turned.bearings.tolist() == [10.0, 30.0]
-    assert turned.codes.tolist() == [1, 3]
-    assert turned.ranges.tolist()[1] == 5.0
+    codes, bearings = parts_of(turned)
+    assert bearings.tolist() == [10.0, 30.0]
+    assert codes.tolist() == [1, 3]
+    assert column(turned, "ranges")[1] == 5.0
     assert turned.photos[0].sectors == ((0.0, 40.0),)
-    assert turned.photos[0].sees(turned.bearings).all()
+    assert turned.photos[0].sees(bearings).all()
 
 
 def test_joined_views_are_split_again() -> None:
@@ -68,10 +67,8 @@ def test_joined_views_are_split_again() -> None:
     assert len(both) == 3
     parts = both.split()
     assert [part.photos for part in parts] == [first.photos, (FULL_VIEW,)]
-    assert parts[1].codes is not None
-    assert parts[1].codes.tolist() == [0, 0]
-    assert parts[1].ranges is not None
-    assert parts[1].ranges.tolist() == [3.0, 9.0]
+    assert column(parts[1], "codes").tolist() == [0, 0]
+    assert column(parts[1], "ranges").tolist() == [3.0, 9.0]
     assert parts[0].class_scores()[0, 3] == 1.0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import json
 import re
@@ -177,9 +178,17 @@ def test_exported_functions_say_what_they_take_and_give(name: str) -> None:
     assert [fault for fault in faults if fault[0] in wanted] == []
 
 
-def test_no_public_name_is_also_a_module() -> None:
-    # Importing such a module would put it in the place of the name.
-    assert {path.stem for path in PACKAGE.iterdir()} & {*dir(semsig_gis)} == set()
+@pytest.mark.parametrize("front", [path.parent for path in PACKAGE.rglob("__init__.pyi")])
+def test_no_exported_name_is_also_a_module(front: Path) -> None:
+    # Importing such a module would replace the exported name on the package.
+    package = importlib.import_module(".".join(front.relative_to(PACKAGE.parent).parts))
+    assert {path.stem for path in front.iterdir()} & {*dir(package)} == set()
+
+
+@pytest.mark.parametrize("front", [path.parent for path in PACKAGE.rglob("__init__.pyi")])
+def test_exported_names_exist(front: Path) -> None:
+    package = importlib.import_module(".".join(front.relative_to(PACKAGE.parent).parts))
+    assert all(hasattr(package, name) for name in dir(package))
 
 
 def test_only_what_draws_itself_asks_for_public_names() -> None:

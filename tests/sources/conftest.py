@@ -1,24 +1,18 @@
-"""What tests of sources share: a server on this machine, a cache, and requests without pauses."""
+"""What tests of sources share: a local server, a cache, and engines of vector files."""
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
 from machine import PATIENCE_S
-from servers import Server
 
 from semsig_gis.sources import Cache, HttpSpec
+from semsig_gis.sources.vector import file as vector_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
 
 
 @pytest.fixture
@@ -35,3 +29,17 @@ def slept() -> list[float]:
 def quick(slept: list[float]) -> HttpSpec:
     """Return a specification that does not sleep, but says in `slept` how long it would."""
     return HttpSpec(timeout=(PATIENCE_S, PATIENCE_S), attempts=3, backoff_s=1.0, sleep=slept.append)
+
+
+@pytest.fixture(params=["pyogrio, then fiona", "fiona", "pyogrio"])
+def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Run each test with pyogrio and fiona, with fiona for all rows, and without fiona."""
+    engine: str = request.param
+    if "fiona" in engine:
+        pytest.importorskip("fiona", reason="there is no fiona for this Python")
+    if engine == "fiona":
+        monkeypatch.setattr(vector_file, "read_whole", lambda *_: None)
+    if engine == "pyogrio":
+        monkeypatch.delitem(sys.modules, "semsig_gis.sources.vector.by_fiona", raising=False)
+        monkeypatch.setitem(sys.modules, "fiona", None)
+    return engine

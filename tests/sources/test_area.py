@@ -9,6 +9,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
+from geojson import collection, feature
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
@@ -149,8 +150,8 @@ def test_unreadable_polygon_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "quarter.geojson"
     with refused(SemsigError, "does not exist"):
         parse_area(str(path))
-    broken = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": [broken]}))
+    broken = feature({"type": "Polygon", "coordinates": 5}, {})
+    path.write_text(json.dumps(collection([broken])))
     with refused(InputError, "polygons that cannot be read", "correct the file"):
         parse_area(str(path))
     with pytest.warns(UserWarning, match="'crs' was not provided"):

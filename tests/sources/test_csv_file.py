@@ -74,17 +74,6 @@ def test_invalid_utf8_is_noted(tmp_path: Path) -> None:
     assert layer.notes == ("1 places are not UTF-8 and are read as \ufffd",)
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\xef\xbb\xbf", b"\n\n", b"\0\1\2" * 99, bytes(range(256))]
-)
-def test_file_that_is_not_text_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "a.csv"
-    path.write_bytes(content)
-    for use in (read, list_layers):
-        with refused(SourceError, str(path)):
-            use(path)
-
-
 @pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
 def test_column_names_are_stripped(tmp_path: Path, separator: str, reader: str) -> None:

@@ -18,10 +18,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import shapely
+from geojson import collection, feature
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from raw_layers import ids, xy
 from sentences import refused
 from servers import Answer, published
+from stand_ins import sent
 
 from semsig_gis.core import CatalogError, CrsError, SourceError
 from semsig_gis.sources import Area, ClassBy, LayerSpec, find_field, fold
@@ -81,16 +84,6 @@ def read_as(tmp_path: Path) -> Read:
         return read(path, spec, **options)
 
     return call
-
-
-def ids(layer: RawLayer) -> list[str]:
-    texts: list[str] = layer.table["source_id"].tolist()
-    return texts
-
-
-def xy(layer: RawLayer) -> list[tuple[float, float]]:
-    points = shapely.get_coordinates(shapely.centroid(layer.table.geometry.array))
-    return [(x, y) for x, y in points.round(9).tolist()]
 
 
 def shape(lon: float, lat: float, kind: str = "Point") -> dict[str, Any]:
@@ -426,10 +419,8 @@ def exported(request: Request) -> Answer:
     for row in json.loads(FILES["v21.json"]):
         if all(holds(text, row) for text in conditions):
             properties = {name: row[name] for name in names}
-            geometry = properties.pop("geo_shape")["geometry"]
-            features.append({"type": "Feature", "geometry": geometry, "properties": properties})
-    content = {"type": "FeatureCollection", "features": features}
-    return Answer(json.dumps(content).encode(), type="application/geo+json", chunked=True)
+            features.append(feature(properties.pop("geo_shape")["geometry"], properties))
+    return sent(collection(features), type="application/geo+json", chunked=True)
 
 
 @pytest.fixture

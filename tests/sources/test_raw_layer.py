@@ -100,16 +100,11 @@ def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
     values = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
     assert layer.notes == (f"left out, unlisted in class_by 'kind': {values}",)
     spec = LayerSpec(name="things", class_name="bench", class_by=by)
-    assert (
-        apply(spec, kind=kinds)
-        .notes[0]
-        .endswith('; write otherwise = "class" to take them as bench')
-    )
+    note = apply(spec, kind=kinds).notes[0]
+    assert note.endswith('; write otherwise = "class" to take them as bench')
     spec = replace(spec, class_by=replace(by, otherwise=True))
-    assert apply(spec, kind=kinds).table["class_name"].tolist() == ["bench"] * 14 + [
-        "bus_stop",
-        "bench",
-    ]
+    names = table(spec, kind=kinds)["class_name"].tolist()
+    assert names == [*["bench"] * 14, "bus_stop", "bench"]
     many = apply(LayerSpec(name="things", class_name="", class_by=by), kind=[*map(str, range(20))])
     assert many.notes[0].endswith("'7' 1, and 12 others")
 

@@ -136,7 +136,7 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
     room = -(-size // 4) * 4
     start = np.empty(count_models)
     floor = np.ones((count_models, room))
-    named = np.zeros((count_models, most, room))
+    names = np.zeros((count_models, most, room))
     angles = np.zeros(room)
     inside = np.ones(most)
     near = np.empty((most, room))
@@ -161,24 +161,26 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
         # What does not depend on the turn: by model, the names of the objects and the density of
         # false detections, with the objects that come into range as others leave it.
         for model in range(count_models):
-            gone = 0.0
+            all_leaving = 0.0
             for detection in range(size):
                 floor[model, detection] = density[model, detection]
             for entry in range(count):
                 kind = kinds[low + entry]
                 wrong = misnamed[model, length, kind]
                 unit = distance_units[low + entry]
-                lost = detected[model, length, kind] * leaving[model, kind, unit]
+                leaving_share = detected[model, length, kind] * leaving[model, kind, unit]
                 if beyond[low + entry]:
-                    lost += detected[model, length, kind] * remaining[model, kind, unit]
-                gone += lost
+                    leaving_share += detected[model, length, kind] * remaining[model, kind, unit]
+                all_leaving += leaving_share
                 for detection in range(size):
                     name = (1.0 - wrong) * own[kind, detection]
                     name += wrong * other[model, kind, detection]
-                    named[model, entry, detection] = name
+                    names[model, entry, detection] = name
                     # Objects that come into range may be in any direction.
-                    floor[model, detection] += lost * name * disc[detection] / FULL_TURN
-            start[model] = models.log_weights[model] - (models.clutter[model] + gone) * photo.width
+                    floor[model, detection] += leaving_share * name * disc[detection] / FULL_TURN
+            start[model] = (
+                models.log_weights[model] - (models.clutter[model] + all_leaving) * photo.width
+            )
             for detection in range(size):
                 start[model] += math.log(floor[model, detection])
                 floor[model, detection] = 1.0 / floor[model, detection]
@@ -237,10 +239,10 @@ def sum_associations(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes 
                     if chance == 0.0:
                         continue
                     odds = chance / missed
-                    own_near, own_named, own_floor = near[entry], named[model, entry], floor[model]
+                    own_near, own_names, own_floor = near[entry], names[model, entry], floor[model]
                     for detection in range(room):
                         values[detection] = (
-                            odds * own_near[detection] * own_named[detection] * own_floor[detection]
+                            odds * own_near[detection] * own_names[detection] * own_floor[detection]
                         )
                         sums[detection] += values[detection]
                     for detection in range(size):

@@ -260,7 +260,7 @@ def photo_scorer(
     detections = PhotoTable.of(photo, table)
     density = detections.density(table)
     rows, masses = levels.rows(detections), levels.masses(detections)
-    named = detections.named(table)[: len(levels.model.detected)] / density
+    naming = detections.named(table)[: len(levels.model.detected)] / density
     disc = detections.disc / FULL_TURN
     base = float(np.log(density).sum())
     if before is None:
@@ -268,7 +268,7 @@ def photo_scorer(
     width = detections.width
 
     if north_sigma == 0.0:
-        arrays = PhotoRows(rows, masses, _padded(named), _padded(disc), width, base)
+        arrays = PhotoRows(rows, masses, _padded(naming), _padded(disc), width, base)
 
         def score(objects: BinnedObjects) -> _PhotoScores:
             size = len(objects.offsets) - 1
@@ -286,7 +286,7 @@ def photo_scorer(
     turned = PhotoRows(
         _turned(by_detection),
         _turned(masses),
-        named.astype(np.float32),
+        naming.astype(np.float32),
         disc.astype(np.float32),
         width,
         base,

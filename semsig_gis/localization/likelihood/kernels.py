@@ -54,40 +54,45 @@ def profile_rows(
 
 @compiled
 def _add_up(  # noqa: PLR0917 - a kernel takes no keywords
-    odds: NDArray[np.float32],
-    leaving: NDArray[np.float32],
-    row_starts: NDArray[np.uint64],
-    name_starts: NDArray[np.uint64],
-    rows: NDArray[np.float32],
-    named: NDArray[np.float32],
-    disc: NDArray[np.float32],
+    objects: tuple[NDArray[np.float32], ...],
+    starts: tuple[NDArray[np.uint64], ...],
+    count: np.uint64,
+    above: np.uint64,
+    first: np.uint64,
+    photo: tuple[NDArray[np.float32], ...],
     sums: NDArray[np.float32],
 ) -> None:
     """Fill `sums` (LANES,) with 1 plus what the objects of a place add to a block of detections.
 
-    By object, `row_starts` and `name_starts` are where it begins in `rows` and `named`. This is a
+    `objects` are the odds of detection and the shares out of range of `count` objects, `starts`
+    where each begins in a block of the rows and in the names. `photo` has the rows, of which the
+    block is `above` the first, the names and the disc, of which it begins at `first`. This is a
     function of its own, and written out, so that the sums stay in one register: a loop over the
     lanes takes 2.5 times as long.
     """
+    odds, leaving = objects
+    row_starts, name_starts = starts
+    rows, naming, disc = photo
     a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(1.0)
-    for entry in range(np.uint64(len(odds))):
-        odd, gone, row, name = odds[entry], leaving[entry], row_starts[entry], name_starts[entry]
-        b0 = odd * rows[row] + gone * disc[0]
-        a0 += b0 * named[name]
-        b1 = odd * rows[row + np.uint64(1)] + gone * disc[1]
-        a1 += b1 * named[name + np.uint64(1)]
-        b2 = odd * rows[row + np.uint64(2)] + gone * disc[2]
-        a2 += b2 * named[name + np.uint64(2)]
-        b3 = odd * rows[row + np.uint64(3)] + gone * disc[3]
-        a3 += b3 * named[name + np.uint64(3)]
-        b4 = odd * rows[row + np.uint64(4)] + gone * disc[4]
-        a4 += b4 * named[name + np.uint64(4)]
-        b5 = odd * rows[row + np.uint64(5)] + gone * disc[5]
-        a5 += b5 * named[name + np.uint64(5)]
-        b6 = odd * rows[row + np.uint64(6)] + gone * disc[6]
-        a6 += b6 * named[name + np.uint64(6)]
-        b7 = odd * rows[row + np.uint64(7)] + gone * disc[7]
-        a7 += b7 * named[name + np.uint64(7)]
+    for entry in range(count):
+        odd, away = odds[entry], leaving[entry]
+        row, name = row_starts[entry] + above, name_starts[entry] + first
+        b0 = odd * rows[row] + away * disc[first]
+        a0 += b0 * naming[name]
+        b1 = odd * rows[row + np.uint64(1)] + away * disc[first + np.uint64(1)]
+        a1 += b1 * naming[name + np.uint64(1)]
+        b2 = odd * rows[row + np.uint64(2)] + away * disc[first + np.uint64(2)]
+        a2 += b2 * naming[name + np.uint64(2)]
+        b3 = odd * rows[row + np.uint64(3)] + away * disc[first + np.uint64(3)]
+        a3 += b3 * naming[name + np.uint64(3)]
+        b4 = odd * rows[row + np.uint64(4)] + away * disc[first + np.uint64(4)]
+        a4 += b4 * naming[name + np.uint64(4)]
+        b5 = odd * rows[row + np.uint64(5)] + away * disc[first + np.uint64(5)]
+        a5 += b5 * naming[name + np.uint64(5)]
+        b6 = odd * rows[row + np.uint64(6)] + away * disc[first + np.uint64(6)]
+        a6 += b6 * naming[name + np.uint64(6)]
+        b7 = odd * rows[row + np.uint64(7)] + away * disc[first + np.uint64(7)]
+        a7 += b7 * naming[name + np.uint64(7)]
     sums[0] = a0
     sums[1] = a1
     sums[2] = a2
@@ -117,7 +122,7 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
     longest, classes = len(model.detected) - 1, model.detected.shape[1]
     # Flat arrays and unsigned indices: otherwise numba checks each index for negative values and
     # computes its strides again.
-    rows, named, masses = photo.rows.ravel(), photo.named.ravel(), photo.masses.ravel()
+    rows, naming, masses = photo.rows.ravel(), photo.naming.ravel(), photo.masses.ravel()
     detected, remaining = model.detected.ravel(), model.remaining.ravel()
     leaving, disc = model.leaving.ravel(), photo.disc
     lanes, all_lanes = np.uint64(LANES), np.uint64(blocks * LANES)
@@ -133,10 +138,13 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
     all_odds, all_leaving = np.empty(most, np.float32), np.empty(most, np.float32)
     all_rows, all_names = np.empty(most, np.uint64), np.empty(most, np.uint64)
     sums = np.empty(LANES, np.float32)
+    # Tuples for `_add_up`, which are not made again for each place.
+    chances, starts = (all_odds, all_leaving), (all_rows, all_names)
+    arrays = rows, naming, disc
     for place in range(part[0], part[1]):
         low, count = np.uint64(offsets[place]), np.uint64(offsets[place + 1] - offsets[place])
         length = min(count, np.uint64(longest)) * np.uint64(classes)
-        total, product, gone = photo.base, 1.0, np.float32(0.0)
+        total, product, leaving_sum = photo.base, 1.0, np.float32(0.0)
         # Each object: the chance that it is missed, its odds, and where its numbers begin.
         for entry in range(count):
             kind, bin_ = np.uint64(kinds[low + entry]), np.uint64(object_bins[low + entry])
@@ -148,7 +156,7 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
             if in_sectors:
                 missed = one_f - chance * masses[bin_]
             all_leaving[entry] = near * leaving[level]
-            gone += all_leaving[entry]
+            leaving_sum += all_leaving[entry]
             product *= missed
             if product < 1.0 / _LARGE:
                 total += math.log(product)
@@ -157,26 +165,16 @@ def scan(  # noqa: PLR0917 - a kernel takes no keywords
             all_rows[entry] = bin_ * lanes
             all_names[entry] = (length + kind) * all_lanes
         # Each block of detections: the sum over the objects, and the product of these sums.
-        odds, away = all_odds[:count], all_leaving[:count]
         for block in range(np.uint64(blocks)):
-            first = block * lanes
-            _add_up(
-                odds,
-                away,
-                all_rows,
-                all_names,
-                rows[block * block_size :],
-                named[first:],
-                disc[first:],
-                sums,
-            )
+            above, first_lane = block * block_size, block * lanes
+            _add_up(chances, starts, count, above, first_lane, arrays, sums)
             # Each pair is below 1e38, all eight together may not be.
             for lane in range(0, LANES, 2):
                 product *= np.float64(sums[lane] * sums[lane + 1])
             if product > _LARGE or product < 1.0 / _LARGE:
                 total += math.log(product)
                 product = 1.0
-        totals[place] = total - gone * photo.width
+        totals[place] = total - leaving_sum * photo.width
         products[place] = product
 
 
@@ -244,7 +242,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
     """
     offsets, kinds, object_bins = objects.offsets, objects.kinds, objects.bins
     group_of, detected, remaining = model.group_of, model.detected, model.remaining
-    leaving, named, disc = model.leaving, photo.named, photo.disc
+    leaving, naming, disc = model.leaving, photo.naming, photo.disc
     first, chances = prior.first, prior.chances
     before_logs, before_shares = before.logs, before.shares
     after_logs, after_shares = after.logs, after.shares
@@ -253,7 +251,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
     bins = inside * all_turns
     longest, classes = len(detected) - 1, detected.shape[1]
     # Flat arrays and unsigned indices, as in `scan`.
-    rows, flat_named, masses = photo.rows.ravel(), named.ravel(), photo.masses.ravel()
+    rows, flat_naming, masses = photo.rows.ravel(), naming.ravel(), photo.masses.ravel()
     in_sectors, at_edge = len(masses) > 0, leaving.max() > 0.0
     fresh, written = len(before_shares) == 0, len(after_shares) > 0
     most = 0
@@ -267,7 +265,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
     product = np.empty(ways, np.float32)
     missed = np.ones(ways, np.float32)
     floors = np.empty(size, np.float32)
-    gone = np.zeros(classes, np.float32)
+    leaving_of = np.zeros(classes, np.float32)
     one_f = np.float32(1.0)
     all_ways, block = np.uint64(ways), np.uint64(TURN_BLOCK)
     per_object, per_turn = np.uint64(room), np.uint64(1 if in_sectors else 0)
@@ -276,24 +274,26 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
         low, count = offsets[place], offsets[place + 1] - offsets[place]
         length = min(count, longest)
         # What any detection has from objects that came into range as others left it.
-        lost = np.float32(0.0)
+        leaving_sum = np.float32(0.0)
         floors[:] = one_f
         if at_edge:
             for entry in range(low, low + count):
                 kind = kinds[entry]
-                gone[kind] += detected[length, kind] * leaving[kind, object_bins[entry] // bins]
+                leaving_of[kind] += (
+                    detected[length, kind] * leaving[kind, object_bins[entry] // bins]
+                )
             for kind in range(classes):
-                if gone[kind] > 0.0:
-                    lost += gone[kind]
+                if leaving_of[kind] > 0.0:
+                    leaving_sum += leaving_of[kind]
                     for detection in range(size):
                         floors[detection] += (
-                            gone[kind] * named[length, kind, detection] * disc[detection]
+                            leaving_of[kind] * naming[length, kind, detection] * disc[detection]
                         )
-                    gone[kind] = 0.0
+                    leaving_of[kind] = 0.0
         # The likelihood by turn is e to the power of `total`, times `scale`, times `product`.
         total, scale = photo.base, 1.0
         if fresh:
-            total -= float(lost) * photo.width
+            total -= float(leaving_sum) * photo.width
             for way in range(ways):
                 product[way] = chances[way]
         else:
@@ -337,7 +337,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
                 b0 = b1 = b2 = b3 = b4 = b5 = b6 = b7 = floors[detection]
                 for entry in range(np.uint64(count)):
                     kind = kinds[np.uint64(low) + entry]
-                    factor = flat_named[np.uint64((length * classes + kind) * size + detection)]
+                    factor = flat_naming[np.uint64((length * classes + kind) * size + detection)]
                     at, of = above + starts[entry] + way, entry * per_object + way * per_turn
                     a0 += factor * odds[of] * rows[at]
                     a1 += factor * odds[of + np.uint64(1)] * rows[at + np.uint64(1)]
@@ -377,7 +377,7 @@ def scan_turned(  # noqa: C901, PLR0912, PLR0915, PLR0917 - a kernel takes no ke
             if scale > _LARGE or scale < 1.0 / _LARGE:
                 total += math.log(scale)
                 scale = 1.0
-        # The sum over the turns, and the first of the turns whose share is the largest, 1.
+        # The sum over the turns, and the first likeliest turn: its share is 1.
         unit, mass = _rescaled(product)
         if written:
             after_logs[place] = total + math.log(scale * unit)
@@ -428,7 +428,7 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
     row_of: NDArray[np.int64],
     query: NDArray[np.int64],
     detected: NDArray[np.float64],
-    named: NDArray[np.float64],
+    naming: NDArray[np.float64],
     clutter: NDArray[np.float64],
     scores: NDArray[np.float32],
 ) -> None:
@@ -436,7 +436,7 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
 
     Fills `scores`, shape (d,), with log-likelihoods. `query`, shape (k + 1,), counts the objects
     of the query by class, those of unknown class last. By length and class, `detected` is the
-    chance of detection and `named`, shape (longest + 1, k, k), that of each name; `clutter` is the
+    chance of detection and `naming`, shape (longest + 1, k, k), that of each name; `clutter` is the
     expected number of false objects in a signature, and `row_of` the row of each class code.
     """
     kinds = len(clutter)
@@ -448,7 +448,7 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
     factorials = np.zeros(max(most, size) + 1)
     for value in range(1, len(factorials)):
         factorials[value] = factorials[value - 1] + math.log(value)
-    share = (size - query[kinds]) / size  # of the detections whose class is known
+    share = (size - query[kinds]) / size  # of detections of known class
     counts = np.empty(kinds, np.int64)
     for row in range(len(scores)):
         length = min(offsets[row + 1] - offsets[row], len(detected) - 1)
@@ -462,10 +462,10 @@ def count_types(  # noqa: C901, PLR0917 - a kernel takes no keywords
             stray = clutter[name]  # expected detections of other things under this name
             for kind in range(kinds):
                 if counts[kind] > 0 and kind != name:
-                    stray += counts[kind] * detected[length, kind] * named[length, kind, name]
+                    stray += counts[kind] * detected[length, kind] * naming[length, kind, name]
             unnamed += clutter[name] + counts[name] * detected[length, name]
             stray *= share
-            chance = share * detected[length, name] * named[length, name, name]
+            chance = share * detected[length, name] * naming[length, name, name]
             own, number = counts[name], query[name]
             if stray == 0.0:
                 continue  # no class of the query is known

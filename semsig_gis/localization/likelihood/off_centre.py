@@ -172,8 +172,8 @@ def _objects_from_points(  # noqa: C901, PLR0912, PLR0915 - a kernel is one func
     view_codes, bearings, distances = np.empty(0, np.uint8), np.empty(0), np.empty(0)
     view = at = 0
     for cell in range(part[0], part[1]):
-        # The objects of the cell and its neighbours, in metres from its centre. Those of neighbours
-        # that the cell itself sees are in its own list.
+        # The objects of the cell and its neighbours, in metres from its centre. If the cell itself
+        # sees an object of a neighbour, it is in its own list already.
         size = 0
         for source in range(len(AROUND)):
             starts[source] = size

@@ -42,7 +42,7 @@ class PhotoRows(NamedTuple):
     """A photo of n detections against all that an object may be, for `kernels.scan`.
 
     `rows` are the densities of `kernels.profile_rows`, `masses` those of
-    `association_kernels.mass_rows`, empty if the photo is a full turn. `named`, shape
+    `association_kernels.mass_rows`, empty if the photo is a full turn. `naming`, shape
     (lengths, k, n), is the chance of a name over the density of such false detections, `disc` (n,)
     the factor of their range, per degree. `width` is the share of the turn that the photo shows,
     `base` the score of a place without objects. `kernels.scan` takes n in whole blocks of `LANES`.
@@ -50,7 +50,7 @@ class PhotoRows(NamedTuple):
 
     rows: NDArray[np.float32]
     masses: NDArray[np.float32]
-    named: NDArray[np.float32]
+    naming: NDArray[np.float32]
     disc: NDArray[np.float32]
     width: float
     base: float
@@ -76,8 +76,8 @@ class PhotoArrays(NamedTuple):
     `ranges` are NaN where unknown, `range_sigma`, shape (models, k, n), their relative errors. The
     score of a name is `own`, shape (k, n), if the class is right, and `other`, shape (models, k,
     n), if the object is misnamed; `density`, shape (models, n), is that of false detections, in
-    which `disc` (n,) is the factor of the range. `sectors`, shape (s, 2), are empty if the photo is
-    a full turn, of which `width` is the share that it shows.
+    which `disc` (n,) is the factor of the range. `sectors`, shape (s, 2), are empty if the photo
+    is a full turn; `width` is the share of the turn that it shows.
     """
 
     bearings: NDArray[np.float64]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TURNS = 64
-"""Turns of a photo whose north is uncertain: steps of 5.625 degrees."""
+"""Turns of a photo of uncertain north: steps of 5.625 degrees."""
 TURN_BLOCK = 16
 """Turns that `kernels.scan_turned` adds up together."""
 _LEAST_TURN_CHANCE = 1e-7  # of a turn, relative to the likeliest; others are left out

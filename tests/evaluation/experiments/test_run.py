@@ -79,10 +79,6 @@ def resume(folder: Path, tmp_path: Path, results: Path) -> None:
     assert contents(tmp_path / "out") == contents(results)
 
 
-def never(*_: object, **__: object) -> None:
-    raise AssertionError
-
-
 @pytest.fixture(autouse=True, scope="module")
 def _small_batches() -> Iterator[None]:
     """Use small batches in this process; other processes use the default."""
@@ -114,9 +110,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def results(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the results of an uninterrupted run."""
+    """Return the results of an uninterrupted run, which reports every batch of answers."""
     out = tmp_path_factory.mktemp("results") / "all"
-    run_experiment(SPEC, out, folder=folder)
+    steps: list[tuple[int, int]] = []
+    run_experiment(SPEC, out, folder=folder, progress=lambda *step: steps.append(step))
+    assert steps == [(count, 52) for count in (20, 26, 46, 52)]
     return out
 
 
@@ -276,7 +274,7 @@ def test_damaged_batches_are_answered_again(folder: Path, results: Path, tmp_pat
 def test_finished_results_are_opened(
     folder: Path, results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("semsig_gis.evaluation.experiments.batches.score_queries", never)
+    monkeypatch.delattr("semsig_gis.evaluation.experiments.batches.score_queries")
     before = contents(results)
     evaluations = run_experiment(SPEC, results, folder=folder)
     assert list(evaluations) == [case.name for case in SPEC.cases]
@@ -325,7 +323,9 @@ def test_other_inputs_and_versions_are_refused(
         run_experiment(SPEC, results, folder=folder)
 
 
-def test_folders_of_other_things_are_refused(folder: Path, tmp_path: Path) -> None:
+def test_folders_of_other_things_and_missing_files_are_refused(
+    folder: Path, results: Path, tmp_path: Path
+) -> None:
     for name in ("photos", "new.partial"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "me.jpg").touch()
@@ -334,6 +334,10 @@ def test_folders_of_other_things_are_refused(folder: Path, tmp_path: Path) -> No
         assert (tmp_path / name / "me.jpg").exists()
     with refused(DatabaseError, "photos", "semsig evaluate"):
         open_results(tmp_path / "photos")
+    shutil.copytree(results, tmp_path / "out")
+    shutil.rmtree(tmp_path / "out" / "none" / "paper-top1")
+    with refused(DatabaseError, "queries.parquet", "does not exist"):
+        open_results(tmp_path / "out")
 
 
 def test_experiments_that_do_not_fit_their_inputs_are_refused(folder: Path, tmp_path: Path) -> None:
@@ -383,19 +387,6 @@ def test_queries_from_anywhere_in_a_later_city(folder: Path, tmp_path: Path) -> 
     assert districts["district"].tolist()[0] == "west"
     assert set(districts["district"]) <= {"west", "nook", "elsewhere"}
     assert set(open_results(tmp_path / "out")) == set(evaluations)
-
-
-def test_progress_counts_every_answer(folder: Path, tmp_path: Path) -> None:
-    steps: list[tuple[int, int]] = []
-    run_experiment(SPEC, tmp_path / "out", folder=folder, progress=lambda *step: steps.append(step))
-    assert steps == [(count, 52) for count in (20, 26, 46, 52)]
-
-
-def test_missing_evaluation_is_refused(results: Path, tmp_path: Path) -> None:
-    shutil.copytree(results, tmp_path / "out")
-    shutil.rmtree(tmp_path / "out" / "none" / "paper-top1")
-    with refused(DatabaseError, "queries.parquet", "does not exist"):
-        open_results(tmp_path / "out")
 
 
 MANY_METHODS = parse_experiment("""

@@ -55,36 +55,20 @@ def between(
 
 @each
 @given(queries=SOME, rows=SOME)
-def test_distances_are_symmetric_in_unit_interval_and_zero_for_equal_sequences(
+def test_distances_are_symmetric_from_zero_if_equal_to_one_without_common_values(
     measure: Distances, queries: Sequences, rows: Sequences
 ) -> None:
     result = between(measure, queries, rows)
-    assert result.shape == (len(queries), len(rows))
-    assert result.dtype == np.float32
+    assert (result.shape, result.dtype) == ((len(queries), len(rows)), np.float32)
     assert ((result >= 0) & (result <= 1)).all()
     assert not np.diagonal(between(measure, rows, rows)).any()
     for normalized in (True, False):
         there = between(measure, queries, rows, normalized=normalized)
         back = between(measure, rows, queries, normalized=normalized)
         np.testing.assert_allclose(there, back.T, rtol=1e-6)
-
-
-@each
-@given(row=st.lists(VALUES, min_size=1, max_size=7))
-def test_distance_is_one_without_common_values(measure: Distances, row: Sequence[int]) -> None:
-    strangers = [value + 100 for value in row]
-    for other in ([], strangers):
-        assert between(measure, [other, row], [other, row]).tolist() == [[0, 1], [1, 0]]
-
-
-@pytest.mark.parametrize("name", ["jaccard", "histogram"])
-@given(data=st.data(), queries=SOME, rows=SOME)
-def test_order_of_values_does_not_matter(
-    name: str, data: st.DataObject, queries: Sequences, rows: Sequences
-) -> None:
-    mixed = [data.draw(st.permutations(row)) for row in rows]
-    straight = between(METRICS[name], queries, rows)
-    np.testing.assert_array_equal(straight, between(METRICS[name], queries, mixed))
+    strangers = [[value + 100 for value in row] for row in rows]
+    expected = [[float(len(query) + len(row) > 0) for row in rows] for query in queries]
+    assert between(measure, queries, strangers).tolist() == expected
 
 
 @each
@@ -173,11 +157,7 @@ def test_edit_distance_equals_slow_cost(
     assert between(measure, [query], [row])[0, 0] == pytest.approx(share, abs=1e-6)
 
 
-def test_edit_operations_have_their_weights() -> None:
-    measure = metric("edit", weights=EditWeights(insert=2, delete=5, substitute=3))
-    # Insertions are objects that the query missed, deletions are false detections.
-    costs = between(measure, [[1], [1, 2]], [[1, 2], [1], [2]], normalized=False)
-    assert costs[[0, 1, 0], [0, 1, 2]].tolist() == [2, 5, 3]
+def test_large_weights_do_not_overflow_and_only_edit_distances_have_weights() -> None:
     heavy = metric("edit", weights=EditWeights(insert=100, delete=100, substitute=100))
     assert between(heavy, [[1] * 300], [[2] * 300], normalized=False).tolist() == [[30_000]]
     assert metric("jaccard", weights=EditWeights(insert=2)) is METRICS["jaccard"]
@@ -313,8 +293,6 @@ def test_bit_planes_without_sequences_or_queries() -> None:
     query = np.array([1], np.uint8)
     assert BitPlanes.build(*flat([])).edit_distances([query]).shape == (1, 0)
     assert BitPlanes.build(*flat([[1]])).edit_distances([]).shape == (0, 1)
-    both = BitPlanes.build(*flat([[], []])).edit_distances([query, query[:0]])
-    assert both.tolist() == [[1, 1], [0, 0]]
 
 
 @pytest.mark.parametrize(("values", "bits"), [(11, 8), (16, 9), (256, 33)])

@@ -4,6 +4,7 @@ import gc
 import json
 import tempfile
 import weakref
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import METHODS, NOTHING, asked, database_of, random_cells
+from noisy_cells import METHODS, NOTHING, asked, database_of, parts_of, random_cells
 from pyproj import Transformer
 from sentences import refused
 from worlds import random_town
@@ -52,6 +53,10 @@ def test_candidates_are_the_best_cells_with_their_ranks(top: int) -> None:
     assert result.cells == len(CITY)
     last = table["distance"].iloc[-1]
     assert result.tied_beyond == (scores == last).sum() - (table["distance"] == last).sum()
+    points = result.to_geodataframe()
+    assert points.crs == CITY.crs
+    assert points.get_coordinates().equals(table[["x", "y"]])
+    assert "geometry" not in table
 
 
 @pytest.mark.parametrize(
@@ -71,9 +76,8 @@ def test_fusion_uses_parts_of_query(
     result = localize(CITY, query, method=method, top=100)
     assert result.used == used
     if used != "types+angles":
-        single = localize(
-            CITY, query, method=Method.parse(f"{used}:{method.measures[used]}"), top=100
-        )
+        single_method = Method.parse(f"{used}:{method.measures[used]}")
+        single = localize(CITY, query, method=single_method, top=100)
         assert result.candidates.equals(single.candidates)
 
 
@@ -81,14 +85,6 @@ def test_too_few_candidates_are_refused() -> None:
     for top in (0, -1):
         with refused(InputError, f"{top} candidates were asked for; give a whole number from 1"):
             localize(CITY, asked("D"), top=top, method=Method())
-
-
-def test_candidates_become_points_in_crs_of_database() -> None:
-    result = localize(CITY, asked("DD"), top=5, method=Method())
-    points = result.to_geodataframe()
-    assert points.crs == CITY.crs
-    assert points.get_coordinates().equals(result.candidates[["x", "y"]])
-    assert "geometry" not in result.candidates
 
 
 @pytest.mark.parametrize(("types", "bearings"), [("DB", [10.0, 20.0]), ("DB", None), (None, [5.0])])
@@ -161,22 +157,10 @@ def test_partitioned_database_gives_same_answer(
         codes = rng.choice(whole.present_codes, int(rng.integers(1, 9)))
         query = Signature(codes, np.sort(rng.uniform(0, 360, len(codes))))
     method = Method.parse(text)
-    if part != "both" and part in method.measures:
-        query = Signature(
-            query.codes if part == "types" else None, query.bearings if part == "angles" else None
-        )
+    if part in method.measures:  # not both
+        codes, bearings = parts_of(query)
+        query = Signature(codes, None) if part == "types" else Signature(None, bearings)
     assert_parts_give_same_answer(whole, rng.integers(0, parts, count), query, method, top)
-
-
-def test_gate_of_second_stage_is_that_of_all_parts() -> None:
-    # More cells are listed than pass: their distances depend on the worst passing score.
-    rng = np.random.default_rng(8)
-    for seed in range(12):
-        whole, owner = database_of(random_cells(60, seed=seed)), rng.integers(0, 4, 60)
-        for keep in (1, 10, 50):
-            assert_parts_give_same_answer(
-                whole, owner, whole.signature(seed), Method(keep=keep), 60
-            )
 
 
 @pytest.mark.parametrize("text", ["edit+edit:2%:raw:weights=40/50/60", "histogram+edit:2%:raw"])
@@ -198,9 +182,8 @@ def test_only_one_part_is_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     def watched(path: Path) -> SignatureDatabase:
         gc.collect()
-        assert (
-            sum(part() is not None for part in opened) <= 2
-        )  # the next is opened before the last is freed
+        # The next is opened before the last is freed.
+        assert sum(part() is not None for part in opened) <= 2
         database = open_database(path)
         opened.append(weakref.ref(database))
         return database
@@ -246,13 +229,12 @@ def test_requirement_only_removes_cells(seed: int, text: str) -> None:
     everything = localize(TOWN, TOWN.signature(cell), top=len(TOWN), method=Method()).candidates
     mask = requirement.met(TOWN.type_sequences)
     expected = everything[mask[everything["cell"].to_numpy()]]
+    search = partial(localize, TOWN, TOWN.signature(cell), requirement=requirement, top=len(TOWN))
     if expected.empty:
         with pytest.raises(EmptyResultError):
-            localize(TOWN, TOWN.signature(cell), requirement=requirement, method=Method(), top=100)
+            search(method=Method())
         return
-    result = localize(
-        TOWN, TOWN.signature(cell), requirement=requirement, top=len(TOWN), method=Method()
-    )
+    result = search(method=Method())
     assert result.candidates["cell"].tolist() == expected["cell"].tolist()
     assert result.candidates["distance"].tolist() == expected["distance"].tolist()
     assert result.cells == int(mask.sum())

@@ -1,4 +1,4 @@
-"""Which detection is which object: sums over associations, re-ranked cells, and explanations."""
+"""Associations of detections with objects: sums, re-ranked cells and explanations."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ GENERIC = named_noise("generic")
 
 def associated(weights: np.ndarray) -> tuple[Pairs, np.ndarray, float]:
     """Associate the objects in rows with the detections in columns; 0 is no pair."""
-    one, other = np.nonzero(weights)
-    starts, away = np.array([0, len(one)]), np.zeros(len(one))
-    pairs = Pairs(starts=starts, objects=one, detections=other, away=away)
-    chances, (total,) = associate_pairs(pairs, weights[one, other])
+    objects, detections = np.nonzero(weights)
+    starts, away = np.array([0, len(objects)]), np.zeros(len(objects))
+    pairs = Pairs(starts=starts, objects=objects, detections=detections, away=away)
+    chances, (total,) = associate_pairs(pairs, weights[objects, detections])
     return pairs, chances, float(total)
 
 
@@ -90,24 +90,24 @@ def test_belief_propagation_is_exact_without_loops(
             if step:
                 weights[step, step - 1] = values[step + 4]
     total, chances = every_association(weights)
-    pairs, near, found = associated(weights)
-    assert found == pytest.approx(total, abs=1e-3)
+    pairs, near, result = associated(weights)
+    assert result == pytest.approx(total, abs=1e-3)
     assert near == pytest.approx(chances[pairs.objects, pairs.detections], abs=2e-3)
 
 
 @given(st.integers(0, 10_000))
-def test_belief_propagation_is_near_the_sum_over_everything(seed: int) -> None:
+def test_belief_propagation_is_close_to_the_exact_sum(seed: int) -> None:
     rng = np.random.default_rng(seed)
     weights = np.exp(rng.normal(0.0, 2.0, (4, 4)))
     total, chances = every_association(weights)
-    _, near, found = associated(weights)
+    _, near, result = associated(weights)
     # The Bethe approximation is a lower bound; of all these seeds, 1386 is the farthest below.
-    assert total - 0.36 <= found <= total + 1e-3
+    assert total - 0.36 <= result <= total + 1e-3
     assert np.abs(near.reshape(4, 4) - chances).max() < 0.2
     assert (near.reshape(4, 4).sum(axis=0) <= 1 + 1e-3).all()
 
 
-def test_problems_do_not_touch_each_other() -> None:
+def test_problems_are_independent() -> None:
     rng = np.random.default_rng(1)
     starts = np.array([[0, 3, 3, 8], [0, 2, 4, 9]])
     bearings = rng.uniform(0, 360, (2, 9))
@@ -115,12 +115,14 @@ def test_problems_do_not_touch_each_other() -> None:
     weights = rng.uniform(0, 3, len(pairs.away))
     chances, sums = associate_pairs(pairs, weights)
     for row in range(3):
-        first, seen = starts[:, row]
+        first_object, first_detection = starts[:, row]
         own = starts[:, row : row + 2] - starts[:, [row]]
-        alone = near_pairs(own[0], bearings[0, first:], own[1], bearings[1, seen:], reach=120.0)
+        own_pairs = near_pairs(
+            own[0], bearings[0, first_object:], own[1], bearings[1, first_detection:], reach=120.0
+        )
         part = slice(*pairs.starts[row : row + 2])
-        assert pairs.objects[part].tolist() == (alone.objects + first).tolist()
-        own_chances, own_sums = associate_pairs(alone, weights[part])
+        assert pairs.objects[part].tolist() == (own_pairs.objects + first_object).tolist()
+        own_chances, own_sums = associate_pairs(own_pairs, weights[part])
         assert own_chances == pytest.approx(chances[part])
         assert own_sums[0] == pytest.approx(sums[row])
     assert sums[1] == 0.0
@@ -129,61 +131,65 @@ def test_problems_do_not_touch_each_other() -> None:
 def slow_weights(
     table: NoiseTable, database: SignatureDatabase, query: Signature, cell: int
 ) -> np.ndarray:
-    """Return what each pair of an object and a detection adds."""
+    """Return the weight of each pair of an object and a detection."""
     part = slice(database.offsets[cell], database.offsets[cell + 1])
     kinds = table.row_of[database.codes[part]]
     sigmas = table.sigmas[kinds, database.distance_units[part]]
     names, length = table.query_rows(query), len(kinds)
     weights = np.zeros((length, len(query)))
-    for one, other in np.ndindex(weights.shape):
-        bearing = database.bearings[part][one] + 0.025
-        weights[one, other] = (
-            table.odds[length, kinds[one]]
-            * table.naming[length, kinds[one], names[other]]
-            * bearing_density(float(query_bearings(query)[other] - bearing), float(sigmas[one]))
+    for entry, detection in np.ndindex(weights.shape):
+        bearing = database.bearings[part][entry] + 0.025
+        weights[entry, detection] = (
+            table.odds[length, kinds[entry]]
+            * table.naming[length, kinds[entry], names[detection]]
+            * bearing_density(
+                float(query_bearings(query)[detection] - bearing), float(sigmas[entry])
+            )
         )
     return weights
 
 
-def nothing_seen(table: NoiseTable, database: SignatureDatabase, cell: int) -> float:
-    """Return the log-likelihood that nothing is detected in a cell."""
+def empty_loglik(table: NoiseTable, database: SignatureDatabase, cell: int) -> float:
+    """Return the log-likelihood of no detections in a cell."""
     kinds = table.row_of[database.codes[database.offsets[cell] : database.offsets[cell + 1]]]
     return float(np.log(table.missed[len(kinds), kinds]).sum() - table.clutter.sum())
 
 
-# Where tails hardly meet behind the observer, or count there.
+# Without tails that meet behind the observer, or with tails that count.
 CLEAR_SIGMAS = st.floats(1.0, 20.0) | st.floats(46.0, 60.0)
 
 
 @given(SEEDS, st.integers(1, 12), noise_specs(), CLEAR_SIGMAS)
-def test_pairs_weigh_as_one_at_a_time(seed: int, size: int, noise: NoiseSpec, sigma: float) -> None:
+def test_weights_of_pairs_equal_a_plain_loop(
+    seed: int, size: int, noise: NoiseSpec, sigma: float
+) -> None:
     noise = replace(noise, bearing_sigma=sigma, bearing_sigma_by_class={"indicator": 10.0})
     database = random_database(seed)
     query = random_query(database, seed, size=size)
     (table,), _ = database_tables(database, noise)
     views, starts = visible_objects_in(database, np.array([0])), np.array([0, size])
     pairs = near_pairs(views.offsets, views.bearings, starts, query_bearings(query))
-    found = associated_views(database, query, noise)
+    association = associated_views(database, query, noise)
     weights = slow_weights(table, database, query, 0)
     expected, (total,) = associate_pairs(pairs, weights[pairs.objects, pairs.detections])
-    assert found.chances == pytest.approx(expected, abs=1e-4)
+    assert association.chances == pytest.approx(expected, abs=1e-4)
     names = table.query_rows(query)
-    alone = nothing_seen(table, database, 0) + np.log(table.density[names]).sum()
-    assert found.loglik.sum() == pytest.approx(total + alone, abs=1e-4)
+    empty = empty_loglik(table, database, 0) + np.log(table.density[names]).sum()
+    assert association.loglik.sum() == pytest.approx(total + empty, abs=1e-4)
 
 
 def associated_views(
     database: SignatureDatabase, query: Signature, noise: NoiseSpec
 ) -> Association:
-    """Associate what the photos of a query show with what the first cell sees."""
+    """Associate the detections of a query with the objects that the first cell sees."""
     (table,), _ = database_tables(database, noise)
-    seen = Detections.of([query], table)
-    views = visible_objects_in(database, np.zeros(len(seen.photos), np.int64))
+    detections = Detections.of([query], table)
+    views = visible_objects_in(database, np.zeros(len(detections.photos), np.int64))
     return associate(
         table,
         views,
-        seen,
-        near_pairs(views.offsets, views.bearings, seen.starts, seen.bearings),
+        detections,
+        near_pairs(views.offsets, views.bearings, detections.starts, detections.bearings),
         lengths=views.lengths,
     )
 
@@ -194,7 +200,7 @@ FADING = {"all": ((5.0, 1.0), (30.0, 0.1)), "street_light": ((10.0, 0.9), (20.0,
 
 @settings(max_examples=60)
 @given(SEEDS, noise_specs(), CLEAR_SIGMAS, st.integers(1, 4), st.sampled_from([0.0, 2.5]))
-def test_views_are_associated_as_by_the_oracle(
+def test_likelihoods_of_views_equal_the_oracle(
     seed: int, noise: NoiseSpec, sigma: float, size: int, position: float
 ) -> None:
     noise = replace(
@@ -207,27 +213,27 @@ def test_views_are_associated_as_by_the_oracle(
     )
     database = random_database(seed, cells=8, longest=4)
     view = random_view(database, np.random.default_rng(seed), size=size, photos=PHOTOS)
-    found = associated_views(database, view, noise).loglik
+    loglik = associated_views(database, view, noise).loglik
     exact = [cell_loglik(database, part, noise, 0) for part in view.split()]
     if size == 1:
-        assert found == pytest.approx(exact, abs=1e-4)
-    assert (found <= np.array(exact) + 1e-3).all()
-    assert (found >= np.array(exact) - 0.35 * size - 1e-3).all()
+        assert loglik == pytest.approx(exact, abs=1e-4)
+    assert (loglik <= np.array(exact) + 1e-3).all()
+    assert (loglik >= np.array(exact) - 0.35 * size - 1e-3).all()
 
 
-def test_the_deviations_inside_a_sector_are_those_of_draws() -> None:
+def test_deviations_inside_a_sector_equal_a_simulation() -> None:
     photos = (Photo(sectors=((350, 10), (30, 33))), FULL_VIEW)
     query = View(np.array([3], np.uint8), np.array([5.0]), photos=photos)
     table = database_tables(random_database(0), NoiseSpec())[0][0]
-    seen = Detections.of([query], table)
+    detections = Detections.of([query], table)
     bearings, spreads = np.array([0.0, 12.0, 31.0, 180.0, 7.0]), np.array([4.0, 8.0, 3.0, 3.0, 9.0])
-    inside, squares = seen.inside(np.array([0, 0, 0, 0, 1]), bearings, spreads)
+    inside, squares = detections.inside(np.array([0, 0, 0, 0, 1]), bearings, spreads)
     rng = np.random.default_rng(0)
     for row, (bearing, spread) in enumerate(zip(bearings[:3], spreads[:3], strict=True)):
         away = rng.normal(0.0, spread, 200_000)
-        kept = photos[0].sees(bearing + away)
-        assert inside[row] == pytest.approx(kept.mean(), abs=0.005)
-        assert squares[row] == pytest.approx(((away[kept] / spread) ** 2).mean(), abs=0.02)
+        inside_sector = photos[0].sees(bearing + away)
+        assert inside[row] == pytest.approx(inside_sector.mean(), abs=0.005)
+        assert squares[row] == pytest.approx(((away[inside_sector] / spread) ** 2).mean(), abs=0.02)
     assert inside[3:].tolist() == [0.0, 1.0]
     assert squares[4] == 1.0
 
@@ -240,18 +246,18 @@ def test_the_sum_over_associations_is_close_and_never_too_large(
     database = random_database(seed, cells=6, longest=5)
     query = random_query(database, seed, size=size)
     cells = np.arange(len(database))
-    found = score_associations(database, query, noise, cells)
+    loglik = score_associations(database, query, noise, cells)
     for cell in cells.tolist():
         exact = cell_loglik(database, query, noise, cell, tails=6.0)
-        assert found[cell] <= exact + 1e-3
+        assert loglik[cell] <= exact + 1e-3
         # Half the logarithm of two for each object is the most that loops can cost.
         loops = min(len(query), int(database.lengths[cell]))
-        assert found[cell] >= exact - 0.35 * loops - 1e-3
+        assert loglik[cell] >= exact - 0.35 * loops - 1e-3
 
 
 @settings(max_examples=15)
 @given(SEEDS, st.floats(0.0, 20.0))
-def test_it_is_exact_where_pairs_form_no_loop(seed: int, away: float) -> None:
+def test_the_sum_is_exact_without_loops_of_pairs(seed: int, away: float) -> None:
     # Objects far apart: no detection can be two of them, though two may be one.
     rng = np.random.default_rng(seed)
     places = np.arange(6) * 60.0
@@ -259,30 +265,30 @@ def test_it_is_exact_where_pairs_form_no_loop(seed: int, away: float) -> None:
     noise = NoiseSpec(bearing_sigma=5.0)
     bearings = (np.repeat(places, 2)[:5] + np.array([0.0, 1.0, -2.0, 3.0, away])) % 360.0
     query = Signature(rng.choice(database.present_codes, 5), bearings)
-    found = score_associations(database, query, noise, np.zeros(1, np.int64))[0]
-    assert found == pytest.approx(cell_loglik(database, query, noise, 0), abs=1e-3)
+    loglik = score_associations(database, query, noise, np.zeros(1, np.int64))[0]
+    assert loglik == pytest.approx(cell_loglik(database, query, noise, 0), abs=1e-3)
 
 
-def test_turns_are_those_of_a_turned_query() -> None:
+def test_turns_give_the_scores_of_a_turned_query() -> None:
     database = random_database(4)
     query = random_query(database, 4, size=7)
     cells, turns = np.array([3, 8]), np.array([[0.0, 30.0], [-200.0, 400.0]])
-    found = score_associations(database, query, GENERIC, cells, turns=turns)
+    loglik = score_associations(database, query, GENERIC, cells, turns=turns)
     for place, way in np.ndindex(turns.shape):
         turned = turned_query(query, float(turns[place, way]))
-        alone = score_associations(database, turned, GENERIC, cells[[place]])
-        assert found[place, way] == pytest.approx(alone[0], abs=1e-3)
+        expected = score_associations(database, turned, GENERIC, cells[[place]])
+        assert loglik[place, way] == pytest.approx(expected[0], abs=1e-3)
 
 
 @pytest.mark.parametrize("weights", [(0.8, 0.1, 0.1), (1e-6, 0.5, 0.5)])
-def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, float, float]) -> None:
+def test_bounds_in_place_of_likelihoods_keep_the_sums(weights: tuple[float, float, float]) -> None:
     town, side = random_town().database, 3
     rng = np.random.default_rng(0)
     longest = np.argsort(-town.lengths, kind="stable")
     cells = rng.choice(longest[:80], 40, replace=False)
     along = (np.arange(side) - 1) * town.grid.step / side
     places = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
-    seen = visible_objects_off_centre(town, cells, places)
+    views = visible_objects_off_centre(town, cells, places)
     query = View.of(town.signature(int(cells[0])))
     sharp = [replace(spec, bearing_sigma=1.5) for spec in GENERIC.specs]
     noise = NoiseMixture(specs=tuple(sharp), weights=weights, name="sharp")
@@ -291,14 +297,14 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
     turns = np.repeat(rng.uniform(-5.0, 5.0, (len(cells), 2)), len(places), axis=0)
     prior = rng.normal(0.0, 3.0, turns.shape)
     some, others = (
-        photo_loglik(photo, seen, tables, shares, turns=turns, log_prior=prior, **what)
-        for what in ({"group": len(places)}, {"whole": True})
+        photo_loglik(photo, views, tables, shares, turns=turns, log_prior=prior, **options)
+        for options in ({"group": len(places)}, {"whole": True})
     )
-    # One model, one place and one turn at a time, of which nothing is left out.
+    # Each model, place and turn is a call of its own, without bounds.
     each = [
         np.hstack(
             [
-                photo_loglik(photo, seen, [table], np.array([share]), turns=turn[:, None])
+                photo_loglik(photo, views, [table], np.array([share]), turns=turn[:, None])
                 for turn in turns.T
             ]
         )
@@ -307,41 +313,41 @@ def test_what_is_not_finished_would_not_have_mattered(weights: tuple[float, floa
     whole = np.logaddexp.reduce(each, axis=0)
     for bounds, many in ((some, len(places)), (others, len(turns))):
         assert (bounds > whole - 1e-3).all()
-        assert (bounds > whole + 1e-3).mean() > 0.01  # which are not worked out
+        assert (bounds > whole + 1e-3).mean() > 0.01  # some are bounds
         sums, expected = (
-            np.logaddexp.reduce((one + prior).reshape(-1, many * turns.shape[1]), axis=1)
-            for one in (bounds, whole)
+            np.logaddexp.reduce((logliks + prior).reshape(-1, many * turns.shape[1]), axis=1)
+            for logliks in (bounds, whole)
         )
         assert sums == pytest.approx(expected, abs=LOST_SHARE)
 
 
-def test_re_ranking_replaces_the_best_and_moves_the_rest_with_them() -> None:
+def test_re_ranking_replaces_the_best_scores_and_shifts_the_others() -> None:
     database = random_database(2, cells=300)
     index = build_index(database, GENERIC)
     query = random_query(database, 2, size=8)
     exact = score_associations(database, query, GENERIC, np.arange(300))
     scores = index.scores(query)
-    found = rerank(index, query, scores, count=40).loglik
+    loglik = rerank(index, query, scores, count=40).loglik
     best = np.argsort(-scores.loglik, kind="stable")
     inside, outside = best[:40], best[40:]
-    assert found[inside] == pytest.approx(exact[inside])
-    # The others keep their order, and what they hold together is right.
-    assert (np.diff(found[outside]) < 0.5).all()
-    masses = [np.logaddexp.reduce(one[outside]) for one in (found, exact)]
+    assert loglik[inside] == pytest.approx(exact[inside])
+    # The others keep their order, and their sum is right.
+    assert (np.diff(loglik[outside]) < 0.5).all()
+    masses = [np.logaddexp.reduce(logliks[outside]) for logliks in (loglik, exact)]
     assert masses[0] == pytest.approx(masses[1], abs=0.3)
-    found, near = rerank(index, query, scores, count=10_000).loglik, exact > exact.max() - 10.0
-    assert found[near] == pytest.approx(exact[near])
-    # A prior chooses what is re-ranked; without bearings nothing is.
+    loglik, near = rerank(index, query, scores, count=10_000).loglik, exact > exact.max() - 10.0
+    assert loglik[near] == pytest.approx(exact[near])
+    # A prior chooses the cells; without bearings, none are re-ranked.
     prior = np.where(np.arange(300) < 5, 0.0, -np.inf)
-    found = rerank(index, query, scores, count=40, log_prior=prior).loglik
-    assert found[:5] == pytest.approx(exact[:5])
+    loglik = rerank(index, query, scores, count=40, log_prior=prior).loglik
+    assert loglik[:5] == pytest.approx(exact[:5])
     types = Signature(parts_of(query)[0], None)
     scores = index.scores(types)
     assert rerank(index, types, scores) is scores
 
 
-def test_a_sum_that_is_far_too_high_everywhere_hides_nothing() -> None:
-    # Told that next to nothing fails, many detections look like a few objects in the first sum.
+def test_re_ranking_finds_the_best_cell_if_all_first_sums_are_too_high() -> None:
+    # With a model almost without failures, many detections resemble a few objects in the first sum.
     noise = NoiseSpec(detection=0.999, misnamed=0.0, clutter=0.01, bearing_sigma=5.0)
     database = random_database(5, cells=400, longest=40, classes=2)
     index = build_index(database, noise)
@@ -351,27 +357,27 @@ def test_a_sum_that_is_far_too_high_everywhere_hides_nothing() -> None:
         scores = index.scores(query)
         exact = score_associations(database, query, noise, np.arange(400))
         best = int(exact.argmax())
-        found = rerank(index, query, scores, count=20).loglik
+        loglik = rerank(index, query, scores, count=20).loglik
         assert exact[best] < scores.loglik.max() - 30.0
-        if found[best] == pytest.approx(exact[best]):
-            hidden += found.argmax() != best
+        if loglik[best] == pytest.approx(exact[best]):
+            hidden += loglik.argmax() != best
     assert not hidden
 
 
 @pytest.mark.parametrize("north_sigma", [10.0, math.inf])
-def test_the_heading_is_found_finer_than_the_scan_has_it(north_sigma: float) -> None:
+def test_re_ranking_refines_the_heading(north_sigma: float) -> None:
     database = random_database(3, cells=100, longest=20)
     cell = int(database.lengths.argmax())
     query = turned_query(database.signature(cell), -7.0)
     index = build_index(database, named_noise("light"))
     scores = index.scores(query, north_sigma=north_sigma)
-    found = rerank(index, query, scores, north_sigma=north_sigma)
-    assert int(found.loglik.argmax()) == cell
-    assert found.heading is not None
-    assert abs(found.heading[cell] - 7.0) <= 1.5
+    result = rerank(index, query, scores, north_sigma=north_sigma)
+    assert int(result.loglik.argmax()) == cell
+    assert result.heading is not None
+    assert abs(result.heading[cell] - 7.0) <= 1.5
 
 
-def test_it_finds_more_than_the_scan_alone() -> None:
+def test_re_ranking_finds_more_cells_than_the_scan() -> None:
     database = random_database(7, cells=400, longest=10, classes=2)
     index = build_index(database, GENERIC)
     right = np.zeros(2, int)
@@ -388,7 +394,7 @@ def test_it_finds_more_than_the_scan_alone() -> None:
 
 NOISE = NoiseSpec(detection=0.8, misnamed=0.05, clutter=1.0, bearing_sigma=4.0)
 TREE, LAMP = CODES[0], CODES[1]
-# North, east and south of the place, and one out of sight.
+# North, east and south of the place, and one out of range.
 WORLD = World(((0.0, 10.0, TREE), (20.0, 0.0, LAMP), (0.0, -15.0, TREE), (0.0, 99.0, TREE)))
 
 
@@ -398,10 +404,10 @@ def explained(query: Signature, world: World = WORLD, **options: Any) -> Explana
     return explain(query, xy, noise, objects=objects, index=ObjectIndex(objects.xy), **options)
 
 
-def test_every_verdict() -> None:
+def test_explanations_have_all_verdicts() -> None:
     query = Signature(np.array([TREE, TREE, LAMP]), np.array([357.0, 92.0, 300.0]))
-    found = explained(query)
-    rows = found.to_dict()["rows"]
+    explanation = explained(query)
+    rows = explanation.to_dict()["rows"]
     assert [(row["verdict"], row["object"], row["source_id"], row["query"]) for row in rows] == [
         ("matched", 0, "0", 0),
         ("misnamed", 1, "1", 1),
@@ -413,62 +419,62 @@ def test_every_verdict() -> None:
     assert rows[1]["object_bearing"] == pytest.approx(90.0)
     assert rows[1]["object_class"] != rows[1]["query_class"]
     assert all(0.5 < row["chance"] <= 1.0 for row in rows)
-    assert found.counts == {"matched": 1, "misnamed": 1, "missed": 1, "false": 1}
-    assert json.loads(json.dumps(found.to_dict()))["x"] == 0.0
-    assert found.table.geometry.isna().tolist() == [False, False, True, False]
-    assert found.table.crs == WORLD.street_objects.crs
+    assert explanation.counts == {"matched": 1, "misnamed": 1, "missed": 1, "false": 1}
+    assert json.loads(json.dumps(explanation.to_dict()))["x"] == 0.0
+    assert explanation.table.geometry.isna().tolist() == [False, False, True, False]
+    assert explanation.table.crs == WORLD.street_objects.crs
 
 
-def test_chances_are_those_of_one_pair() -> None:
+def test_chance_of_a_single_pair() -> None:
     world = World(((0.0, 10.0, TREE), (0.0, -500.0, LAMP)))
-    found = explained(Signature(np.array([TREE]), np.array([8.0])), world)
+    explanation = explained(Signature(np.array([TREE]), np.array([8.0])), world)
     density = np.exp(-0.5 * 4.0) / (4.0 * np.sqrt(2 * np.pi))
     weight = 0.8 / 0.2 * 0.95 * density / (0.5 / 360)
-    assert found.table["chance"].iloc[0] == pytest.approx(weight / (1 + weight), rel=1e-6)
+    assert explanation.table["chance"].iloc[0] == pytest.approx(weight / (1 + weight), rel=1e-6)
     expected = np.log(0.2 * (0.5 / 360) * (1 + weight)) - 1.0
-    assert found.loglik == pytest.approx(expected, rel=1e-6)
+    assert explanation.loglik == pytest.approx(expected, rel=1e-6)
 
 
 def test_no_object_is_matched_twice() -> None:
     lamps = World(((0.0, 10.0, LAMP), (1.0, 10.0, LAMP)))
     query = Signature(np.array([LAMP, LAMP]), np.array([2.0, 3.0]))
-    found = explained(query, lamps, noise=named_noise("light"))
-    assert sorted(found.table["object"].tolist()) == [0, 1]
-    assert found.counts["matched"] == 2
+    explanation = explained(query, lamps, noise=named_noise("light"))
+    assert sorted(explanation.table["object"].tolist()) == [0, 1]
+    assert explanation.counts["matched"] == 2
 
 
-def test_a_query_of_unknown_classes_that_is_turned() -> None:
-    found = explained(Signature(None, np.array([350.0, 80.0])), heading=10.0)
-    assert found.table["verdict"].tolist() == ["matched", "matched", "missed"]
-    assert found.table["query_class"].tolist()[:2] == ["unknown", "unknown"]
-    assert found.table["query_bearing"].tolist()[:2] == [0.0, 90.0]
-    assert found.heading == 10.0
+def test_a_turned_query_of_unknown_classes_is_explained() -> None:
+    explanation = explained(Signature(None, np.array([350.0, 80.0])), heading=10.0)
+    assert explanation.table["verdict"].tolist() == ["matched", "matched", "missed"]
+    assert explanation.table["query_class"].tolist()[:2] == ["unknown", "unknown"]
+    assert explanation.table["query_bearing"].tolist()[:2] == [0.0, 90.0]
+    assert explanation.heading == 10.0
 
 
-def test_where_nothing_is_seen_all_is_false() -> None:
-    found = explained(Signature(np.array([TREE]), np.array([0.0])), xy=(500.0, 500.0))
-    assert found.counts == {"matched": 0, "misnamed": 0, "missed": 0, "false": 1}
-    assert found.table["chance"].tolist() == [1.0]
+def test_all_detections_are_false_at_a_place_without_objects() -> None:
+    explanation = explained(Signature(np.array([TREE]), np.array([0.0])), xy=(500.0, 500.0))
+    assert explanation.counts == {"matched": 0, "misnamed": 0, "missed": 0, "false": 1}
+    assert explanation.table["chance"].tolist() == [1.0]
 
 
 def test_a_cell_is_explained_without_the_street_objects() -> None:
     database = WORLD.database
     cell = int(np.flatnonzero((database.xy == [5.0, 5.0]).all(axis=1))[0])
     query = database.signature(cell)
-    found = explain_cell(query, cell, NOISE, database=database)
+    explanation = explain_cell(query, cell, NOISE, database=database)
     exact = explained(query, xy=(5.0, 5.0))
-    assert found.counts == exact.counts
-    assert found.loglik == pytest.approx(exact.loglik, abs=0.1)
-    assert found.table["object"].isna().all()
-    assert found.table.geometry.distance(exact.table.geometry).max() < 0.2
-    assert found.table.crs == WORLD.street_objects.crs
+    assert explanation.counts == exact.counts
+    assert explanation.loglik == pytest.approx(exact.loglik, abs=0.1)
+    assert explanation.table["object"].isna().all()
+    assert explanation.table.geometry.distance(exact.table.geometry).max() < 0.2
+    assert explanation.table.crs == WORLD.street_objects.crs
 
 
-def test_what_is_outside_the_photo_is_neither_missed_nor_counted() -> None:
+def test_objects_outside_the_photo_are_not_missed_or_counted() -> None:
     east = Photo.looking(heading=100, fov=60)
     query = View(np.array([LAMP]), np.array([92.0]), ranges=np.array([18.0]), photos=(east,))
-    found = explained(query)
-    rows = found.to_dict()["rows"]
+    explanation = explained(query)
+    rows = explanation.to_dict()["rows"]
     assert [(row["verdict"], row["object"]) for row in rows] == [
         ("matched", 1),
         ("outside", 0),
@@ -476,7 +482,7 @@ def test_what_is_outside_the_photo_is_neither_missed_nor_counted() -> None:
     ]
     assert (rows[0]["query_range"], rows[0]["distance"]) == (18.0, pytest.approx(20.0))
     assert rows[0]["photo"] is None
-    assert found.counts == {"matched": 1, "misnamed": 0, "missed": 0, "false": 0}
+    assert explanation.counts == {"matched": 1, "misnamed": 0, "missed": 0, "false": 0}
     assert all(row["chance"] > 0.99 for row in rows)
     blind = View(np.array([LAMP]), np.array([60.0]), photos=(Photo.looking(heading=30, fov=80),))
     assert explained(blind).counts["missed"] == 1  # the tree in the north
@@ -487,32 +493,32 @@ def test_photos_have_their_own_headings() -> None:
     query = View(
         np.array([LAMP, TREE]), np.array([70.0, 10.0]), photo=np.array([1, 0]), photos=photos
     )
-    found = explained(query, heading=(-10.0, 20.0))
-    rows = found.to_dict()["rows"]
+    explanation = explained(query, heading=(-10.0, 20.0))
+    rows = explanation.to_dict()["rows"]
     assert [(row["verdict"], row["object"], row["photo"]) for row in rows] == [
         ("matched", 1, 1),
         ("matched", 0, 0),
         ("outside", 2, None),
     ]
-    assert (found.heading, found.headings) == (-10.0, (-10.0, 20.0))
-    assert found.to_dict()["headings"] == [-10.0, 20.0]
+    assert (explanation.heading, explanation.headings) == (-10.0, (-10.0, 20.0))
+    assert explanation.to_dict()["headings"] == [-10.0, 20.0]
 
 
-def test_ranges_tell_objects_in_a_row_apart() -> None:
+def test_ranges_distinguish_objects_in_one_direction() -> None:
     row = World(((0.0, 8.0, LAMP), (0.1, 25.0, LAMP)))
     for metres, entry in ((7.0, 0), (28.0, 1)):
         query = View(np.array([LAMP]), np.array([0.0]), ranges=np.array([metres]))
-        (seen, missed) = explained(query, row).rows
-        assert (seen["object"], missed["verdict"]) == (entry, "missed")
+        (matched, missed) = explained(query, row).rows
+        assert (matched["object"], missed["verdict"]) == (entry, "missed")
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_likelihood_of_a_view_is_that_of_the_oracle(seed: int) -> None:
+def test_explanations_have_the_likelihood_of_the_oracle(seed: int) -> None:
     database = random_database(seed, cells=8, longest=4)
     view = random_view(database, np.random.default_rng(seed), size=1, photos=PHOTOS)
     noise = NoiseMixture(
         specs=(NoiseSpec(fading=FADING, position_sigma=2.0), NoiseSpec(detection=0.5)),
         weights=(0.4, 0.6),
     )
-    found = explain_cell(view, 0, noise, database=database)
-    assert found.loglik == pytest.approx(cell_loglik(database, view, noise, 0), abs=1e-4)
+    explanation = explain_cell(view, 0, noise, database=database)
+    assert explanation.loglik == pytest.approx(cell_loglik(database, view, noise, 0), abs=1e-4)

@@ -1,4 +1,4 @@
-"""The first sum over all cells, held to a slow one; see also `view_oracle`."""
+"""The first sum over all cells, compared with a slow one; see also `view_oracle`."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ TOWN = random_town()
 
 
 def slow_counts(index: LikelihoodIndex, query: list[int], cell: int) -> float:
-    """Return the likelihood of so many objects of each class, by sums over all hits."""
+    """Return the likelihood of the counts of the classes, by sums over all hits."""
     table, database = index.table, index.database
     length = int(database.lengths[cell])
     codes = database.codes[database.offsets[cell] : database.offsets[cell + 1]]
     own = np.bincount(table.row_of[codes], minlength=len(table.codes))
     share = sum(query[:-1]) / sum(query)
     detected = own * (1 - table.missed[length])
-    named, right = table.named[length], np.diag(table.named[length])
-    strays = share * (table.clutter + detected @ named - detected * right)
+    names, right = table.named[length], np.diag(table.named[length])
+    strays = share * (table.clutter + detected @ names - detected * right)
     chances = share * (1 - table.missed[length]) * right
     total = 0.0
     if share:
@@ -63,13 +63,13 @@ def slow_counts(index: LikelihoodIndex, query: list[int], cell: int) -> float:
 FADING = st.none() | st.just({"all": [[5, 1.0], [20, 0.8], [30, 0.3]]})
 PLACES = st.just(0.0) | st.floats(0.5, 5.0)
 SECTORS = st.lists(
-    st.tuples(st.floats(0, 360), st.floats(5, 300)), max_size=2, unique_by=lambda one: one[0]
-).map(lambda some: tuple((low, low + width) for low, width in some))
+    st.tuples(st.floats(0, 360), st.floats(5, 300)), max_size=2, unique_by=lambda sector: sector[0]
+).map(lambda pairs: tuple((low, low + width) for low, width in pairs))
 
 
 @settings(max_examples=40)
 @given(SEEDS, noise_specs(), FADING, PLACES, st.lists(SECTORS, min_size=1, max_size=2))
-def test_scores_are_the_formula(
+def test_scores_equal_the_formula(
     seed: int,
     noise: NoiseSpec,
     fading: dict[str, list[list[float]]] | None,
@@ -90,9 +90,9 @@ def test_scores_are_the_formula(
     expected = [
         cell_loglik(database, view, noise, cell, form=set_loglik) for cell in range(len(database))
     ]
-    # The scan takes bearings in steps and distances in levels, by which ranges go most. A level is
-    # up to 9 % off, and so is a spread; where all that explains a thing is an object that hardly
-    # fits, the square of that counts.
+    # The scan has steps of bearings and levels of distances, which matter most for ranges. A level
+    # has an error of up to 9 %, and so has a deviation; if the only object near a detection hardly
+    # fits, its square counts.
     errors = np.abs(scores.loglik - expected)
     assert np.median(errors) < 0.25 * len(view)
     assert (errors < 0.5 * len(view) + 0.2 * np.abs(expected)).all()
@@ -100,7 +100,7 @@ def test_scores_are_the_formula(
 
 @settings(max_examples=15)
 @given(SEEDS, st.sampled_from([4.0, 20.0, math.inf]), SECTORS)
-def test_turns_are_summed_over_with_their_chances(
+def test_scores_are_summed_over_turns_by_their_chances(
     seed: int, sigma: float, sectors: tuple[tuple[float, float], ...]
 ) -> None:
     database = random_database(seed, cells=20)
@@ -110,21 +110,21 @@ def test_turns_are_summed_over_with_their_chances(
     turns = np.arange(-32, 32) * TURN
     chances = np.exp(-0.5 * (turns / sigma) ** 2)
     chances /= chances.sum()
-    known = replace(view, photos=(replace(photo, north_sigma=0.0),))
-    logliks = [index.scores(known.turned(turn)).loglik for turn in turns.tolist()]
-    found = index.scores(view)
+    fixed = replace(view, photos=(replace(photo, north_sigma=0.0),))
+    logliks = [index.scores(fixed.turned(turn)).loglik for turn in turns.tolist()]
+    result = index.scores(view)
     with np.errstate(divide="ignore"):
         each = np.stack(logliks).astype(np.float64) + np.log(chances)[:, None]
-    assert found.loglik == pytest.approx(np.logaddexp.reduce(each, axis=0), abs=2e-2)
-    assert found.heading is not None
-    rows = np.rint((found.heading + 180.0) / TURN).astype(int)
+    assert result.loglik == pytest.approx(np.logaddexp.reduce(each, axis=0), abs=2e-2)
+    assert result.heading is not None
+    rows = np.rint((result.heading + 180.0) / TURN).astype(int)
     reached = each[rows, np.arange(len(database))]
     assert reached == pytest.approx(each.max(axis=0), abs=2e-2)
 
 
 @settings(max_examples=10)
 @given(SEEDS, noise_specs(), SECTORS)
-def test_places_aside_are_summed_over(
+def test_off_centre_scores_are_means_over_points(
     seed: int, noise: NoiseSpec, sectors: tuple[tuple[float, float], ...]
 ) -> None:
     town = TOWN.database
@@ -135,38 +135,38 @@ def test_places_aside_are_summed_over(
     view = replace(view, ranges=None, range_errors=None)
     cells = np.random.default_rng(seed).choice(len(town), 8, replace=False)
     step = town.grid.step
-    places = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
-    seen = visible_objects_off_centre(town, cells, places)
+    points = np.array([[east, north] for north in (-1, 1) for east in (-1, 1)]) * step / 4.0
+    views = visible_objects_off_centre(town, cells, points)
     (spec,) = cell_noise(noise, step / 2.0).specs
     (table,), _ = database_tables(town, spec)
     codes = town.present_codes.tolist()
-    # What is seen there, as if it were in the middle of the cells.
-    units = np.rint(seen.distances * 255.0 / town.reach).clip(0, 255)
+    # The objects seen from a point, as a database of its own.
+    units = np.rint(views.distances * 255.0 / town.reach).clip(0, 255)
     each = []
-    for place in range(len(places)):
-        views = np.arange(len(cells)) * len(places) + place
-        part = consecutive(seen.offsets[views], seen.lengths[views])
+    for point in range(len(points)):
+        rows = np.arange(len(cells)) * len(points) + point
+        part = consecutive(views.offsets[rows], views.lengths[rows])
         there = replace(
             town.select(cells),
-            offsets=np.append(0, np.cumsum(seen.lengths[views])),
-            codes=seen.codes[part],
-            bearing_units=np.floor(seen.bearings[part] * 20.0).astype(np.uint16),
+            offsets=np.append(0, np.cumsum(views.lengths[rows])),
+            codes=views.codes[part],
+            bearing_units=np.floor(views.bearings[part] * 20.0).astype(np.uint16),
             distance_units=units[part].astype(np.uint8),
         )
         scenes = [scene_of(there, row, spec, table) for row in range(len(cells))]
         north = [[(0.0, 1.0)]]
         each.append([turned_loglik(scene, view, codes, north, set_loglik) for scene in scenes])
     expected = np.logaddexp.reduce(each, axis=0) - math.log(4)
-    found = build_index(town, cell_noise(noise, step)).off_centre_scorer(view, north_sigma=0.0)(
+    result = build_index(town, cell_noise(noise, step)).off_centre_scorer(view, north_sigma=0.0)(
         cells
     )
-    assert found == pytest.approx(expected, abs=0.5 * len(view))
-    assert np.median(np.abs(found - expected)) < 0.1 * len(view)
+    assert result == pytest.approx(expected, abs=0.5 * len(view))
+    assert np.median(np.abs(result - expected)) < 0.1 * len(view)
 
 
 @settings(max_examples=20)
 @given(SEEDS, noise_specs(), st.lists(st.integers(0, 4), min_size=1, max_size=9))
-def test_types_alone_are_compared_by_their_numbers(
+def test_types_without_bearings_are_scored_by_their_counts(
     seed: int, spec: NoiseSpec, codes: list[int]
 ) -> None:
     database = random_database(seed, cells=30)
@@ -180,27 +180,27 @@ def test_types_alone_are_compared_by_their_numbers(
 def test_a_query_of_many_objects_is_scored() -> None:
     database = random_database(2, cells=5)
     index = build_index(database, named_noise("medium"))
-    one = random_query(database, 2, size=1)
-    many = Signature(*(np.repeat(part, 600) for part in parts_of(one)))
-    single, found = index.scores(one).loglik, index.scores(many).loglik
+    query = random_query(database, 2, size=1)
+    many = Signature(*(np.repeat(part, 600) for part in parts_of(query)))
+    single, total = index.scores(query).loglik, index.scores(many).loglik
     nothing = index.scores(NOTHING).loglik
-    assert found - nothing == pytest.approx(600 * (single - nothing), rel=1e-4)
+    assert total - nothing == pytest.approx(600 * (single - nothing), rel=1e-4)
 
 
 def test_scores_do_not_depend_on_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     database = random_database(8, cells=390)
     query = random_query(database, 8, size=6)
-    alone = build_index(database, NOISE).scores(query).loglik
+    expected = build_index(database, NOISE).scores(query).loglik
     monkeypatch.setattr("semsig_gis.core.threads.ROWS_A_PART", 50)
     monkeypatch.setattr("semsig_gis.core.threads.cores", lambda: 3)
-    assert np.array_equal(build_index(database, NOISE).scores(query).loglik, alone)
+    assert np.array_equal(build_index(database, NOISE).scores(query).loglik, expected)
 
 
-def test_the_fingerprint_changes_with_what_the_index_depends_on() -> None:
+def test_the_fingerprint_depends_on_database_and_noise() -> None:
     database = random_database(8)
     nearer = replace(database, distance_units=database.distance_units // 2)
     others = [random_database(9), database.select(slice(39)), nearer]
-    prints = {index_fingerprint(one, NOISE) for one in (database, *others)}
+    prints = {index_fingerprint(city, NOISE) for city in (database, *others)}
     prints.add(index_fingerprint(database, named_noise("light")))
     assert len(prints) == 5
     assert index_fingerprint(random_database(8), NOISE) in prints
@@ -210,7 +210,7 @@ def test_the_fingerprint_changes_with_what_the_index_depends_on() -> None:
     st.lists(st.one_of(st.floats(-500, 0, width=32), st.just(-math.inf)), min_size=1, max_size=60),
     st.integers(1, 60),
 )
-def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
+def test_promising_cells_include_the_best(scores: list[float], count: int) -> None:
     array = np.array(scores, np.float32)
     count = min(count, len(array))
     cells = promising_cells(array, count)
@@ -220,7 +220,7 @@ def test_promising_cells_hold_the_best(scores: list[float], count: int) -> None:
     assert worst > np.delete(array, cells).max(initial=-math.inf) or len(cells) == len(array)
 
 
-def test_promising_cells_bear_scores_that_are_no_numbers() -> None:
+def test_promising_cells_accept_nan_and_infinity() -> None:
     scores = np.array([math.nan, -3.0, math.inf, -1.0, -math.inf], np.float32)
     for top in (scores, scores[[0, 1, 3, 4]], scores[:1]):
         cells = promising_cells(top, min(2, len(top)))

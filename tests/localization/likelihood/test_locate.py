@@ -50,12 +50,12 @@ PLACE = CORNER + np.array([103.0, 97.0])
 
 
 def seen_from(xy: np.ndarray, *, objects: StreetObjects = STORE.objects) -> Signature:
-    """Return what there is to see from a place, without a mistake."""
+    """Return the objects visible from a place, without errors."""
     view = visible_objects_at(objects, xy[None], index=ObjectIndex(objects.xy), radius=30.0)
     return Signature(view.codes, view.bearings)
 
 
-def test_what_a_person_leaves_out_hardly_speaks_against_a_place() -> None:
+def test_omissions_of_a_person_hardly_count_against_a_place() -> None:
     marked = CELLS.taxonomy.encode("DBH"), np.array([20.0, 140.0, 260.0])
     street = (
         "DDDDBDDDDHDD",
@@ -71,19 +71,19 @@ def test_what_a_person_leaves_out_hardly_speaks_against_a_place() -> None:
     assert max(chances["generic"], chances["medium"]) < 0.5
 
 
-def test_what_a_long_signature_was_seen_from_is_found() -> None:
+def test_long_signatures_are_located() -> None:
     right = 0
     for cell in LONG:
-        found = locate(INDEX, CITY.signature(cell), top=5)
-        right += int(np.hypot(*(CITY.xy[cell] - [found.answer.x, found.answer.y])) <= 50)
-        chances = found.candidates["chance"].to_numpy()
+        location = locate(INDEX, CITY.signature(cell), top=5)
+        right += int(np.hypot(*(CITY.xy[cell] - [location.answer.x, location.answer.y])) <= 50)
+        chances = location.candidates["chance"].to_numpy()
         assert (np.diff(chances) <= 0).all()
         assert 0 < chances.sum() <= 1 + 1e-9
-        assert found.candidates["rank"].tolist() == [1, 2, 3, 4, 5]
+        assert location.candidates["rank"].tolist() == [1, 2, 3, 4, 5]
     assert right >= len(LONG) - 1
 
 
-def test_a_prior_and_a_rule_decide() -> None:
+def test_the_answer_depends_on_prior_and_rule() -> None:
     cell = LONG[0]
     query = Signature(parts_of(CITY.signature(cell))[0][:1], None)
     anywhere = locate(INDEX, query)
@@ -95,17 +95,19 @@ def test_a_prior_and_a_rule_decide() -> None:
     assert not locate(INDEX, query, log_prior=near, rule=AnswerRule(threshold=1.5)).answer.given
 
 
-def test_a_prior_that_the_view_speaks_against_is_told() -> None:
+def test_a_prior_that_contradicts_the_view_gives_a_note() -> None:
     cell = LONG[0]
     farthest = int(np.hypot(*(CITY.xy - CITY.xy[cell]).T).argmax())
     query, places = CITY.signature(cell), CITY.xy[[cell, farthest]]
     right, wrong = (position_prior(CITY, (x, y), sigma=10.0) for x, y in places.tolist())
-    known = {"near": "the lamp"}
-    found, misled = (locate(WIDE, query, log_prior=one, known=known) for one in (right, wrong))
-    assert found.prior_ratio is not None
-    assert found.prior_ratio > 1
-    assert not found.notes
-    assert found.to_dict()["prior"] == {"near": "the lamp", "ratio": found.prior_ratio}
+    facts = {"near": "the lamp"}
+    location, misled = (
+        locate(WIDE, query, log_prior=prior, known=facts) for prior in (right, wrong)
+    )
+    assert location.prior_ratio is not None
+    assert location.prior_ratio > 1
+    assert not location.notes
+    assert location.to_dict()["prior"] == {"near": "the lamp", "ratio": location.prior_ratio}
     assert misled.prior_ratio is not None
     assert misled.prior_ratio < 0.01
     assert "the prior and the view disagree: the view is" in misled.notes[0]
@@ -115,15 +117,15 @@ def test_a_prior_that_the_view_speaks_against_is_told() -> None:
     assert views[0].prior_ratio == pytest.approx(misled.prior_ratio, rel=1e-6)
 
 
-def test_the_place_between_the_viewpoints_is_found() -> None:
+def test_refinement_finds_places_between_the_viewpoints() -> None:
     errors = np.empty((12, 2))
     for trial, xy in enumerate(CORNER + np.random.default_rng(1).uniform(40, 160, (12, 2))):
         for refined in (False, True):
-            found = locate(WIDE, seen_from(xy), store=STORE, refined=refined, explained=1)
-            errors[trial, int(refined)] = math.dist(xy, (found.estimate.x, found.estimate.y))
-            assert found.estimate.refined == refined
-            assert found.posterior.chances.sum() == pytest.approx(1.0)
-            assert (np.diff(found.candidates["chance"]) <= 0).all()
+            location = locate(WIDE, seen_from(xy), store=STORE, refined=refined, explained=1)
+            errors[trial, int(refined)] = math.dist(xy, (location.estimate.x, location.estimate.y))
+            assert location.estimate.refined == refined
+            assert location.posterior.chances.sum() == pytest.approx(1.0)
+            assert (np.diff(location.candidates["chance"]) <= 0).all()
     plain, close = np.median(errors, axis=0)
     assert close < 1.0 < plain < 8.0
 
@@ -131,17 +133,17 @@ def test_the_place_between_the_viewpoints_is_found() -> None:
 def test_explanations_name_the_street_objects() -> None:
     query = seen_from(PLACE)
     for refined in (False, True):
-        found = locate(WIDE, query, store=STORE, refined=refined, explained=3)
-        assert len(found.explanations) == 3
-        best, first = found.explanations[0], found.candidates.iloc[0]
+        location = locate(WIDE, query, store=STORE, refined=refined, explained=3)
+        assert len(location.explanations) == 3
+        best, first = location.explanations[0], location.candidates.iloc[0]
         assert math.dist(best.xy, first[["x", "y"]]) <= 5.0 * math.sqrt(2.0)
         assert best.counts["matched"] == len(query)
         rows = best.table[best.table["verdict"] == "matched"]
         ids = rows["source_id"].astype(int).to_numpy()
         assert (STORE.objects.codes[ids] == query.codes).all()
-    alone = locate(WIDE, query, explained=1).explanations[0]
-    assert alone.table["source_id"].isna().all()
-    assert alone.counts["matched"] > len(query) // 2
+    explanation = locate(WIDE, query, explained=1).explanations[0]
+    assert explanation.table["source_id"].isna().all()
+    assert explanation.counts["matched"] > len(query) // 2
 
 
 @pytest.mark.parametrize("north_sigma", [0.0, math.inf])
@@ -155,34 +157,36 @@ def test_a_class_that_no_cell_sees_is_a_false_detection(north_sigma: float) -> N
     codes, bearings = parts_of(plain)
     query = Signature(np.append(codes, absent), np.append(bearings, 33.0))
     options: Any = {"north_sigma": north_sigma, "explained": 1}
-    found, expected = (locate(index, one, **options) for one in (query, plain))
-    assert np.array_equal(found.chances, expected.chances)
-    assert found.query is query
-    assert len(found.notes) == 1
-    assert found.explanations[0].counts["false"] == expected.explanations[0].counts["false"] + 1
+    location, expected = (locate(index, view, **options) for view in (query, plain))
+    assert np.array_equal(location.chances, expected.chances)
+    assert location.query is query
+    assert len(location.notes) == 1
+    assert location.explanations[0].counts["false"] == expected.explanations[0].counts["false"] + 1
     assert not expected.notes
     nothing = Signature(np.empty(0, np.uint8), np.empty(0))
-    unseen, alone = (locate(index, one, **options) for one in (nothing, far))
-    assert np.array_equal(unseen.chances, alone.chances)
-    assert not unseen.answer.given
-    assert unseen.explanations == ()
-    json.dumps([found.to_dict(), unseen.to_dict(), alone.to_dict()], allow_nan=False)
+    empty_location, far_location = (locate(index, view, **options) for view in (nothing, far))
+    assert np.array_equal(empty_location.chances, far_location.chances)
+    assert not empty_location.answer.given
+    assert empty_location.explanations == ()
+    json.dumps(
+        [location.to_dict(), empty_location.to_dict(), far_location.to_dict()], allow_nan=False
+    )
 
 
-def test_a_turned_place_is_found_with_its_heading() -> None:
+def test_a_turned_query_is_located_with_its_heading() -> None:
     query = turned_query(seen_from(PLACE), -70.0)
     options: Any = {"north_sigma": math.inf, "store": STORE, "explained": 1}
-    found = locate(WIDE, query, **options)
-    assert found.candidates["heading"][0] == pytest.approx(70.0, abs=5.0)
-    found = locate(WIDE, query, **options, refined=True)
-    place = found.estimate
+    location = locate(WIDE, query, **options)
+    assert location.candidates["heading"][0] == pytest.approx(70.0, abs=5.0)
+    location = locate(WIDE, query, **options, refined=True)
+    place = location.estimate
     assert math.dist((place.x, place.y), PLACE) < 2.0
     assert place.heading == pytest.approx(70.0, abs=3.0 * place.heading_sigma)
-    headings = [found.candidates["heading"][0], found.explanations[0].heading]
+    headings = [location.candidates["heading"][0], location.explanations[0].heading]
     assert headings == pytest.approx([70.0, 70.0], abs=10.0)
 
 
-def test_buildings_hide_what_is_behind_them() -> None:
+def test_buildings_hide_objects_behind_them() -> None:
     east, north = PLACE.tolist()
     wall = shapely.box(east + 4.0, north - 40.0, east + 8.0, north + 40.0)
     houses = gpd.GeoDataFrame(geometry=[wall], crs="EPSG:2154")
@@ -192,11 +196,11 @@ def test_buildings_hide_what_is_behind_them() -> None:
         for store in stores
     )
     assert math.dist(free.xy, PLACE) < 1.0
-    assert math.dist(walled.xy, PLACE) > 3.0  # half of what was seen would be hidden here
+    assert math.dist(walled.xy, PLACE) > 3.0  # half of the query would be hidden here
     assert walled.loglik < free.loglik - 3.0
 
 
-def test_a_route_settles_what_one_view_leaves_open() -> None:
+def test_a_route_is_more_certain_than_one_view() -> None:
     start, way = LONG[0], np.array([20.0, 0.0])
     (after,) = np.flatnonzero((CITY.xy == CITY.xy[start] + way).all(axis=1)).tolist()
     poor = Signature(*(part[:2] for part in parts_of(CITY.signature(start))))
@@ -205,65 +209,73 @@ def test_a_route_settles_what_one_view_leaves_open() -> None:
     views = [poor, CITY.signature(after), nothing]
     for refined in (False, True):
         options: Any = {"store": STORE, "refined": refined, "explained": 1}
-        alone = locate(WIDE, poor, **options)
+        single = locate(WIDE, poor, **options)
         first, _, last = locate_route(WIDE, views, legs, **options)
-        assert first.posterior.chances[start] > alone.posterior.chances[start]
+        assert first.posterior.chances[start] > single.posterior.chances[start]
         assert math.dist((first.estimate.x, first.estimate.y), CITY.xy[start]) < 12.0
         assert math.dist((last.estimate.x, last.estimate.y), CITY.xy[start] + 2 * way) < 15.0
-        assert [len(one.explanations) for one in (first, last)] == [1, 0]
+        assert [len(location.explanations) for location in (first, last)] == [1, 0]
         assert not last.estimate.refined
 
 
-def test_one_cell_is_the_answer() -> None:
+def test_a_database_of_one_cell_is_answered() -> None:
     database = CITY.select(slice(0, 1))
     index = build_index(database, cell_noise(named_noise("generic"), 10.0))
     for refined in (False, True):
-        found = locate(index, database.signature(0), store=STORE, refined=refined, explained=3)
-        assert found.answer.given
-        assert found.posterior.chances == pytest.approx([1.0])
-        assert math.dist((found.estimate.x, found.estimate.y), database.xy[0]) < 8.0
-        assert found.region.tolist() == [0]
+        location = locate(index, database.signature(0), store=STORE, refined=refined, explained=3)
+        assert location.answer.given
+        assert location.posterior.chances == pytest.approx([1.0])
+        assert math.dist((location.estimate.x, location.estimate.y), database.xy[0]) < 8.0
+        assert location.region.tolist() == [0]
 
 
 @pytest.mark.parametrize("north_sigma", [0.0, math.inf])
-def test_a_query_longer_than_any_signature(north_sigma: float) -> None:
+def test_a_query_longer_than_any_signature_is_scored(north_sigma: float) -> None:
     rng = np.random.default_rng(0)
     query = Signature(rng.choice(CITY.present_codes, 200), np.sort(rng.uniform(0, 360, 200)))
-    found = locate(WIDE, query, north_sigma=north_sigma, store=STORE, refined=True, explained=1)
-    assert np.isfinite(found.candidates["loglik"]).all()
-    assert found.explanations[0].counts["false"] > 150
+    location = locate(WIDE, query, north_sigma=north_sigma, store=STORE, refined=True, explained=1)
+    assert np.isfinite(location.candidates["loglik"]).all()
+    assert location.explanations[0].counts["false"] > 150
 
 
-def test_an_answer_is_plain_values_and_points() -> None:
-    found = locate(INDEX, CITY.signature(LONG[0]), top=4, explained=2)
-    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+def test_a_location_converts_to_plain_values_and_points() -> None:
+    location = locate(INDEX, CITY.signature(LONG[0]), top=4, explained=2)
+    plain = json.loads(json.dumps(location.to_dict(), allow_nan=False))
     assert plain["cells"] == len(CITY)
-    assert plain["answered"] == found.answer.given
+    assert plain["answered"] == location.answer.given
     assert len(plain["candidates"]) == 4
-    assert found.loglik[found.candidates["cell"]].tolist() == found.candidates["loglik"].to_list()
-    assert ["explanation" in one for one in plain["candidates"]] == [True, True, False, False]
+    assert (
+        location.loglik[location.candidates["cell"]].tolist()
+        == location.candidates["loglik"].to_list()
+    )
+    assert ["explanation" in candidate for candidate in plain["candidates"]] == [
+        True,
+        True,
+        False,
+        False,
+    ]
     place = plain["place"]
     assert place["within_m"] == 50.0
-    assert [place["x"], place["y"]] == [found.estimate.x, found.estimate.y]
-    assert place["chance"] == found.answer.mass
+    assert [place["x"], place["y"]] == [location.estimate.x, location.estimate.y]
+    assert place["chance"] == location.answer.mass
     assert place["heading"] is None
     assert np.shape(place["covariance"]) == (2, 2)
     assert place["lon"] == pytest.approx(3.8, abs=1.0)
-    assert found.to_geodataframe().crs == CITY.crs
-    assert found.region_km2 == pytest.approx(len(found.region) * 1e-4)
-    assert found.posterior.chances[found.region].sum() >= 0.9 - 1e-9
-    # A rule that answers nothing is plain, too.
-    found = locate(INDEX, CITY.signature(LONG[0]), rule=AnswerRule(threshold=math.inf))
-    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert location.to_geodataframe().crs == CITY.crs
+    assert location.region_km2 == pytest.approx(len(location.region) * 1e-4)
+    assert location.posterior.chances[location.region].sum() >= 0.9 - 1e-9
+    # A rule without answers has plain values as well.
+    location = locate(INDEX, CITY.signature(LONG[0]), rule=AnswerRule(threshold=math.inf))
+    plain = json.loads(json.dumps(location.to_dict(), allow_nan=False))
     assert (plain["threshold"], plain["answered"]) == (None, False)
 
 
 @given(st.integers(0, 99), st.integers(0, 39), st.sampled_from([10.0, 30.0, 500.0]))
-def test_the_mean_is_that_of_drawn_places(seed: int, cell: int, radius: float) -> None:
+def test_the_estimate_is_the_mean_over_the_cells(seed: int, cell: int, radius: float) -> None:
     chances = np.random.default_rng(seed).dirichlet(np.full(len(CELLS), 0.3))
-    found = Posterior(database=CELLS, chances=chances)
-    blind = Signature(CELLS.signature(0).codes, None)  # which tells nothing of north
-    place = cell_estimate(blind, SHARP, found, cell, radius=radius, north_sigma=math.inf)
+    distribution = Posterior(database=CELLS, chances=chances)
+    blind = Signature(CELLS.signature(0).codes, None)  # without information on north
+    place = cell_estimate(blind, SHARP, distribution, cell, radius=radius, north_sigma=math.inf)
     inside = np.hypot(*(CELLS.xy - CELLS.xy[cell]).T) <= radius + 1e-9
     weights = chances[inside] / chances[inside].sum()
     mean = weights @ CELLS.xy[inside]
@@ -276,31 +288,31 @@ def test_the_mean_is_that_of_drawn_places(seed: int, cell: int, radius: float) -
 
 
 @given(st.floats(0.1, 30.0), st.floats(0.1, 30.0), st.floats(0.0, 179.0))
-def test_an_ellipse_holds_its_share(one: float, other: float, bearing: float) -> None:
+def test_the_ellipse_contains_its_share(first: float, second: float, bearing: float) -> None:
     angle = math.radians(bearing)
     along = np.array([math.sin(angle), math.cos(angle)])
     across = np.array([along[1], -along[0]])
     covariance = np.zeros((3, 3))
-    covariance[:2, :2] = one**2 * np.outer(along, along) + other**2 * np.outer(across, across)
+    covariance[:2, :2] = first**2 * np.outer(along, along) + second**2 * np.outer(across, across)
     place = PlaceEstimate(x=0.0, y=0.0, heading=None, covariance=covariance, refined=True)
     longer, shorter, turned = place.ellipse(0.9)
     scale = math.sqrt(4.605170186)
-    assert longer == pytest.approx(scale * max(one, other))
-    assert shorter == pytest.approx(scale * min(one, other), rel=1e-5)
-    if one > 1.01 * other:
+    assert longer == pytest.approx(scale * max(first, second))
+    assert shorter == pytest.approx(scale * min(first, second), rel=1e-5)
+    if first > 1.01 * second:
         assert abs((turned - bearing + 90.0) % 180.0 - 90.0) < 1e-3
-    assert place.sigma == pytest.approx(math.hypot(one, other) / math.sqrt(2.0))
+    assert place.sigma == pytest.approx(math.hypot(first, second) / math.sqrt(2.0))
 
 
 @pytest.mark.parametrize("turn", [-170.0, 0.0, 63.0, 179.0])
-def test_the_heading_is_found_with_its_uncertainty(turn: float) -> None:
+def test_the_heading_is_estimated_with_its_uncertainty(turn: float) -> None:
     cell = int(CELLS.lengths.argmax())
-    seen = turned_query(CELLS.signature(cell), -turn)
+    query = turned_query(CELLS.signature(cell), -turn)
     sure = posterior(CELLS, np.where(np.arange(len(CELLS)) == cell, 0.0, -200.0))
-    place = cell_estimate(seen, SHARP, sure, cell, radius=50.0, north_sigma=math.inf)
+    place = cell_estimate(query, SHARP, sure, cell, radius=50.0, north_sigma=math.inf)
     assert place.heading is not None
     away = (place.heading - turn + 180.0) % 360.0 - 180.0
-    expected = math.hypot(SHARP.bearing_sigma / math.sqrt(len(seen)), 2.0 / math.sqrt(12.0))
+    expected = math.hypot(SHARP.bearing_sigma / math.sqrt(len(query)), 2.0 / math.sqrt(12.0))
     assert abs(away) < 2.0
     assert place.heading_sigma == pytest.approx(expected, rel=0.3)
     plain = place.to_dict()
@@ -312,7 +324,7 @@ def test_the_heading_is_found_with_its_uncertainty(turn: float) -> None:
 
 
 def parts(places: np.ndarray, headings: list[float], chances: list[float]) -> Refinement:
-    """Return parts of two metres whose headings are good to one degree."""
+    """Return parts of two metres with headings that are exact to one degree."""
     count = len(places)
     return Refinement(
         places=places,
@@ -325,30 +337,30 @@ def parts(places: np.ndarray, headings: list[float], chances: list[float]) -> Re
     )
 
 
-def test_parts_around_the_answer_count() -> None:
+def test_only_parts_around_the_answer_are_averaged() -> None:
     places = np.array([[0.0, 0.0], [4.0, 0.0], [90.0, 0.0]])
-    found = parts(places, [10.0, 14.0, 0.0], [0.1, 0.1, 0.8])
-    place = refined_estimate(found, (5.0, 5.0), radius=50.0, turned=True)
+    refinement = parts(places, [10.0, 14.0, 0.0], [0.1, 0.1, 0.8])
+    place = refined_estimate(refinement, (5.0, 5.0), radius=50.0, turned=True)
     assert place is not None
     assert (place.x, place.y, place.heading) == pytest.approx((2.0, 0.0, 12.0))
     assert place.covariance[0] == pytest.approx([4.0 + 4.0 / 12.0, 0.0, 4.0], abs=1e-3)
     assert place.heading_sigma == pytest.approx(math.sqrt(5.0), abs=1e-3)
-    assert refined_estimate(found, (500.0, 0.0), radius=50.0, turned=True) is None
+    assert refined_estimate(refinement, (500.0, 0.0), radius=50.0, turned=True) is None
 
 
 def test_headings_are_averaged_over_north() -> None:
-    found = parts(np.zeros((2, 2)), [-179.0, 179.0], [0.5, 0.5])
-    assert abs(found.heading) == pytest.approx(180.0)
-    assert found.covariance[2, 2] == pytest.approx(2.0)
+    refinement = parts(np.zeros((2, 2)), [-179.0, 179.0], [0.5, 0.5])
+    assert abs(refinement.heading) == pytest.approx(180.0)
+    assert refinement.covariance[2, 2] == pytest.approx(2.0)
 
 
 def detected(world: World, xy: np.ndarray, seed: int) -> Signature:
-    """Return what a good detector gives at a place."""
+    """Return the detections of a good detector at a place."""
     codes, bearings = parts_of(seen_from(xy, objects=world.street_objects))
     rng = np.random.default_rng(seed)
     noise = rng.normal(0.0, SHARP.bearing_sigma, len(codes))
-    kept = rng.random(len(codes)) < SHARP.detection
-    return Signature(codes[kept], ((bearings + noise) % 360.0)[kept])
+    hits = rng.random(len(codes)) < SHARP.detection
+    return Signature(codes[hits], ((bearings + noise) % 360.0)[hits])
 
 
 def refined(query: Signature, world: World, **options: Any) -> Refinement:  # noqa: ANN401
@@ -357,18 +369,18 @@ def refined(query: Signature, world: World, **options: Any) -> Refinement:  # no
     return refine(query, cells, SHARP, store=store, **options)
 
 
-def test_the_place_is_as_good_as_it_says() -> None:
+def test_refined_places_are_within_their_uncertainty() -> None:
     errors, inside, masses = [], [], []
     for seed in range(12):
         world = noisy_town(seed)
         xy = CORNER + np.random.default_rng([seed, 1]).uniform(50, 150, 2)
-        found = refined(detected(world, xy, seed), world)
-        away = np.array(found.xy) - xy
+        refinement = refined(detected(world, xy, seed), world)
+        away = np.array(refinement.xy) - xy
         errors.append(float(np.hypot(*away)))
-        inside.append(away @ np.linalg.inv(found.covariance[:2, :2]) @ away < 9.21)
-        masses.append(found.mass)
-        assert found.chances.sum() == pytest.approx(1.0)
-        assert found.covariance[2, 2] == 0.0
+        inside.append(away @ np.linalg.inv(refinement.covariance[:2, :2]) @ away < 9.21)
+        masses.append(refinement.mass)
+        assert refinement.chances.sum() == pytest.approx(1.0)
+        assert refinement.covariance[2, 2] == 0.0
     assert np.median(errors) < 1.5
     assert max(errors) < 5.0
     assert np.mean(inside) > 0.8  # 0.99 but for chance and clipped numbers
@@ -376,20 +388,20 @@ def test_the_place_is_as_good_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("north_sigma", [10.0, math.inf])
-def test_the_heading_is_as_good_as_it_says(north_sigma: float) -> None:
+def test_refined_headings_are_within_their_uncertainty(north_sigma: float) -> None:
     world = noisy_town(3)
     xy = CORNER + np.array([103.0, 98.0])
     query = turned_query(detected(world, xy, 3), -12.0)
     headings = np.full(len(world.database), 10.0)
-    found = refined(query, world, north_sigma=north_sigma, headings=[headings])
-    away = np.array([*(np.array(found.xy) - xy), found.heading - 12.0])
-    assert away @ np.linalg.inv(found.covariance) @ away < 16.3  # 99.9 %
-    assert found.heading == pytest.approx(12.0, abs=6.0)
-    assert math.sqrt(np.trace(found.covariance[:2, :2])) < 5.0
-    assert 0.0 < found.covariance[2, 2] < 30.0
+    refinement = refined(query, world, north_sigma=north_sigma, headings=[headings])
+    away = np.array([*(np.array(refinement.xy) - xy), refinement.heading - 12.0])
+    assert away @ np.linalg.inv(refinement.covariance) @ away < 16.3  # 99.9 %
+    assert refinement.heading == pytest.approx(12.0, abs=6.0)
+    assert math.sqrt(np.trace(refinement.covariance[:2, :2])) < 5.0
+    assert 0.0 < refinement.covariance[2, 2] < 30.0
 
 
-def test_what_else_is_known_and_buildings_count() -> None:
+def test_refinement_uses_prior_and_buildings() -> None:
     world = World(((0.0, 10.0, CODES[0]), (1000.0, 10.0, CODES[0])))
     query = Signature(np.array([CODES[0]]), np.array([1.0]))
     find = partial(refined, query, world, cells=np.array([[0.0, 0.0], [1000.0, 0.0]]))
@@ -406,28 +418,28 @@ def test_what_else_is_known_and_buildings_count() -> None:
 def test_parts_fill_the_cells() -> None:
     world = noisy_town(5)
     cells = world.database.xy[:7]
-    found = refined(detected(world, CORNER + 100.0, 5), world, cells=cells)
-    assert (found.sizes**2).sum() == pytest.approx(7 * 100.0)
-    assert np.abs(found.places[:, None] - cells).max(axis=2).min(axis=1).max() < 5.0
+    refinement = refined(detected(world, CORNER + 100.0, 5), world, cells=cells)
+    assert (refinement.sizes**2).sum() == pytest.approx(7 * 100.0)
+    assert np.abs(refinement.places[:, None] - cells).max(axis=2).min(axis=1).max() < 5.0
 
 
-def test_many_detections_that_clutter_hardly_explains_do_not_overflow() -> None:
+def test_many_detections_almost_without_clutter_do_not_overflow() -> None:
     bearings = np.linspace(0.0, 315.0, 8)
     database = database_of([("DDDDDDDD", bearings.tolist()), ("D", [10.0])])
     noise = NoiseSpec(detection=0.999, clutter=0.0, bearing_sigma=0.5)
     view = View(np.full(8, 3), bearings, ranges=np.full(8, 11.8), range_errors=np.full(8, 0.05))
-    found = build_index(database, noise).scores(view).loglik
-    assert np.isfinite(found).all()
-    assert found[0] > found[1] + 90.0
+    loglik = build_index(database, noise).scores(view).loglik
+    assert np.isfinite(loglik).all()
+    assert loglik[0] > loglik[1] + 90.0
 
 
 @pytest.mark.parametrize("north_sigma", [0.0, 10.0, math.inf])
-def test_hundreds_of_objects_that_are_hardly_ever_missed_do_not_underflow(
+def test_hundreds_of_objects_almost_without_misses_do_not_underflow(
     north_sigma: float,
 ) -> None:
     bearings = np.linspace(0.0, 359.0, 200)
     database = database_of([("D" * 200, bearings.tolist()), ("DB", [10.0, 20.0])])
     noise = NoiseSpec(detection=0.999, clutter=1.0)
     query = database.signature(0).select(np.arange(0, 200, 2))
-    found = build_index(database, noise).scores(query, north_sigma=north_sigma).loglik
-    assert np.isfinite(found).all()
+    loglik = build_index(database, noise).scores(query, north_sigma=north_sigma).loglik
+    assert np.isfinite(loglik).all()

@@ -1,4 +1,4 @@
-"""Chances of the cells: what else is known of a place, a route, and whether to answer."""
+"""Chances of the cells: posteriors, priors, routes and answer rules."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def test_chances_are_proportional_to_likelihood_times_prior(
 ) -> None:
     prior = np.arange(1.0, len(DATABASE) + 1)
     weights = np.exp(loglik)
-    alone = posterior(DATABASE, loglik + shift).chances
-    assert alone == pytest.approx(weights / weights.sum(), rel=1e-6)
+    chances = posterior(DATABASE, loglik + shift).chances
+    assert chances == pytest.approx(weights / weights.sum(), rel=1e-6)
     both = posterior(DATABASE, loglik, log_prior=np.log(prior)).chances
     assert both == pytest.approx(weights * prior / (weights @ prior), rel=1e-6)
 
@@ -66,30 +66,28 @@ def test_chances_are_proportional_to_likelihood_times_prior(
 def test_the_mass_within_a_radius_is_a_sum_over_the_cells_in_it(
     loglik: np.ndarray, radius: float
 ) -> None:
-    found = posterior(DATABASE, loglik)
+    result = posterior(DATABASE, loglik)
     away = np.hypot(*(DATABASE.xy[:, None] - DATABASE.xy[None]).transpose(2, 0, 1))
-    expected = (away <= radius + 1e-6) @ found.chances
-    assert found.mass_within(radius) == pytest.approx(expected)
+    expected = (away <= radius + 1e-6) @ result.chances
+    assert result.mass_within(radius) == pytest.approx(expected)
     some = np.array([5, 2, 77])
-    assert found.mass_within(radius, some) == pytest.approx(expected[some])
-    cell, mass = found.best_place(radius)
+    assert result.mass_within(radius, some) == pytest.approx(expected[some])
+    cell, mass = result.best_place(radius)
     assert [mass, expected[cell]] == pytest.approx([expected.max()] * 2, abs=2e-9)
 
 
 @given(LOGLIKS, st.floats(0.01, 1.0))
-def test_a_credible_region_is_the_smallest_that_holds_its_share(
-    loglik: np.ndarray, share: float
-) -> None:
-    found = posterior(DATABASE, loglik)
-    cells = found.credible_cells(share)
-    held = found.chances[cells]
-    assert (np.diff(held) <= 0).all()
-    assert held.sum() >= share * (1 - 1e-9)
-    assert held[:-1].sum() < share
-    assert held[-1] >= np.delete(found.chances, cells).max(initial=0.0)
+def test_a_credible_region_is_the_smallest_with_its_share(loglik: np.ndarray, share: float) -> None:
+    result = posterior(DATABASE, loglik)
+    cells = result.credible_cells(share)
+    chances = result.chances[cells]
+    assert (np.diff(chances) <= 0).all()
+    assert chances.sum() >= share * (1 - 1e-9)
+    assert chances[:-1].sum() < share
+    assert chances[-1] >= np.delete(result.chances, cells).max(initial=0.0)
 
 
-def test_entropy_counts_in_bits() -> None:
+def test_entropy_is_in_bits() -> None:
     loglik = np.full(len(DATABASE), -np.inf)
     loglik[3] = -700.0
     assert posterior(DATABASE, loglik).entropy == 0.0
@@ -104,7 +102,7 @@ BOX = shapely.box(0.0, 0.0, 100.0, 100.0)
 INSIDE = (DATABASE.xy <= 100.0).all(axis=1)
 
 
-def test_an_area_keeps_its_cells_alone() -> None:
+def test_an_area_prior_excludes_cells_outside() -> None:
     prior = area_prior(DATABASE, BOX)
     assert INSIDE.any()
     assert np.array_equal(np.isfinite(prior), INSIDE)
@@ -148,7 +146,7 @@ PARIS = replace(
         (DIAGONAL, "45m,45m,20", "X,Y"),
     ],
 )
-def test_a_position_is_read_as_what_is_in_the_city(
+def test_a_position_is_read_as_the_form_that_is_in_the_city(
     database: SignatureDatabase, text: str, form: str
 ) -> None:
     position = KnownPosition.parse(text, database)
@@ -177,7 +175,7 @@ def test_a_position_is_read_as_what_is_in_the_city(
         (PARIS, "48.9,2.3,nan", "is nan; give a number from 0.01"),
     ],
 )
-def test_a_position_that_is_not_one_place_of_the_city_is_refused(
+def test_a_position_without_exactly_one_reading_in_the_city_is_refused(
     database: SignatureDatabase, text: str, words: str
 ) -> None:
     with refused(InputError, words):
@@ -185,7 +183,9 @@ def test_a_position_that_is_not_one_place_of_the_city_is_refused(
 
 
 @given(LOGLIKS, LOGLIKS)
-def test_the_ratio_of_a_prior(loglik: NDArray[np.float64], log_prior: NDArray[np.float64]) -> None:
+def test_prior_ratio_equals_its_formula(
+    loglik: NDArray[np.float64], log_prior: NDArray[np.float64]
+) -> None:
     prior = np.exp(log_prior) / np.exp(log_prior).sum()
     expected = (prior * np.exp(loglik)).sum() / np.exp(loglik).mean()
     assert prior_ratio(loglik, log_prior) == pytest.approx(expected)
@@ -202,13 +202,13 @@ def test_weights_and_priors_add_up() -> None:
     assert chances == pytest.approx(weights * INSIDE / (weights @ INSIDE))
 
 
-def raster(folder: Path, values: object, *, left: float = 0.0, nodata: float | None = None) -> Path:
+def raster(folder: Path, values: object, *, west: float = 0.0, nodata: float | None = None) -> Path:
     """Write a raster of pixels of 100 m from the corner of the grid; the first row is southern."""
     bands = np.asarray(values, dtype=np.float64)[None, ::-1]
     path = folder / "raster.tif"
     options = {"driver": "GTiff", "count": 1, "dtype": "float64", "crs": "EPSG:2154"}
     shape = {"height": bands.shape[1], "width": bands.shape[2], "nodata": nodata}
-    place = rasterio.Affine(100, 0, left, 0, -100, 100 * bands.shape[1])
+    place = rasterio.Affine(100, 0, west, 0, -100, 100 * bands.shape[1])
     with rasterio.open(path, "w", transform=place, **options, **shape) as file:
         file.write(bands)
     return path
@@ -218,12 +218,12 @@ def raster(folder: Path, values: object, *, left: float = 0.0, nodata: float | N
     ("values", "nodata", "weights"),
     [
         ([[1.0, 4.0], [0.0, 2.5]], None, [[1.0, 4.0], [0.0, 2.5]]),
-        # Where it tells nothing, by a value or beyond its edge, the least weight is taken.
+        # Cells without data or beyond the edge get the least weight.
         ([[3.0, -1.0], [0.0, 8.0]], -1.0, [[3.0, 3.0], [0.0, 8.0]]),
         ([[6.0], [2.0]], None, [[6.0, 2.0], [2.0, 2.0]]),
     ],
 )
-def test_a_raster_weighs_the_cells(
+def test_raster_values_are_weights_of_cells(
     tmp_path: Path, values: list[list[float]], nodata: float | None, weights: list[list[float]]
 ) -> None:
     chances = np.exp(raster_prior(DATABASE, raster(tmp_path, values, nodata=nodata)))
@@ -233,7 +233,7 @@ def test_a_raster_weighs_the_cells(
 
 
 @pytest.mark.parametrize(
-    ("values", "left", "fault"),
+    ("values", "west", "fault"),
     [
         ([[1.0]], 1e5, "has no data at any cell"),
         (np.zeros((2, 2)), 0.0, "excludes every cell"),
@@ -242,10 +242,10 @@ def test_a_raster_weighs_the_cells(
         ([[0.0]], 0.0, "excludes every cell"),
     ],
 )
-def test_a_raster_that_says_nothing_usable_is_refused(
-    tmp_path: Path, values: object, left: float, fault: str
+def test_a_raster_without_usable_values_is_refused(
+    tmp_path: Path, values: object, west: float, fault: str
 ) -> None:
-    path = raster(tmp_path, values, left=left)
+    path = raster(tmp_path, values, west=west)
     with refused(InputError, fault):
         raster_prior(DATABASE, path)
 
@@ -258,7 +258,7 @@ legs = st.builds(
 
 
 def share(way: float, cells: int, sigma: float) -> float:
-    """Integrate the chance to move by so many cells of 10 m, by the sum of many steps."""
+    """Integrate the chance to move by a number of cells of 10 m, as a sum of many steps."""
     noise = np.linspace(-6, 6, 1201) if sigma else np.zeros(1)
     weights = np.exp(-0.5 * noise**2)
     triangle = np.maximum(1 - np.abs((way + sigma * noise) / 10.0 - cells), 0.0)
@@ -272,8 +272,8 @@ def test_chances_move_as_a_sum_over_all_pairs_of_cells(seed: int, leg: Leg) -> N
     columns, rows = database.columns.tolist(), database.rows.tolist()
     slow = np.zeros(30)
     for to, of in np.ndindex(30, 30):
-        aside = share(leg.dx, columns[to] - columns[of], leg.sigma)
-        slow[to] += aside * share(leg.dy, rows[to] - rows[of], leg.sigma) * chances[of]
+        across = share(leg.dx, columns[to] - columns[of], leg.sigma)
+        slow[to] += across * share(leg.dy, rows[to] - rows[of], leg.sigma) * chances[of]
     assert moved_chances(database, chances, leg) == pytest.approx(slow, abs=2e-4)
 
 
@@ -293,33 +293,33 @@ def test_smoothing_is_the_sum_over_all_routes(seed: int, ways: list[Leg]) -> Non
             + [steps[view][route[view], route[view + 1]] for view in range(len(ways))]
         )
         slow[range(len(route)), route] += weight
-    found = route_posteriors(database, list(logliks), ways)
-    for one, expected in zip(found, slow, strict=True):
+    posteriors = route_posteriors(database, list(logliks), ways)
+    for result, expected in zip(posteriors, slow, strict=True):
         # The shares that are left out of a blur make a small difference.
-        assert one.chances == pytest.approx(expected / expected.sum(), abs=2e-3)
+        assert result.chances == pytest.approx(expected / expected.sum(), abs=2e-3)
 
 
 def test_routes_of_one_view_and_out_of_the_city() -> None:
     loglik = np.random.default_rng(0).normal(0, 1, len(DATABASE))
-    (found,) = route_posteriors(DATABASE, [loglik], [], log_prior=-loglik)
-    assert found.chances == pytest.approx(1 / len(DATABASE))
+    (result,) = route_posteriors(DATABASE, [loglik], [], log_prior=-loglik)
+    assert result.chances == pytest.approx(1 / len(DATABASE))
     leg = Leg.towards(180.0, 1e6, sigma=1.0)
     assert (leg.dx, leg.dy, leg.sigma) == pytest.approx((0.0, -1e6, 1.0), abs=1e-6)
     away = route_posteriors(DATABASE, [FLAT, FLAT], [leg])
-    assert all(one.chances.sum() == pytest.approx(1.0) for one in away)
+    assert all(view.chances.sum() == pytest.approx(1.0) for view in away)
 
 
 # --- Whether to answer ------------------------------------------------------------------------
 
 
 def queries(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return chances and outcomes of a model that is too sure of itself."""
+    """Return chances and outcomes of an over-confident model."""
     rng = np.random.default_rng(seed)
     masses = np.where(rng.random(count) < 0.5, rng.beta(1, 5, count), rng.beta(20, 1, count))
     return masses, rng.random(count) < masses**1.3
 
 
-def test_the_promise_is_kept() -> None:
+def test_calibrated_rules_keep_their_precision() -> None:
     masses, correct = queries(99, 200_000)
     broken = 0
     for seed in range(150):
@@ -330,7 +330,7 @@ def test_the_promise_is_kept() -> None:
     assert rule.coverage > 0.2
 
 
-def test_counts_are_those_of_the_threshold() -> None:
+def test_calibration_counts_match_the_threshold() -> None:
     masses, correct = queries(0, 2000)
     rule = calibrate(masses, correct, precision=0.9, radius=25.0)
     answered = masses >= rule.threshold
@@ -339,7 +339,7 @@ def test_counts_are_those_of_the_threshold() -> None:
     assert (rule.radius, rule.coverage) == (25.0, answered.mean())
 
 
-def test_too_few_queries_prove_nothing() -> None:
+def test_too_few_queries_give_no_threshold() -> None:
     rule = calibrate(np.ones(100), np.ones(100, bool))
     assert (rule.threshold, rule.answered, rule.answers(1.0)) == (math.inf, 0, False)
     assert calibrate(np.ones(217), np.ones(217, bool)).threshold == 1.0
@@ -349,7 +349,7 @@ def test_too_few_queries_prove_nothing() -> None:
     assert calibrate(np.full(1000, 0.9), np.arange(1000) < 600).threshold == math.inf
 
 
-def test_a_posterior_is_decided_on() -> None:
+def test_a_rule_decides_on_a_posterior() -> None:
     chances = posterior(DATABASE, np.where(np.arange(len(DATABASE)) == 7, 0.0, -50.0))
     answer = AnswerRule(threshold=0.9).decide(chances)
     assert answer.given
@@ -369,7 +369,7 @@ def test_a_rule_is_saved_and_opened(tmp_path: Path, threshold: float) -> None:
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"threshold": "a"}', '{"threshold": 1, "more": 2}']
 )
-def test_damaged_rules(tmp_path: Path, text: str) -> None:
+def test_damaged_rules_are_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "rule.json").write_text(text)
     with refused(InputError, "rule.json", "save_rule"):
         open_rule(tmp_path / "rule.json")

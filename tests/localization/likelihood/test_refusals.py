@@ -1,4 +1,4 @@
-"""What the parts of the likelihood method refuse, each in one sentence that says what to give."""
+"""Errors of the likelihood method for invalid arguments."""
 
 from __future__ import annotations
 
@@ -139,8 +139,6 @@ CASES: list[tuple[Callable[[], object], str, str]] = [
 
 
 @pytest.mark.parametrize(("call", "fault", "remedy"), CASES)
-def test_what_cannot_be_used_is_refused(
-    call: Callable[[], object], fault: str, remedy: str
-) -> None:
+def test_invalid_arguments_are_refused(call: Callable[[], object], fault: str, remedy: str) -> None:
     with refused(InputError, fault, remedy):
         call()

@@ -1,4 +1,4 @@
-"""The oracle of views itself: it is a density, and agrees with what is known of full turns."""
+"""The oracle of views: it is a density, and agrees with the kernels on full turns."""
 
 from __future__ import annotations
 
@@ -36,9 +36,7 @@ PHOTO = Photo(sectors=((0.0, 50.0), (350.0, 355.0)))
 
 @pytest.mark.parametrize("ranged", [False, True])
 @pytest.mark.parametrize("form", [exact_loglik, set_loglik])
-def test_the_chances_of_none_and_of_one_detection_are_those_of_the_process(
-    form: type, *, ranged: bool
-) -> None:
+def test_chances_of_no_and_one_detection_equal_the_process(form: type, *, ranged: bool) -> None:
     scene = Scene(things=(LAMP,), clutter=(0.5, 0.3), reach=30.0)
     inside = 0.8 * mass_inside(45.0, 6.0, PHOTO)
     false = 0.8 * 55.0 / 360.0
@@ -51,22 +49,22 @@ def test_the_chances_of_none_and_of_one_detection_are_those_of_the_process(
         for row in ((1.0, 0.0), (0.0, 1.0))
         for metres in ranges
     ]
-    found = sum(each) * (steps[1] - steps[0] if ranged else 1.0)
+    result = sum(each) * (steps[1] - steps[0] if ranged else 1.0)
     expected = math.exp(-false) * ((1 - inside) * false + inside)
-    assert found == pytest.approx(expected, rel=2e-3)
+    assert result == pytest.approx(expected, rel=2e-3)
 
 
 @settings(max_examples=15)
 @given(st.integers(0, 10_000), mixtures(), st.integers(1, 4))
-def test_of_a_full_turn_it_is_what_it_was(seed: int, noise: NoiseSpec, size: int) -> None:
+def test_full_turns_equal_the_kernel(seed: int, noise: NoiseSpec, size: int) -> None:
     database = random_database(seed, cells=6, longest=4)
     query = random_query(database, seed, size=size)
-    found = cell_loglik(database, query, noise, 0)
+    loglik = cell_loglik(database, query, noise, 0)
     near = score_associations(database, query, noise, np.zeros(1, np.int64))[0]
-    assert near - 1e-2 <= found <= near + 0.35 * size + 1e-2
+    assert near - 1e-2 <= loglik <= near + 0.35 * size + 1e-2
 
 
-def test_associations_are_summed_as_elsewhere() -> None:
+def test_sums_over_associations_equal_an_independent_sum() -> None:
     rng = np.random.default_rng(3)
     things = [
         Thing(
@@ -80,15 +78,15 @@ def test_associations_are_summed_as_elsewhere() -> None:
         for bearing in (10.0, 30.0, 50.0)
     ]
     scene = Scene(things=things, clutter=(1.0, 1.0), reach=30.0)
-    seen = [Glimpse(bearing=float(a), weights=(1.0, 0.0)) for a in rng.uniform(0, 60, 3)]
+    glimpses = [Glimpse(bearing=float(a), weights=(1.0, 0.0)) for a in rng.uniform(0, 60, 3)]
     weights = np.array(
-        [[set_loglik(Scene(things=[one], clutter=(1.0, 1.0), reach=30.0), [each], FULL_VIEW)
-          for each in seen] for one in things]
+        [[set_loglik(Scene(things=[thing], clutter=(1.0, 1.0), reach=30.0), [glimpse], FULL_VIEW)
+          for glimpse in glimpses] for thing in things]
     )  # fmt: skip
-    alone = math.log(0.3) - 2.0 + math.log(1 / 360)
-    pairs, _ = every_association(np.exp(weights - alone) - 1.0)
+    empty = math.log(0.3) - 2.0 + math.log(1 / 360)
+    pairs, _ = every_association(np.exp(weights - empty) - 1.0)
     expected = pairs + 3 * math.log(0.3) - 2.0 + 3 * math.log(1 / 360)
-    assert exact_loglik(scene, seen, FULL_VIEW) == pytest.approx(expected)
+    assert exact_loglik(scene, glimpses, FULL_VIEW) == pytest.approx(expected)
 
 
 def test_photos_multiply_and_turns_are_summed() -> None:
@@ -96,11 +94,11 @@ def test_photos_multiply_and_turns_are_summed() -> None:
     noise = NoiseSpec(fading={"all": ((10.0, 1.0), (30.0, 0.2))}, position_sigma=1.0)
     photos = (Photo.looking(heading=20, fov=70), Photo.looking(heading=200, fov=50))
     view = random_view(database, np.random.default_rng(0), size=2, photos=photos)
-    one, other = (cell_loglik(database, part, noise, 0) for part in view.split())
-    assert cell_loglik(database, view, noise, 0) == pytest.approx(one + other)
+    first, second = (cell_loglik(database, part, noise, 0) for part in view.split())
+    assert cell_loglik(database, view, noise, 0) == pytest.approx(first + second)
     turns = [[(0.0, 0.5), (20.0, 0.5)], [(0.0, 1.0)]]
     turned = cell_loglik(database, view.split()[0].turned(20.0), noise, 0)
-    expected = np.logaddexp(one, turned) - math.log(2.0) + other
-    found = cell_loglik(database, view, noise, 0, headings=turns)
-    assert found == pytest.approx(expected)
-    assert found != pytest.approx(cell_loglik(database, view, noise, 0, form=set_loglik))
+    expected = np.logaddexp(first, turned) - math.log(2.0) + second
+    result = cell_loglik(database, view, noise, 0, headings=turns)
+    assert result == pytest.approx(expected)
+    assert result != pytest.approx(cell_loglik(database, view, noise, 0, form=set_loglik))

@@ -1,4 +1,4 @@
-"""Noise models, and what they say in numbers."""
+"""Noise models and their tables."""
 
 from __future__ import annotations
 
@@ -65,9 +65,7 @@ if TYPE_CHECKING:
         ({"specs": [{"clutter": -1}], "weights": [1]}, "clutter of the noise is -1"),
     ],
 )
-def test_what_cannot_be_a_model_is_refused_in_a_sentence(
-    values: dict[str, object], fault: str
-) -> None:
+def test_invalid_models_are_refused(values: dict[str, object], fault: str) -> None:
     with refused(InputError, fault):
         noise_from_dict(values)
 
@@ -77,7 +75,7 @@ def test_what_cannot_be_a_model_is_refused_in_a_sentence(
     st.text(st.characters(codec="utf-8")),
     st.sampled_from(["json", "toml", "TOML"]),
 )
-def test_any_model_survives_a_file(
+def test_models_are_equal_after_a_file(
     tmp_path_factory: pytest.TempPathFactory, noise: Noise, name: str, suffix: str
 ) -> None:
     file = tmp_path_factory.mktemp("noise") / f"noise.{suffix}"
@@ -106,7 +104,7 @@ def test_a_file_and_a_name_without_a_model_are_refused(tmp_path: Path) -> None:
         named_noise("genric")
 
 
-# --- In numbers -------------------------------------------------------------------------------
+# --- Tables -------------------------------------------------------------------------------
 
 CODES = np.array([1, 3, 4], np.uint8)
 NAMES = ["alignment_tree", "street_light", "indicator"]
@@ -119,10 +117,10 @@ def tables_of(noise: Noise, longest: int) -> tuple[tuple[NoiseTable, ...], np.nd
 def slow_named(spec: NoiseSpec, kind: int, name: int, length: int) -> float:
     """Return the chance of a name, one number at a time."""
     misnamed = spec.misnamed_by_class.get(NAMES[kind], spec.misnamed)
-    alike = dict.fromkeys(NAMES, misnamed / 2) | {NAMES[kind]: 1 - misnamed}
-    row = spec.confusion.get(NAMES[kind], alike)
-    shares = [row.get(one, 0.0) for one in NAMES]
-    wrong = sum(share for one, share in enumerate(shares) if one != kind)
+    equal = dict.fromkeys(NAMES, misnamed / 2) | {NAMES[kind]: 1 - misnamed}
+    row = spec.confusion.get(NAMES[kind], equal)
+    shares = [row.get(other, 0.0) for other in NAMES]
+    wrong = sum(share for other, share in enumerate(shares) if other != kind)
     right = shares[kind] * (1 - 1 / length) ** spec.misnamed_each
     right = 1 - min(max(1 - right, 1e-3), 0.95)
     if name == kind:
@@ -132,7 +130,7 @@ def slow_named(spec: NoiseSpec, kind: int, name: int, length: int) -> float:
 
 
 @given(noise_specs(), st.integers(1, 30))
-def test_a_table_says_what_the_model_says(spec: NoiseSpec, length: int) -> None:
+def test_tables_have_the_values_of_the_model(spec: NoiseSpec, length: int) -> None:
     (table,), weights = tables_of(spec, 30)
     assert weights.tolist() == [1.0]
     for kind, name in enumerate(NAMES):
@@ -150,36 +148,36 @@ def test_a_table_says_what_the_model_says(spec: NoiseSpec, length: int) -> None:
 
 
 @pytest.mark.parametrize("level", ["light", "medium", "strong"])
-def test_the_levels_predict_what_the_distortion_does(level: str) -> None:
+def test_levels_predict_the_distortion(level: str) -> None:
     length, draws = 20, 3000
     rng = np.random.default_rng(3)
     true = Signature(np.full(length, 1, np.uint8), np.arange(0.0, 360.0, 18.0))
-    seen = [distort(true, named_distortion(level), classes=CODES, rng=rng) for _ in range(draws)]
+    queries = [distort(true, named_distortion(level), classes=CODES, rng=rng) for _ in range(draws)]
     (table,), _ = tables_of(named_noise(level), length)
     detected = (1 - table.missed[length, 0]) * length
     expected = detected + table.clutter.sum()
-    # A false object may itself be missed again, which the model does not tell.
-    assert np.mean([len(one) for one in seen]) == pytest.approx(expected, abs=0.6)
-    wrong = np.mean([np.count_nonzero(one.codes != 1) for one in seen])
+    # A false object may itself be missed again, which the model does not include.
+    assert np.mean([len(query) for query in queries]) == pytest.approx(expected, abs=0.6)
+    wrong = np.mean([np.count_nonzero(query.codes != 1) for query in queries])
     modelled = detected * table.misnamed[length, 0] + table.clutter.sum() * 2 / 3
     assert wrong == pytest.approx(modelled, rel=0.25)
 
 
 @given(noise_specs(), noise_specs())
-def test_a_mean_lies_between_its_models(one: NoiseSpec, other: NoiseSpec) -> None:
-    mixture = NoiseMixture(specs=(one, other), weights=(0.25, 0.75))
+def test_a_mean_lies_between_its_models(first: NoiseSpec, second: NoiseSpec) -> None:
+    mixture = NoiseMixture(specs=(first, second), weights=(0.25, 0.75))
     both, weights = tables_of(mixture, 9)
     mean = mean_table(both, weights)
     for name in ("missed", "misnamed", "clutter", "sigma", "others"):
         values = [getattr(table, name) for table in both]
-        found = getattr(mean, name)
-        assert (found >= np.minimum(*values) - 1e-12).all()
-        assert (found <= np.maximum(*values) + 1e-12).all()
+        value = getattr(mean, name)
+        assert (value >= np.minimum(*values) - 1e-12).all()
+        assert (value <= np.maximum(*values) + 1e-12).all()
     assert np.allclose(mean.named.sum(axis=2), 1.0)
     assert np.allclose(mean.missed, 0.25 * both[0].missed + 0.75 * both[1].missed)
 
 
-def test_a_position_that_is_not_known_turns_near_objects_most() -> None:
+def test_position_uncertainty_turns_near_objects_most() -> None:
     spec = NoiseSpec(bearing_sigma=5.0, position_sigma=3.0)
     (table,), _ = tables_of(spec, 9)
     sigmas = table.sigmas
@@ -194,7 +192,7 @@ def test_a_single_class_is_never_misnamed() -> None:
     assert (table.named == 1.0).all()
 
 
-def test_queries_are_checked_for_their_classes() -> None:
+def test_query_rows_are_class_rows() -> None:
     (table,), _ = tables_of(NoiseSpec(), 9)
     assert table.query_rows(Signature(np.array([4, 0, 1], np.uint8), None)).tolist() == [2, 3, 0]
     assert table.query_rows(Signature(None, np.array([4.0]))).tolist() == [3]

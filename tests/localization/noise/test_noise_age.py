@@ -1,4 +1,4 @@
-"""Noise for old maps: what it says in numbers, and whether its chances come true."""
+"""Noise for old maps: its values, and the calibration of its chances."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def change(name: str, before: int, **counts: float) -> ClassChange:
     return ClassChange(class_name=name, before=before, **values)
 
 
-MANY = 10**9  # objects, so that no class is drawn to the others
+MANY = 10**9  # objects, so that no class rate is shrunk
 HALVED = Drift(
     years=2.0,
     classes=tuple(
@@ -57,7 +57,7 @@ LEAPT = Drift(
 )
 
 
-def test_what_has_gone_is_missed_what_has_come_is_false_and_what_moved_is_blurred() -> None:
+def test_map_age_changes_misses_clutter_and_sigma() -> None:
     spec = NoiseSpec(detection=0.8, clutter=2.0, position_sigma=1.0)
     aged = aged_noise(spec, 4.0, database=CITY, drift=HALVED)
     assert isinstance(aged, NoiseSpec)
@@ -73,23 +73,23 @@ def test_what_has_gone_is_missed_what_has_come_is_false_and_what_moved_is_blurre
     assert far.clutter == pytest.approx(2.0 + 0.5 * SEEN.sum())
 
 
-def test_every_model_of_a_mixture_ages_and_a_map_of_today_changes_nothing() -> None:
+def test_age_changes_every_model_of_a_mixture_and_age_zero_none() -> None:
     generic = named_noise("generic")
     aged = aged_noise(generic, 1.5, database=CITY)
     assert (aged.name, aged.weights) == ("1.5-year-old map with generic", generic.weights)
-    assert [one.name for one in aged.specs] == ["light", "medium", "strong"]
+    assert [spec.name for spec in aged.specs] == ["light", "medium", "strong"]
     assert aged_noise(generic, 0.0, database=CITY) is generic
 
 
-def test_classes_of_few_objects_are_drawn_to_all_together() -> None:
+def test_rates_of_small_classes_are_shrunk_to_the_overall_rate() -> None:
     few = Drift(years=1.0, classes=(change(NAMES[0], 2), change(NAMES[1], 90, removed=46)))
     aged = aged_noise(NoiseSpec(detection=1.0), 1.0, database=CITY, drift=few)
     assert isinstance(aged, NoiseSpec)
-    gone = 1.0 - np.array([aged.detection_by_class[name] for name in NAMES[:3]])
-    assert gone == pytest.approx([8 * 0.5 / 10, (46 + 8 * 0.5) / 98, 0.5])
+    removals = 1.0 - np.array([aged.detection_by_class[name] for name in NAMES[:3]])
+    assert removals == pytest.approx([8 * 0.5 / 10, (46 + 8 * 0.5) / 98, 0.5])
 
 
-def test_learning_leaves_out_what_the_age_explains() -> None:
+def test_fresh_noise_is_the_inverse_of_aged_noise() -> None:
     spec = NoiseSpec(detection=0.8, clutter=2.0)
     aged = aged_noise(spec, 3.0, database=CITY)
     assert isinstance(aged, NoiseSpec)
@@ -105,22 +105,22 @@ def test_learning_leaves_out_what_the_age_explains() -> None:
 
 def test_ranges_and_fading_do_not_age() -> None:
     fading = {"all": ((10.0, 1.0), (30.0, 0.4)), NAMES[0]: ((5.0, 0.9), (30.0, 0.1))}
-    kept: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "fading": fading,
         "range_sigma": 0.3,
         "range_sigma_by_class": {NAMES[1]: 0.5},
     }
-    spec = NoiseSpec(detection=0.8, clutter=2.0, **kept)
+    spec = NoiseSpec(detection=0.8, clutter=2.0, **fields)
     aged = aged_noise(spec, 3.0, database=CITY)
     assert isinstance(aged, NoiseSpec)
-    for one in (aged, fresh_noise(aged, 3.0, database=CITY), cell_noise(aged, 10.0)):
-        assert {name: getattr(one, name) for name in kept} == kept
+    for noise in (aged, fresh_noise(aged, 3.0, database=CITY), cell_noise(aged, 10.0)):
+        assert {name: getattr(noise, name) for name in fields} == fields
 
 
-def test_the_shipped_drift_is_of_classes_of_the_catalogue() -> None:
+def test_the_built_in_drift_has_classes_of_the_catalogue() -> None:
     drift = named_drift()
-    known = {item.name for item in load_catalog("openstreetmap").taxonomy.classes}
-    assert {item.class_name for item in drift.classes} <= known
+    names = {item.name for item in load_catalog("openstreetmap").taxonomy.classes}
+    assert {item.class_name for item in drift.classes} <= names
     assert drift.years == 1.24
 
 
@@ -158,7 +158,7 @@ BENCH = {"class_name": "bench", "before": 5}
         ({"years": 1, "classes": [{**BENCH, "before": 0}]}, "has no objects from before"),
     ],
 )
-def test_what_is_no_drift_is_refused(tmp_path: Path, values: object, fault: str) -> None:
+def test_invalid_drifts_are_refused(tmp_path: Path, values: object, fault: str) -> None:
     (tmp_path / "drift.json").write_text(json.dumps(values))
     with refused(InputError, fault):
         open_drift(tmp_path / "drift.json")
@@ -171,7 +171,7 @@ def test_an_age_out_of_its_range_is_refused(years: float) -> None:
             change_noise(NoiseSpec(), years, database=CITY)
 
 
-def test_chances_on_an_old_map_come_true_once_its_age_is_told() -> None:
+def test_chances_on_an_old_map_are_calibrated_with_its_age() -> None:
     """Objects go, come and move, one by one and whole rows, by other rules than the model has."""
     layers = synthetic_city(CitySpec(size=500.0, seed=3))
     old, _ = build_objects(layers, taxonomy=paper_taxonomy(), crs=layers[0].table.crs)

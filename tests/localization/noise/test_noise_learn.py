@@ -46,24 +46,25 @@ TRUTH = {"detection": DETECTION, "misnamed": MISNAMED, "clutter": CLUTTER, "bear
 DATABASE = random_database(1, cells=200)
 
 
-def detector(seed: int, seen: list[tuple[int, float]]) -> Signature:
+def detector(seed: int, objects: list[tuple[int, float]]) -> Signature:
     """Detect things as a plain loop over the throws of dice."""
     dice = random.Random(seed)  # noqa: S311
-    given: list[tuple[float, int]] = []
-    for code, bearing in seen:
+    detections: list[tuple[float, int]] = []
+    for code, bearing in objects:
         if dice.random() < DETECTION[code]:
             name = code
             if dice.random() < MISNAMED[code]:
                 name = dice.choice([other for other in DETECTION if other != code])
-            given.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name))
+            detections.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name))
     for code, rate in CLUTTER.items():
         alive = dice.random()
         while alive > math.exp(-rate):  # Knuth's Poisson numbers
-            given.append((dice.uniform(0, 360), code))
+            detections.append((dice.uniform(0, 360), code))
             alive *= dice.random()
-    given.sort()
+    detections.sort()
     return Signature(
-        np.array([code for _, code in given], np.uint8), np.array([angle for angle, _ in given])
+        np.array([code for _, code in detections], np.uint8),
+        np.array([angle for angle, _ in detections]),
     )
 
 
@@ -73,8 +74,8 @@ def simulated(database: SignatureDatabase, count: int, *, seed: int = 0) -> list
     for number in range(count):
         cell = number % len(database)
         part = slice(views.offsets[cell], views.offsets[cell + 1])
-        seen = zip(views.codes[part].tolist(), views.bearings[part].tolist(), strict=True)
-        signature = detector(seed * 100_000 + number, list(seen))
+        objects = zip(views.codes[part].tolist(), views.bearings[part].tolist(), strict=True)
+        signature = detector(seed * 100_000 + number, list(objects))
         samples.append(Sample(signature=signature, cell_id=int(database.cell_ids[cell])))
     return samples
 
@@ -113,29 +114,31 @@ def test_the_true_rates_are_recovered_within_their_intervals(estimate: NoiseEsti
     assert estimate.confusion.to_numpy().sum() == pytest.approx(detected, rel=1e-6)
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+def test_intervals_have_their_coverage() -> None:
     database = random_database(2, cells=100, longest=8)
     inside = []
     for seed in range(12):
-        found = learn_noise(simulated(database, 250, seed=seed + 1), database)
-        inside += [low <= true <= high for true, low, high in truths(found)]
+        estimate = learn_noise(simulated(database, 250, seed=seed + 1), database)
+        inside += [low <= true <= high for true, low, high in truths(estimate)]
     assert 0.88 <= np.mean(inside) <= 0.995
 
 
-def test_a_class_of_few_samples_is_drawn_to_the_whole() -> None:
+def test_rates_of_a_rare_class_are_shrunk_to_the_overall_rate() -> None:
     rare = 5
     codes = DATABASE.codes.copy()
     codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
-    found = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
+    estimate = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
     name = TAXONOMY.by_code(rare).name
-    row = found.rates[(found.rates["quantity"] == "detection") & (found.rates["class"] == name)]
-    overall = found.spec.detection
+    row = estimate.rates[
+        (estimate.rates["quantity"] == "detection") & (estimate.rates["class"] == name)
+    ]
+    overall = estimate.spec.detection
     assert row["samples"].item() == 2
     assert abs(row["value"].item() - overall) < abs(row["own"].item() - overall) + 1e-9
     assert row["value"].item() == pytest.approx(overall, abs=0.2)
 
 
-def test_places_in_cells_turn_bearings() -> None:
+def test_position_uncertainty_is_not_learnt_as_bearing_noise() -> None:
     rng = np.random.default_rng(0)
     world = World(
         tuple((x, y, int(rng.choice(CODES[:2]))) for x, y in rng.uniform(0, 300, (90, 2)))
@@ -147,28 +150,28 @@ def test_places_in_cells_turn_bearings() -> None:
         away = objects.xy - xy
         near = np.flatnonzero(np.hypot(*away.T) <= 30.0)
         angles = np.degrees(np.arctan2(away[near, 0], away[near, 1])) + rng.normal(0, 2, len(near))
-        seen = Signature(objects.codes[near], np.asarray(angles % 360.0))
-        samples.append(Sample(signature=seen, xy=(float(xy[0]), float(xy[1]))))
+        signature = Signature(objects.codes[near], np.asarray(angles % 360.0))
+        samples.append(Sample(signature=signature, xy=(float(xy[0]), float(xy[1]))))
     exact = learn_noise(samples, objects)
     assert exact.spec.bearing_sigma == pytest.approx(2.0, abs=0.15)
     assert exact.spec.detection > 0.99
-    lost = Sample(signature=samples[0].signature, xy=(9e6, 9e6))
-    with_lost = learn_noise([lost, *samples], objects)
-    assert (with_lost.skipped, with_lost.spec) == (exact.skipped + 1, exact.spec)
+    distant = Sample(signature=samples[0].signature, xy=(9e6, 9e6))
+    with_distant = learn_noise([distant, *samples], objects)
+    assert (with_distant.skipped, with_distant.spec) == (exact.skipped + 1, exact.spec)
     naive = learn_noise(samples, database)
-    told = learn_noise(samples, database, position_sigma=10 / math.sqrt(12))
-    assert naive.spec.bearing_sigma > 2 * told.spec.bearing_sigma
-    assert told.spec.position_sigma == pytest.approx(2.89, abs=0.01)
-    assert told.skipped == naive.skipped > 0
+    informed = learn_noise(samples, database, position_sigma=10 / math.sqrt(12))
+    assert naive.spec.bearing_sigma > 2 * informed.spec.bearing_sigma
+    assert informed.spec.position_sigma == pytest.approx(2.89, abs=0.01)
+    assert informed.skipped == naive.skipped > 0
 
 
-def test_one_class_alone() -> None:
+def test_a_single_class_is_learnt() -> None:
     database = random_database(4, classes=1)
     ids = enumerate(database.cell_ids.tolist())
     samples = [Sample(signature=database.signature(cell), cell_id=number) for cell, number in ids]
-    found = learn_noise(samples, database)
-    assert found.spec.detection > 0.98
-    assert found.spec.confusion == {"alignment_tree": {"alignment_tree": 1.0}}
+    estimate = learn_noise(samples, database)
+    assert estimate.spec.detection > 0.98
+    assert estimate.spec.confusion == {"alignment_tree": {"alignment_tree": 1.0}}
 
 
 # --- Views ------------------------------------------------------------------------------------
@@ -182,7 +185,7 @@ def left(distance: float) -> float:
     return float(np.interp(distance, METRES, LEFT))
 
 
-def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
+def photographer(seed: int, objects: list[tuple[int, float, float]]) -> View:
     """Take two photos of things with their bearings and distances, by a plain loop."""
     dice = random.Random(seed)  # noqa: S311
     photos = tuple(
@@ -191,20 +194,20 @@ def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
     )
     rows: list[tuple[float, int, float, int]] = []
     for number, photo in enumerate(photos):
-        found = []
-        for code, bearing, distance in seen:
+        detections = []
+        for code, bearing, distance in objects:
             if dice.random() < DETECTION[code] * left(distance):
                 name = code
                 if dice.random() < MISNAMED[code]:
                     name = dice.choice([other for other in DETECTION if other != code])
                 metres = max(distance, 0.1) * math.exp(dice.gauss(0, RANGE_SIGMA[code]))
-                found.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name, metres))
+                detections.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name, metres))
         for code, rate in CLUTTER.items():
             alive = dice.random()
             while alive > math.exp(-3 * rate):
-                found.append((dice.uniform(0, 360), code, 30 * math.sqrt(dice.random())))
+                detections.append((dice.uniform(0, 360), code, 30 * math.sqrt(dice.random())))
                 alive *= dice.random()
-        rows += [(*one, number) for one in found if photo.sees(one[0])]
+        rows += [(*detection, number) for detection in detections if photo.sees(detection[0])]
     scores = np.zeros((len(rows), 256))
     for row, (_, name, _, _) in enumerate(rows):
         both = [name, dice.choice([other for other in DETECTION if other != name])]
@@ -213,11 +216,11 @@ def photographer(seed: int, seen: list[tuple[int, float, float]]) -> View:
         if dice.random() < 0.5:
             scores[row] = np.eye(256)[name]
     columns = np.array(rows, np.float64).reshape(-1, 4).T
-    told = [dice.random() < 0.7 for _ in rows]
+    ranged = [dice.random() < 0.7 for _ in rows]
     return View(
         columns[1].astype(np.uint8),
         columns[0],
-        ranges=np.where(told, columns[2], np.nan),
+        ranges=np.where(ranged, columns[2], np.nan),
         scores=scores,
         photo=columns[3].astype(np.int64),
         photos=photos,
@@ -233,8 +236,8 @@ def photographed(count: int, *, seed: int = 0) -> NoiseEstimate:
         cell = number % len(database)
         part = slice(views.offsets[cell], views.offsets[cell + 1])
         columns = (views.codes, views.bearings, views.distances)
-        seen = list(zip(*(column[part].tolist() for column in columns), strict=True))
-        view = photographer(seed * 100_000 + number, seen)
+        objects = list(zip(*(column[part].tolist() for column in columns), strict=True))
+        view = photographer(seed * 100_000 + number, objects)
         samples.append(Sample(signature=view, cell_id=int(database.cell_ids[cell])))
     return learn_noise(samples, database)
 
@@ -247,20 +250,20 @@ def photo_truth(quantity: str, code: int, distance: float) -> float:
     return {**TRUTH, "range_sigma": RANGE_SIGMA}[quantity][code]
 
 
-def test_photos_teach_what_panoramas_teach_and_ranges_and_fading() -> None:
+def test_photos_recover_rates_ranges_and_fading() -> None:
     codes = {item.name: item.code for item in TAXONOMY.classes}
     inside = []
     for seed in range(2):
-        found = photographed(800, seed=seed)
-        rows = found.rates[found.rates["class"] != ALL].to_dict("records")
+        estimate = photographed(800, seed=seed)
+        rows = estimate.rates[estimate.rates["class"] != ALL].to_dict("records")
         assert len(rows) == 4 * (5 + 4)
-        for one in rows:
-            true = photo_truth(one["quantity"], codes[one["class"]], one["distance"])
-            inside.append(one["low_95"] <= true <= one["high_95"])
+        for row in rows:
+            true = photo_truth(row["quantity"], codes[row["class"]], row["distance"])
+            inside.append(row["low_95"] <= true <= row["high_95"])
     assert np.mean(inside) >= 0.87
 
 
-def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
+def test_csv_and_json_lines_give_equal_samples(tmp_path: Path) -> None:
     (tmp_path / "seen.CSV").write_text(
         'note,cell_id,types,bearings,x,y\nfirst,7,DB,"10, 350",,\nnothing,8,,,,\n,,D,-10,1.5,2\n'
     )
@@ -271,11 +274,11 @@ def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
     ]
     (tmp_path / "seen.jsonl").write_text("\n\n".join(map(json.dumps, lines)))
     for name in ("seen.CSV", "seen.jsonl"):
-        found = [
-            (one.cell_id, one.xy, *(part.tolist() for part in parts_of(one.signature)))
-            for one in read_samples(tmp_path / name, taxonomy=TAXONOMY)
+        samples = [
+            (sample.cell_id, sample.xy, *(part.tolist() for part in parts_of(sample.signature)))
+            for sample in read_samples(tmp_path / name, taxonomy=TAXONOMY)
         ]
-        assert found == [
+        assert samples == [
             (7, None, [3, 1], [10.0, 350.0]),
             (8, None, [], []),
             (None, (1.5, 2.0), [3], [350.0]),
@@ -301,7 +304,7 @@ def test_csv_and_json_lines_say_the_same(tmp_path: Path) -> None:
         ('{"types": "D", "bearings": {"a": 1}, "cell_id": 7}', ["line 1"]),
     ],
 )
-def test_what_is_wrong_is_said(tmp_path: Path, text: str, words: list[str]) -> None:
+def test_invalid_samples_are_refused(tmp_path: Path, text: str, words: list[str]) -> None:
     path = tmp_path / ("seen.jsonl" if text[0] in "[{" else "seen.csv")
     path.write_text(text)
     with refused(InputError, *words):
@@ -327,7 +330,7 @@ def test_counts_add_up(seed: int) -> None:
     counts = expected_counts(evidence, model)
     hits = counts.named.sum()
     assert hits == pytest.approx(counts.chances.sum())
-    # What is neither an object nor clutter came into range with the observer.
+    # Other detections are objects that are in range only of the observer.
     assert 0.8 * len(evidence.detections.bearings) < hits + counts.false.sum()
     assert hits + counts.false.sum() <= len(evidence.detections.bearings) + 0.05
     assert (counts.named.sum(axis=1) <= counts.trials.sum() + 0.05).all()
@@ -337,7 +340,7 @@ def test_counts_add_up(seed: int) -> None:
     assert new.named.sum(axis=2) == pytest.approx(1.0)
 
 
-def test_rounds_raise_the_likelihood() -> None:
+def test_rounds_of_the_fit_raise_the_likelihood() -> None:
     database = random_database(3, cells=60, longest=5)
     rng = np.random.default_rng(0)
     detected = [distorted(database, cell, rng) for cell in range(60)]
@@ -348,7 +351,7 @@ def test_rounds_raise_the_likelihood() -> None:
     before = -math.inf
     for _ in range(8):
         counts = expected_counts(evidence, model)
-        assert counts.log_likelihood > before - 0.1  # classes are drawn to the whole, too
+        assert counts.log_likelihood > before - 0.1  # class rates are shrunk as well
         before = counts.log_likelihood
         new = next_model(evidence, counts, model)
         assert model_change(model, model) == 0.0
@@ -356,16 +359,16 @@ def test_rounds_raise_the_likelihood() -> None:
         model = new
 
 
-def test_where_every_association_is_certain_the_intervals_are_the_text_books() -> None:
+def test_intervals_of_certain_associations_equal_the_textbook() -> None:
     database = random_database(0, cells=300, longest=1, classes=1)
     views = visible_objects_in(database, np.arange(300))
-    seen = [
+    signatures = [
         Signature(views.codes[[row]], (views.bearings[[row]] + 1.0 - 2.0 * (row % 2)) % 360)
         if row % 10
         else NOTHING
         for row in range(300)
     ]
-    evidence = gather_evidence(views, seen, taxonomy=TAXONOMY)
+    evidence = gather_evidence(views, signatures, taxonomy=TAXONOMY)
     model = replace(
         evidence.start,
         missed=np.array([[0.1]]),
@@ -374,18 +377,18 @@ def test_where_every_association_is_certain_the_intervals_are_the_text_books() -
     )
     rates = estimated_rates(evidence, expected_counts(evidence, model), model)
     rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
-    found = rows["detection"]
-    assert found["own"] == pytest.approx(0.9, abs=1e-4)
-    assert found["samples"] == 300
+    detection = rows["detection"]
+    assert detection["own"] == pytest.approx(0.9, abs=1e-4)
+    assert detection["samples"] == 300
     expected = wilson_interval(0.9, 300)
-    assert (found["low_95"], found["high_95"]) == pytest.approx(expected, abs=0.003)
+    assert (detection["low_95"], detection["high_95"]) == pytest.approx(expected, abs=0.003)
     sigma = rows["bearing_sigma"]
     assert sigma["own"] == pytest.approx(1.0, abs=0.03)  # half a unit of bearing is noise too
     assert math.log(sigma["high_95"] / sigma["own"]) >= 1.96 / math.sqrt(2 * 270) - 1e-6
     assert len(rates) == 8
 
 
-def test_rates_are_drawn_as_the_overall_rate_with_eight_samples() -> None:
-    found = shrunk_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
-    assert found == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
+def test_the_overall_rate_counts_for_eight_samples() -> None:
+    rates = shrunk_rates(np.array([0.0, 90.0]), np.array([10.0, 90.0]))
+    assert rates == pytest.approx([8 * 0.9 / 18, (90 + 8 * 0.9) / 98])
     assert shrunk_rates(np.zeros(2), np.zeros(2)).tolist() == [0.0, 0.0]

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from PIL import Image
-from PIL.ExifTags import GPS, IFD, Base
+from PIL.ExifTags import GPS, Base
 from sentences import refused
+from workbench import picture
 
 from semsig_gis.core import InputError
 from semsig_gis.observation import read_exif
@@ -18,14 +18,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def save(path: Path, **groups: Mapping[Any, Any]) -> Path:
+def save(folder: Path, **groups: Mapping[Any, Any]) -> Path:
     """Write a picture with EXIF tags of the groups ``image``, ``exif`` and ``gps``."""
-    exif = Image.Exif()
-    exif.update(groups.get("image", {}))
-    exif.get_ifd(IFD.Exif).update(groups.get("exif", {}))
-    exif.get_ifd(IFD.GPSInfo).update(groups.get("gps", {}))
-    Image.new("L", (400, 300)).save(path, exif=exif)
-    return path
+    (folder / "a.jpg").write_bytes(picture(**groups))
+    return folder / "a.jpg"
 
 
 def test_exif_of_phone_has_camera_heading_and_position(tmp_path: Path) -> None:
@@ -37,8 +33,7 @@ def test_exif_of_phone_has_camera_heading_and_position(tmp_path: Path) -> None:
         GPS.GPSImgDirectionRef: "M",
         GPS.GPSImgDirection: 123.5,
     }
-    path = save(tmp_path / "a.jpg", exif={Base.FocalLengthIn35mmFilm: 26}, gps=gps)
-    shot = read_exif(path)
+    shot = read_exif(save(tmp_path, exif={Base.FocalLengthIn35mmFilm: 26}, gps=gps))
     assert shot.size == (400, 300)
     # 26 mm with a diagonal of 43.27 mm, which is 500 pixels.
     assert shot.focal == pytest.approx(26 / math.hypot(36, 24) * 500 / 400)
@@ -62,7 +57,7 @@ LOCAL = {Base.DateTimeOriginal: "2026:05:31 12:05:09"}
 def test_time_of_picture(
     exif: Mapping[Any, Any], gps: Mapping[Any, Any], time: str | None, tmp_path: Path
 ) -> None:
-    assert read_exif(save(tmp_path / "a.jpg", exif=exif, gps=gps)).time == time
+    assert read_exif(save(tmp_path, exif=exif, gps=gps)).time == time
 
 
 @pytest.mark.parametrize(
@@ -78,12 +73,11 @@ def test_focal_length_from_pixels_of_sensor(
         Base.ExifImageWidth: width,
     }
     # 20 mm with 200 pixels per millimetre and a width of 4,000 pixels; then a smaller copy.
-    assert read_exif(save(tmp_path / "a.jpg", exif=exif)).focal == pytest.approx(1.0)
+    assert read_exif(save(tmp_path, exif=exif)).focal == pytest.approx(1.0)
 
 
 def test_size_is_that_of_the_upright_picture(tmp_path: Path) -> None:
-    path = save(tmp_path / "a.jpg", image={Base.Orientation: 6})
-    assert read_exif(path).size == (300, 400)
+    assert read_exif(save(tmp_path, image={Base.Orientation: 6})).size == (300, 400)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +93,7 @@ def test_size_is_that_of_the_upright_picture(tmp_path: Path) -> None:
 def test_missing_or_invalid_tags_are_unknown(
     groups: dict[str, dict[Any, Any]], tmp_path: Path
 ) -> None:
-    shot = read_exif(save(tmp_path / "a.jpg", **groups))
+    shot = read_exif(save(tmp_path, **groups))
     assert (shot.focal, shot.heading, shot.position) == (None, None, None)
 
 

@@ -13,7 +13,6 @@ from semsig_gis.core import InputError
 from semsig_gis.observation import Shot, read_pictures
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     from semsig_gis.observation import AnnotatedPicture
@@ -33,38 +32,10 @@ COCO: dict[str, Any] = {
 }
 
 
-def coco(folder: Path) -> list[Path]:
-    (folder / "street.json").write_text(json.dumps(COCO))
-    return [folder / "street.json"]
-
-
-def coco_results(folder: Path) -> list[Path]:
-    truth = {**COCO, "annotations": [{**COCO["annotations"][0], "bbox": [0, 0, 1, 1]}]}
-    results = [{**item, "score": item.get("score", 1.0)} for item in COCO["annotations"]]
-    (folder / "results.json").write_text(json.dumps(results))
-    (folder / "truth.json").write_text(json.dumps(truth))
-    return [folder / "results.json", folder / "truth.json"]
-
-
 YOLO = "0 0.2 0.375 0.2 0.25\n1 0.525 0.15 0.05 0.1 0.75\n"
 
 
-def yolo(folder: Path) -> list[Path]:
-    (folder / "labels").mkdir()
-    (folder / "labels/street.txt").write_text(YOLO)
-    (folder / "data.yaml").write_text("path: .\nnames:\n  0: bench\n  1: stop sign\n")
-    return [folder / "labels"]
-
-
-def yolo_polygons(folder: Path) -> list[Path]:
-    # As segmentation models write them, with another file of names.
-    text = "0 0.1 0.25 0.3 0.3 0.2 0.5\n1 0.5 0.1 0.55 0.2 0.52 0.15 0.75\n"
-    (folder / "street.txt").write_text(text)
-    (folder / "my.names").write_text("bench\nstop sign\n")
-    return [folder / "my.names", folder / "street.txt"]
-
-
-def rectangle(label: str, *box: float, **more: Any) -> dict[str, Any]:  # noqa: ANN401
+def rectangle(label: str, *box: float, rotation: int = 0) -> dict[str, Any]:
     x, y, width, height = box
     return {
         "id": "Dx",
@@ -75,10 +46,9 @@ def rectangle(label: str, *box: float, **more: Any) -> dict[str, Any]:  # noqa: 
         "original_height": 400,
         "image_rotation": 0,
         "value": {
-            "x": x, "y": y, "width": width, "height": height, "rotation": 0,
+            "x": x, "y": y, "width": width, "height": height, "rotation": rotation,
             "rectanglelabels": [label],
         },
-        **more,
     }  # fmt: skip
 
 
@@ -95,7 +65,8 @@ TASK: dict[str, Any] = {
             "result": [
                 rectangle("bench", 10, 25, 20, 25),
                 {
-                    **rectangle("", 0, 0, 0, 0, score=0.75),
+                    **rectangle("", 0, 0, 0, 0),
+                    "score": 0.75,
                     "type": "polygonlabels",
                     "value": {
                         "points": [[50, 10], [55, 12], [51, 20]], "polygonlabels": ["stop sign"],
@@ -106,11 +77,6 @@ TASK: dict[str, Any] = {
         }
     ],
 }  # fmt: skip
-
-
-def label_studio(folder: Path) -> list[Path]:
-    (folder / "export.json").write_text(json.dumps([TASK]))
-    return [folder / "export.json"]
 
 
 CVAT = """<?xml version="1.0" encoding="utf-8"?>
@@ -128,11 +94,6 @@ CVAT = """<?xml version="1.0" encoding="utf-8"?>
   </image>
 </annotations>
 """
-
-
-def cvat(folder: Path) -> list[Path]:
-    (folder / "annotations.xml").write_text(CVAT)
-    return [folder / "annotations.xml"]
 
 
 def tile(*points: tuple[int, int]) -> str:
@@ -179,9 +140,27 @@ IMAGE: dict[str, Any] = {
 }
 
 
-def mapillary(folder: Path) -> list[Path]:
-    (folder / "images.json").write_text(json.dumps({"data": [IMAGE]}))
-    return [folder / "images.json"]
+# The texts of the files of each format.
+ONE = {"annotations": [{**COCO["annotations"][0], "bbox": [0, 0, 1, 1]}]}
+FORMATS = {
+    "coco": {"street.json": json.dumps(COCO)},
+    "coco results": {
+        "results.json": json.dumps([{"score": 1.0, **item} for item in COCO["annotations"]]),
+        "truth.json": json.dumps(COCO | ONE),
+    },
+    "yolo": {
+        "labels/street.txt": YOLO,
+        "data.yaml": "path: .\nnames:\n  0: bench\n  1: stop sign\n",
+    },
+    # As segmentation models write them, with another file of names.
+    "yolo polygons": {
+        "my.names": "bench\nstop sign\n",
+        "street.txt": "0 0.1 0.25 0.3 0.3 0.2 0.5\n1 0.5 0.1 0.55 0.2 0.52 0.15 0.75\n",
+    },
+    "label studio": {"export.json": json.dumps([TASK])},
+    "cvat": {"annotations.xml": CVAT},
+    "mapillary": {"images.json": json.dumps({"data": [IMAGE]})},
+}
 
 
 def pixels(picture: AnnotatedPicture) -> list[list[float]]:
@@ -190,25 +169,31 @@ def pixels(picture: AnnotatedPicture) -> list[list[float]]:
     return [[side * size for side, size in zip(box, scale, strict=True)] for box in corners]
 
 
-FORMATS = [coco, coco_results, yolo, yolo_polygons, label_studio, cvat, mapillary]
+def read_format(form: str, folder: Path) -> AnnotatedPicture:
+    """Write and read the files of a format; return the single picture."""
+    (folder / "labels").mkdir()
+    for name, text in FORMATS[form].items():
+        (folder / name).write_text(text)
+    files = ["labels"] if form == "yolo" else FORMATS[form]
+    (picture,) = read_pictures([folder / name for name in files])
+    return picture
 
 
-@pytest.mark.parametrize("write", FORMATS)
-def test_every_format_gives_same_boxes(write: Callable[[Path], list[Path]], tmp_path: Path) -> None:
-    (picture,) = read_pictures(write(tmp_path))
+@pytest.mark.parametrize("form", FORMATS)
+def test_every_format_gives_same_boxes(form: str, tmp_path: Path) -> None:
+    picture = read_format(form, tmp_path)
     assert picture.name.removesuffix(".jpg") == "street"
     assert [box.label for box in picture.boxes] == LABELS
     for box_pixels, corners in zip(pixels(picture), CORNERS, strict=True):
         assert box_pixels == pytest.approx(corners, abs=0.15)  # 1 / 4096 of a tile
-    scores = [1.0, 1.0] if write is mapillary else SCORES  # it has no scores
+    scores = [1.0, 1.0] if form == "mapillary" else SCORES  # it has no scores
     assert [box.score for box in picture.boxes] == scores
-    assert [box.whole for box in picture.boxes] == [True, write is not cvat]
-    assert picture.others == (write in {label_studio, cvat})
-    assert picture.shot.size == (None if write in {yolo, yolo_polygons} else (800, 400))
+    assert [box.whole for box in picture.boxes] == [True, form != "cvat"]
+    assert picture.others == (form in {"label studio", "cvat"})
+    assert picture.shot.size == (None if form.startswith("yolo") else (800, 400))
 
 
 def test_mapillary_image_has_camera_and_position(tmp_path: Path) -> None:
-    (picture,) = read_pictures(mapillary(tmp_path))
     shot = Shot(
         camera="pinhole",
         focal=0.85,
@@ -218,7 +203,7 @@ def test_mapillary_image_has_camera_and_position(tmp_path: Path) -> None:
         size=(800, 400),
         position=(43.73, 7.42),
     )
-    assert picture.shot == shot
+    assert read_format("mapillary", tmp_path).shot == shot
 
 
 def test_mapillary_detections_are_grouped_by_image(tmp_path: Path) -> None:
@@ -228,50 +213,28 @@ def test_mapillary_detections_are_grouped_by_image(tmp_path: Path) -> None:
     assert [picture.name for picture in read_pictures([tmp_path])] == ["a", "b"]
 
 
+ROTATED = {
+    "id": 1,
+    "data": {"image": "a.jpg"},
+    "annotations": [{"result": [rectangle("x", 50, 25, 10, 10, rotation=90)]}],
+}
+ROTATED_IN_CVAT = """<annotations><image name="a" width="800" height="400">
+  <box label="x" xtl="400" ytl="100" xbr="480" ybr="140" rotation="90"/>
+</image></annotations>"""
+
+
 @pytest.mark.parametrize(
-    ("write", "corners"),
+    ("name", "text", "corners"),
     [
         # Rotated by 90 degrees about its upper left corner, and about its middle.
-        (
-            lambda folder: (folder / "a.json").write_text(
-                json.dumps(
-                    [
-                        {
-                            "id": 1,
-                            "data": {"image": "a.jpg"},
-                            "annotations": [
-                                {
-                                    "result": [
-                                        {
-                                            **rectangle("x", 0, 0, 0, 0),
-                                            "value": {
-                                                "x": 50, "y": 25, "width": 10, "height": 10,
-                                                "rotation": 90, "rectanglelabels": ["x"],
-                                            },
-                                        }
-                                    ]
-                                }
-                            ],
-                        }
-                    ]
-                )
-            ),
-            (360, 100, 400, 180),
-        ),
-        (
-            lambda folder: (folder / "a.xml").write_text(
-                '<annotations><image name="a" width="800" height="400"><box label="x" '
-                'xtl="400" ytl="100" xbr="480" ybr="140" rotation="90"/></image></annotations>'
-            ),
-            (420, 80, 460, 160),
-        ),
+        ("a.json", json.dumps([ROTATED]), (360, 100, 400, 180)),
+        ("a.xml", ROTATED_IN_CVAT, (420, 80, 460, 160)),
     ],
-    ids=["label_studio", "cvat"],
-)  # fmt: skip
+)
 def test_rotated_box_becomes_bounding_box(
-    write: Callable[[Path], object], corners: tuple[float, ...], tmp_path: Path
+    name: str, text: str, corners: tuple[float, ...], tmp_path: Path
 ) -> None:
-    write(tmp_path)
+    (tmp_path / name).write_text(text)
     (picture,) = read_pictures([tmp_path])
     assert pixels(picture)[0] == pytest.approx(corners)
 
