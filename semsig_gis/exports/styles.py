@@ -14,7 +14,7 @@ from semsig_gis.core import (
     RANK_RAMP,
     class_signs,
     group_labels,
-    one_line,
+    one_lines,
 )
 
 if TYPE_CHECKING:
@@ -93,12 +93,11 @@ class LegendEntry(NamedTuple):
 def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     """Return a style of points by class code: the shape of the class with its letter."""
     present = set(codes)
+    signs = {str(code): sign for code, sign in class_signs(taxonomy).items() if code in present}
+    labels = shown_lines(f"{sign.symbol}  {sign.title}" for sign in signs.values())
     entries = {
-        str(code): LegendEntry(
-            {"value": str(code)}, shown_line(f"{sign.symbol}  {sign.title}"), _class_layers(sign)
-        )
-        for code, sign in class_signs(taxonomy).items()
-        if code in present
+        code: LegendEntry({"value": code}, label, _class_layers(sign))
+        for (code, sign), label in zip(signs.items(), labels, strict=True)
     }
     return Style("Classes", _renderer("class_code", entries, "point"))
 
@@ -271,10 +270,10 @@ def _renderer(
     return ET.tostring(renderer, encoding="unicode")
 
 
-def shown_line(text: str, letters: int = LABEL_LETTERS) -> str:
-    """Return text from data for QGIS: one short line, without expressions that QGIS evaluates."""
-    line = one_line(text).replace("[%", "[ %")
-    return line if len(line) <= letters else f"{line[: letters - 1].rstrip()}…"
+def shown_lines(texts: Iterable[str], letters: int = LABEL_LETTERS) -> list[str]:
+    """Return texts from data for QGIS: short single lines, without expressions to evaluate."""
+    lines = [line.replace("[%", "[ %") for line in one_lines(texts)]
+    return [line if len(line) <= letters else f"{line[: letters - 1].rstrip()}…" for line in lines]
 
 
 def _rgba(colour: str, opacity: int = 255) -> str:

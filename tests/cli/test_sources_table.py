@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 import pytest
 import shapely
 from open_cities import CITIES, serve
+from osm_xml import node, write_osm
 from servers import Answer
 from stand_ins import ArcGIS
 from stores import keep_in_bucket
@@ -83,13 +84,8 @@ def elements() -> dict[str, Any]:
 
 
 def extract(folder: Path, _: Server) -> None:
-    nodes = "".join(
-        f'<node id="{n}" lon="{x}" lat="{y}">'
-        + "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
-        + "</node>"
-        for n, ((x, y), tags) in enumerate(zip(PLACES, TAGS, strict=True), 1)
-    )
-    (folder / "city.osm").write_text(f'<osm version="0.6">{nodes}</osm>', "utf-8")
+    things = enumerate(zip(PLACES, TAGS, strict=True), 1)
+    write_osm(folder / "city.osm", *(node(n, x, y, tags) for n, ((x, y), tags) in things))
 
 
 def osmnx(folder: Path, _: Server) -> None:
