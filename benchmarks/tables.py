@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.views import NOT_TOLD, RANGES, SECTORS
+from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
+from benchmarks.views import FULL_TURN, RANGES, SECTORS
 from benchmarks.views import bars as bars_of_views
 
 if TYPE_CHECKING:
@@ -14,9 +13,8 @@ if TYPE_CHECKING:
 
 __all__ = ["main", "page"]
 
-FOLDER = Path(__file__).parent
 TODAY = "of the day"
-"""The map in the rows of ``chances.json`` that are of no old one."""
+"""Value of ``map`` in the rows of ``chances.json`` with a current map."""
 PAGE = FOLDER.parent / "docs" / "figures.md"
 TRUST = FOLDER.parent / "docs" / "reliability.md"
 _SOAK = ("<!-- make soak -->\n", "<!-- end -->")
@@ -25,99 +23,98 @@ _HEAD = """# Figures
 
 This page is written by `python -m benchmarks.tables`, which `make bench`, `make accuracy`,
 `make views`, `make bayes`, `make chances` and `make reproduce` end with. All figures are from one
-machine with two cores that other programs share, so ratios say more than times.
+machine with two cores that other programs share, so ratios are more reliable than times.
 """
 _ACCURACY = """## Accuracy
 
-`make accuracy` draws {queries:,} cells of a city, spoils their signatures, and asks every method
-for all of them. `light`, `medium` and `strong` are 1, 7 and 13 errors (missed, false, or of a false
-class) and bearing noise of 5 degrees. `edit+edit:5%` is the best method that the paper reports.
-The errors are those of the one best place; the interval of 95 % is Wilson's. "On the grid", a
+`make accuracy` draws {queries:,} cells of a city, distorts their signatures, and localizes all of
+them with every method. `light`, `medium` and `strong` are 1, 7 and 13 errors (missed, false, or of
+a false class) and bearing noise of 5 degrees. `edit+edit:5%` is the best method that the paper
+reports. The error is that of the best place; the interval of 95 % is Wilson's. "On the grid", a
 query is seen from the centre of a cell, as in the paper; off the grid, from anywhere in it.
 """
 _CHANCES = """## Chances
 
-The likelihood method says how sure it is. "Stated" is its mean chance to be within 50 m, "came
-true" how often it was. A region of 90 % is made of whole cells and so holds somewhat more: "holds"
-is how often the true cell is in it, "stated" what the method says of that, and "just 90 %" how
-often it is in a region whose least likely cells count only with the part that is needed.
+The likelihood method states a chance with each answer. "Stated" is its mean chance to be within
+50 m, "came true" how often it was. A region of 90 % consists of whole cells, so its chance is
+somewhat higher: "stated" is this chance, "holds" how often the true cell is in the region, and
+"just 90 %" how often it is if the least likely cells of the region count only in part, so that the
+chance is exactly 90 %.
 """
 _SURE = """## Answers
 
-The likelihood method gives an answer or says that it cannot tell. The threshold is chosen on half
-of the `medium` queries so that 98 % of the answers are right; these are the other halves.
+The likelihood method gives an answer, or "cannot tell". The threshold is chosen on half of the
+`medium` queries so that 98 % of the answers are right; the table shows the other halves.
 """
-_BARS = """## What was asked for
+_BARS = """## Targets
 
-The figures that accuracy was to reach, and what came out.
+The target of each figure of accuracy, and the value that was measured.
 """
 _VIEWS = """## Views
 
-`make views` asks up to {queries} queries a line of a camera that sees 70, 120 or 360 degrees. The
-detector finds 80 % of the objects, misnames 10 % of these, is 4 degrees out and makes up one object
-in a full turn; the likelihood method has this noise model. The queries of a line are the same for
-all columns: taken for a full turn, with the sector told, or with rough distances, 25 % off, told,
-too. These are the shares within 50 m of the one best place, with Wilson's intervals of 95 %. Photos
-are {photos} in a row, 20 m apart, each in a direction of its own, the legs known; the last place is
-asked for. From cells, queries are seen from the centres of cells; else from anywhere in them, and
-places are not refined.
+`make views` localizes up to {queries} queries for each line, of a camera that sees 70, 120 or 360
+degrees. The detector finds 80 % of the objects, misnames 10 % of these, is 4 degrees out and makes
+up one object in a full turn; the likelihood method has this noise model. The columns have the same
+queries: as if they were full turns, with their sectors, or with sectors and distances that are 25 %
+off. The figures are the shares with a best place within 50 m, with Wilson's intervals of 95 %.
+Lines with {photos} photos are routes: the photos are 20 m apart, in random directions, with known
+legs, and the last place is localized; "last only" is the same with only the last photo. "Cells"
+means that queries are seen from the centres of cells, "anywhere" from random places in them. Places
+are not refined.
 """
 _VIEW_CHANCES = """The same lines: how often the true cell is in the region of just 90 %, and how
 far off, at most, the stated chance is in a tenth of the chance with 100 queries or more.
 """
-_BAYES = """### What no method can pass
+_BAYES = """### Upper bound for all methods
 
-`make bayes` asks {queries} queries a line in a made-up city of {cells} cells, small enough for
-exact sums over all one-to-one associations of what is seen with what is there. With the noise and
-camera of the views, the chances that Bayes' rule gives are then known. "At most" is the mean chance
-of the best place within 50 m: no method is right more often in the long run; "by Bayes" is how
-often that place was right, beside the likelihood method, for the same queries of one to fourteen
-detections, with the chance that it states.
+`make bayes` localizes {queries} queries for each line in a made-up city of {cells} cells, small
+enough for exact sums over all one-to-one associations of detections and objects. With the noise
+model and the cameras of the views, this gives the exact chances by Bayes' rule. "At most" is the
+mean chance of the best place within 50 m: no method is right more often in the long run. "By Bayes"
+is how often that place was right. The next columns are the same share for the likelihood method,
+for the same queries of one to fourteen detections, and the chance that it states.
 """
-_VIEW_BARS = """The figures that views were to reach, and what came out.
+_VIEW_BARS = """The target of each figure of views, and the value that was measured.
 """
 _REAL = """## Chances in real cities
 
-`make chances` asks for what is seen from anywhere in a city, {queries} queries at each of `light`,
-`medium` and `strong`, and answers as `semsig localize` does: generic noise,
-refined places. "Stated" is the mean chance, of the queries in a tenth, to be within 50 m; "came
-true" how often it was. Queries of which nothing remains are not among them.
+`make chances` localizes queries from anywhere in a city, {queries} at each of `light`, `medium` and
+`strong`, with the settings of `semsig localize`: generic noise, refined places. "Stated" is the
+mean chance to be within 50 m, of the queries in a tenth; "came true" is how often it was. Queries
+without any object left are not counted.
 """
 _OLD = """## Old maps
 
-`make chances` also asks with a map that is older than the queries ({queries} at each of `light` and
-`medium`). Of Monaco there are two real dates, and its own changes are those that are shipped. The
-other cities are changed for three years, by rules that the noise model does not have: objects go,
-come and move, one by one, and in whole streets lamps are replaced and trees felled and planted
-again, and new rows appear. "Told" is what the answer was told of that: nothing, the age
-(`--map-age`) with the changes of Monaco, or with a drift report of a first year of the city, made
-with other random numbers (`--drift-report`). "Answered" are the queries with a chance of 0.9 or
-more.
+`make chances` also uses maps that are older than the queries ({queries} at each of `light` and
+`medium`). For Monaco there is real data of two dates, and the built-in drift report is of its
+changes. The other cities are changed for three years, by rules that the noise model does not have:
+single objects are removed, added and moved; in whole streets lamps are replaced, and trees felled
+and planted again; and new rows appear. "Settings" is what the method gets: nothing, the age of the
+map (`--map-age`) with the changes of Monaco, or with a drift report of another simulated first year
+of the city (`--drift-report`). "Answered" are the queries with a chance of 0.9 or more.
 """
 _PAPER = """## The paper's experiments
 
-`make reproduce` runs them on a made-up city as large and as furnished as the paper's Paris, with
-10,000 queries of each, and writes a report with all plots into `reproduction/`; these are its
-numbers of which the paper prints one too. Intervals are those of 95 %. What the paper only reads
-off its plots is marked in the report.
+`make reproduce` runs them on a made-up city with as many cells and objects as the paper's Paris,
+with 10,000 queries each, and writes a report with all plots into `reproduction/`. The table has the
+numbers that the paper prints as well, with intervals of 95 %. Numbers that were read off plots of
+the paper are marked in the report.
 """
 _SPEED = """## Speed
 
-`make bench` times ours and a peer in turns, in one process, and keeps the medians. The paper's
-times are those that it prints, for 312,134 cells on a machine of its own.
+`make bench` times ours and a peer in turns, in one process, and takes the medians. The paper's
+times are for 312,134 cells, on its own machine.
 """
 
 
 def main() -> None:
     """Write the page of figures, and the table of the soak."""
-    names = (
-        *("accuracy.json", "results.json", "reproduction.json", "chances.json"),
-        "views.json",
-    )
-    results = map(_results, names)
-    PAGE.write_text(page(*results, bayes=_results("bayes.json")), encoding="utf-8")
+    names = ("accuracy", "results", "reproduction", "chances", "views")
+    results = [read_rows(FOLDER / f"{name}.json") for name in names]
+    PAGE.write_text(page(*results, bayes=read_rows(FOLDER / "bayes.json")), encoding="utf-8")
     TRUST.write_text(
-        trust_page(TRUST.read_text(encoding="utf-8"), _results("soak.json")), encoding="utf-8"
+        trust_page(TRUST.read_text(encoding="utf-8"), read_rows(FOLDER / "soak.json")),
+        encoding="utf-8",
     )
     for path in (PAGE, TRUST):
         print(f"wrote {path.relative_to(FOLDER.parent)}")
@@ -132,18 +129,10 @@ def page(
     *,
     bayes: Sequence[dict[str, Any]],
 ) -> str:
-    """Return the page.
+    """Return the page of figures as Markdown, from the rows of the files of results.
 
-    Parameters
-    ----------
-    accuracy, speed, paper, chances, views, bayes : sequence of dict
-        Rows of ``accuracy.json``, ``results.json``, ``reproduction.json``, ``chances.json``,
-        ``views.json`` and ``bayes.json``.
-
-    Returns
-    -------
-    str
-        Markdown.
+    `speed` are the rows of ``results.json``, `paper` of ``reproduction.json``, the others of the
+    file of their name.
     """
     parts = [_HEAD]
     plain = [row for row in accuracy if row["coverage"] is None]
@@ -152,14 +141,14 @@ def page(
     for city in dict.fromkeys(row["city"] for row in plain):
         rows = [row for row in plain if row["city"] == city]
         parts += [f"### {city}, {rows[0]['cells']:,} cells\n", _accuracy_table(rows)]
-    told = [row for row in plain if row["in_region"] is not None]
+    with_regions = [row for row in plain if row["in_region"] is not None]
     sure = [row for row in accuracy if row["coverage"] is not None]
     real = [row for row in chances if row["map"] == TODAY]
     old = [row for row in chances if row["map"] != TODAY]
     bars = [{**bar, "city": row["city"]} for row in accuracy for bar in row["bars"]]
     view_bars = [{**bar.to_dict(), "city": city} for city, bar in bars_of_views(views)]
     for text, rows, table in (
-        (_CHANCES, told, _chance_table),
+        (_CHANCES, with_regions, _chance_table),
         (_SURE, sure, _answer_table),
         (_views_text(views), list(views), _view_table),
         (_VIEW_CHANCES, list(views), _view_chance_table),
@@ -178,7 +167,7 @@ def page(
 
 def _paper_table(rows: Iterable[dict[str, Any]]) -> str:
     return _table(
-        "experiment | what | figure | ours | interval | the paper",
+        "experiment | case | figure | ours | interval | the paper",
         (
             (
                 *(row["section"], row["row"], row["column"]),
@@ -198,7 +187,7 @@ def _number(value: float, unit: str) -> str:
 
 def _accuracy_table(rows: Iterable[dict[str, Any]]) -> str:
     return _table(
-        "noise | method | what is known | <= 25 m | <= 50 m | interval | ten objects or more | "
+        "noise | method | setting | <= 25 m | <= 50 m | interval | ten objects or more | "
         "recall@10 % | ms",
         (
             (
@@ -216,8 +205,7 @@ def _accuracy_table(rows: Iterable[dict[str, Any]]) -> str:
 def _chance_table(rows: Iterable[dict[str, Any]]) -> str:
     names = ("chance", "p50", "region_mass", "in_region", "in_exact_region")
     return _table(
-        "city | noise | method | what is known | stated | came true | region: stated | holds | "
-        "just 90 %",
+        "city | noise | method | setting | stated | came true | region: stated | holds | just 90 %",
         (
             (
                 *(row["city"], row["distortion"], f"`{row['method']}`", row["setting"]),
@@ -242,12 +230,12 @@ def _answer_table(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def _each_level(text: str, rows: Sequence[dict[str, Any]]) -> str:
-    """Fill in how many queries there are at each level."""
+    """Fill in the number of queries at each level."""
     return text.format(queries=rows[0]["queries"] // len(rows[0]["levels"])) if rows else text
 
 
 def _views_text(rows: Sequence[dict[str, Any]]) -> str:
-    """Fill in how many queries a line has, and how many photos a route."""
+    """Fill in the numbers of queries of a line and of photos of a route."""
     if not rows:
         return ""
     queries, photos = (max(row[name] for row in rows) for name in ("queries", "photos"))
@@ -257,8 +245,8 @@ def _views_text(rows: Sequence[dict[str, Any]]) -> str:
 def _view_table(rows: Iterable[dict[str, Any]]) -> str:
     def cell(row: Mapping[str, Any]) -> str:
         shares = _share(row["p50"]), _share(row["p50_low"]), _share(row["p50_high"])
-        alone = f"; alone {_share(row['alone'])}" if "alone" in row else ""
-        return "{} ({}-{}){}".format(*shares, alone)
+        last = f"; last only {_share(row[LAST_ONLY])}" if LAST_ONLY in row else ""
+        return "{} ({}-{}){}".format(*shares, last)
 
     return _of_views(rows, cell)
 
@@ -273,7 +261,7 @@ def _view_chance_table(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def _bayes_text(rows: Sequence[dict[str, Any]]) -> str:
-    """Fill in how many queries a line has, and how many cells the city."""
+    """Fill in the numbers of queries of a line and of cells of the city."""
     if not rows:
         return ""
     return _BAYES.format(**{name: f"{rows[0][name]:,}" for name in ("queries", "cells")})
@@ -297,12 +285,12 @@ def _bayes_table(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def _of_views(rows: Iterable[dict[str, Any]], cell: Callable[[Mapping[str, Any]], str]) -> str:
-    """Return a table with a line for each view, and a column for each thing that is told."""
-    columns = (NOT_TOLD, SECTORS, RANGES)
+    """Return a table with a line for each kind of view, and a column for the inputs."""
+    columns = (FULL_TURN, SECTORS, RANGES)
     names = ("city", "seen_from", "photos", "degrees", "queries", "least", "heading")
     lines: dict[tuple[Any, ...], dict[str, str]] = {}
     for row in rows:
-        lines.setdefault(tuple(row[name] for name in names), {})[row["told"]] = cell(row)
+        lines.setdefault(tuple(row[name] for name in names), {})[row[INPUTS]] = cell(row)
     return _table(
         " | ".join(
             ["city", "from", "photos", "degrees", "queries", "detections", "heading", *columns]
@@ -332,11 +320,11 @@ def _real_table(rows: Iterable[dict[str, Any]]) -> str:
 
 def _old_table(rows: Iterable[dict[str, Any]]) -> str:
     return _table(
-        "city | map | told | within 50 m | stated | answered | right, of these | interval | "
+        "city | map | settings | within 50 m | stated | answered | right, of these | interval | "
         "right, of those below 0.99",
         (
             (
-                *(row["city"], row["map"], f"`{row['told']}`" if row["told"] else "nothing"),
+                *(row["city"], row["map"], f"`{row[INPUTS]}`" if row[INPUTS] else "nothing"),
                 *(_share(row["p50"]), _share(row["stated"])),
                 f"{row['answered']} of {row['queries']}",
                 f"{row['right'] / row['answered']:.3f}",
@@ -355,7 +343,7 @@ def _interval(values: Mapping[str, Any]) -> str:
 
 def _bar_table(rows: Iterable[dict[str, Any]]) -> str:
     return _table(
-        "city | what | wanted | came out | reached",
+        "city | figure | target | measured | reached",
         (
             (
                 *(row["city"], row["what"]),
@@ -370,7 +358,7 @@ def _bar_table(rows: Iterable[dict[str, Any]]) -> str:
 
 def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
     return _table(
-        "what | ours | peer | times better | wanted | the paper",
+        "figure | ours | peer | times better | target | the paper",
         (
             (
                 row["name"],
@@ -386,38 +374,14 @@ def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def trust_page(text: str, rows: Iterable[dict[str, Any]]) -> str:
-    """Return the page of what can be relied on, with another table.
-
-    Parameters
-    ----------
-    text : str
-        The page as it is.
-    rows : iterable of dict
-        Rows of ``soak.json``.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return the page ``reliability.md`` with its table replaced, from rows of ``soak.json``."""
     before, _, rest = text.partition(_SOAK[0])
     after = rest.partition(_SOAK[1])[2]
     return f"{before}{_SOAK[0]}\n{soak_table(rows)}\n{_SOAK[1]}{after}"
 
 
 def soak_table(rows: Iterable[dict[str, Any]]) -> str:
-    """Return the table of a soak's trials.
-
-    Parameters
-    ----------
-    rows : iterable of dict
-        Rows of ``soak.json``.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return the table of the trials of a soak as Markdown, from rows of ``soak.json``."""
     rows = list(rows)
     counts = list(rows[0])[1:]
     total = {"part": "all"} | {name: sum(row[name] for row in rows) for name in counts}
@@ -428,7 +392,7 @@ def soak_table(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def _table(head: str, rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; the columns of the head are parted by bars."""
+    """Return a table; the titles of `head` are separated by bars."""
     titles = head.split(" | ")
     lines = [titles, ["---"] * len(titles), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
@@ -436,11 +400,6 @@ def _table(head: str, rows: Iterable[Sequence[str]]) -> str:
 
 def _share(value: float | None) -> str:
     return "" if value is None else f"{value:.3f}"
-
-
-def _results(name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads((FOLDER / name).read_text(encoding="utf-8"))
-    return rows
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import pandas as pd
 
 from semsig_gis.core import WILDCARD, Displayed, InputError, ObjectIndex, cell_ids
 from semsig_gis.database import SignatureDatabase, visible_objects_at, visible_objects_in
-from semsig_gis.localization.noise.fit import (
+from semsig_gis.localization.learning.fit import (
     ALL,
     KNOTS,
     LEAST,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature, Taxonomy
     from semsig_gis.database import Footprints, VisibleObjects
-    from semsig_gis.localization.noise.fit import Evidence
+    from semsig_gis.localization.learning.fit import Evidence
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.objects import StreetObjects
     from semsig_gis.storage import Row
@@ -227,12 +227,12 @@ def learn_noise(
     The rate of a class with n samples and its own rate r is
     ``(n * r + 8 * overall) / (n + 8)``, so the overall rate counts for eight samples; the same
     holds for squares of deviations. A row of the confusion has eight samples added that are
-    misnamed at the overall rate, each other class equally often. See `localization.noise.fit` for
-    the intervals.
+    misnamed at the overall rate, each other class equally often. See `localization.learning.fit`
+    for the intervals.
 
     Examples
     --------
-    >>> from semsig_gis.localization.noise.learn import Sample
+    >>> from semsig_gis.localization.learning.learn import Sample
     >>> cells = demo_database.cell_ids[:50].tolist()
     >>> seen = [
     ...     Sample(signature=demo_database.signature(row), cell_id=cell)
