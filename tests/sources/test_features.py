@@ -158,11 +158,3 @@ def test_file_without_tags_is_refused(tmp_path: Path) -> None:
     damaged.write_text("PAR1")
     with refused(SourceError, "damaged.parquet", "download it again"):
         find_files(SPECS, [damaged])
-
-
-def test_overpass_answer_is_recognized_by_its_content(tmp_path: Path) -> None:
-    answer = {"version": 0.6, "elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2,
-                                            "tags": {"amenity": "bench"}}]}  # fmt: skip
-    path = tmp_path / "some.json"
-    path.write_text(json.dumps(answer))
-    assert file_reader(path, sure=True) == "overpass"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -27,18 +26,16 @@ from stand_ins import (
 )
 
 from semsig_gis.core import CatalogError, SourceError
-from semsig_gis.sources import Area, HttpError, LayerSpec, PagingError, parse_area, reader
+from semsig_gis.sources import Area, HttpError, LayerSpec, PagingError, parse_area
 from semsig_gis.sources.services.fetch import fetch_layers
-from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from servers import Server
     from stand_ins import StandIn
 
-    from semsig_gis.sources import Cache, Download, HttpSpec
+    from semsig_gis.sources import Cache, Download, HttpSpec, RawLayer
 
     Fetch = Callable[..., Download]
 
@@ -215,12 +212,11 @@ def test_arcgis_server_without_paging_sends_one_page(server: Server, fetched: Fe
     ],
 )
 def test_esri_geometries_are_read(
-    tmp_path: Path, geometry: dict[str, Any], text: str | None
+    read_as: Callable[..., RawLayer], geometry: dict[str, Any], text: str | None
 ) -> None:
     rows = [{"attributes": {"a": 1}, "geometry": geometry}]
     content = {"spatialReference": {"wkid": 102100, "latestWkid": 3857}, "features": rows}
-    (tmp_path / "a.json").write_text(json.dumps(content))
-    (layer,) = read_layers(tmp_path / "a.json", [LayerSpec(name="a", class_name="bench")])
+    layer = read_as("a.json", content, replace(LAMPS, id_field=None))
     assert layer.table.crs == "EPSG:3857"
     (shape,) = layer.table.geometry
     assert (shape is None) == (text is None)
@@ -426,9 +422,7 @@ def test_socrata_positions_are_read(server: Server, fetched: Fetch, place: str) 
         '{"features": [{"attributes": {"OBJECTID": 7}, "geometry": {"x": 2.35, "y": 48.85}}]}',
     ],
 )
-def test_file_downloaded_by_hand_is_read(tmp_path: Path, text: str) -> None:
-    path = tmp_path / ("a.csv" if text[0] == "O" else "a.json")
-    path.write_text(text)
+def test_file_downloaded_by_hand_is_read(read_as: Callable[..., RawLayer], text: str) -> None:
     spec = replace(LAMPS, aliases=(("geo_point_2d", ("location",)),))
-    (layer,) = reader("socrata")(path, [spec])
+    layer = read_as("a.csv" if text[0] == "O" else "a.json", text, spec, by="socrata")
     assert (ids(layer), xy(layer), layer.notes) == (["7"], [(2.35, 48.85)], ())

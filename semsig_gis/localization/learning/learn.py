@@ -227,8 +227,8 @@ def learn_noise(
     The rate of a class with n samples and its own rate r is
     ``(n * r + 8 * overall) / (n + 8)``, so the overall rate counts for eight samples; the same
     holds for squares of deviations. A row of the confusion has eight samples added that are
-    misnamed at the overall rate, each other class equally often. See `localization.learning.fit` for
-    the intervals.
+    misnamed at the overall rate, each other class equally often. See `localization.learning.fit`
+    for the intervals.
 
     Examples
     --------

@@ -360,6 +360,8 @@ class NoiseLevels:
     @classmethod
     def of(cls, table: NoiseTable) -> NoiseLevels:
         """Return the levels of a table."""
+        metres, detected = table.distances, table.detected
+        remaining, leaving = table.remaining, table.leaving
         # Levels are spaced by the logarithm of the distance; a level is the mean of its units.
         units = np.maximum(np.arange(DISTANCE_UNITS + 1), 1)
         logs = (DISTANCE_LEVELS - 1) * np.log(units) / math.log(DISTANCE_UNITS)
@@ -369,7 +371,7 @@ class NoiseLevels:
         def by_level(values: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.bincount(level_of, values, DISTANCE_LEVELS) / count
 
-        distances = np.exp(by_level(np.log(table.distances)))
+        distances = np.exp(by_level(np.log(metres)))
         # Classes with the same errors share their rows.
         errors = np.stack([table.sigma, table.range_sigma], axis=1)
         groups, group_of = np.unique(errors, axis=0, return_inverse=True)
@@ -383,7 +385,6 @@ class NoiseLevels:
         fine /= sigma[..., None] * math.sqrt(2.0 * math.pi)
         fine[fine < LEAST_DENSITY] = 0.0
         # If the chances do not depend on the length of a signature, one row does for all lengths.
-        detected = table.detected
         same = (detected == detected[0]).all() and (table.misnamed == table.misnamed[0]).all()
         return cls(
             table=table,
@@ -396,8 +397,8 @@ class NoiseLevels:
             model=LevelModel(
                 group_of=group_of.reshape(-1),
                 detected=(detected[:1] if same else detected).astype(np.float32),
-                remaining=np.stack([by_level(row) for row in table.remaining]).astype(np.float32),
-                leaving=np.stack([by_level(row) for row in table.leaving]).astype(np.float32),
+                remaining=np.stack([by_level(row) for row in remaining]).astype(np.float32),
+                leaving=np.stack([by_level(row) for row in leaving]).astype(np.float32),
             ),
         )
 
