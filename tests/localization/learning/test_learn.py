@@ -367,8 +367,8 @@ def test_intervals_of_certain_associations_equal_the_textbook() -> None:
         for row in range(300)
     ]
     evidence = gather_evidence(views, signatures, taxonomy=TAXONOMY)
-    known = {"missed": np.array([[0.1]]), "clutter": np.array([1e-6]), "sigma": np.ones(1)}
-    model = replace(evidence.start, **known)
+    rates = {"missed": np.array([[0.1]]), "clutter": np.array([1e-6]), "sigma": np.ones(1)}
+    model = replace(evidence.start, **rates)
     rates = estimated_rates(evidence, expected_counts(evidence, model), model)
     rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
     detection = rows["detection"]
