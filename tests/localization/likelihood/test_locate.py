@@ -244,16 +244,10 @@ def test_a_location_converts_to_plain_values_and_points() -> None:
     assert plain["cells"] == len(CITY)
     assert plain["answered"] == location.answer.given
     assert len(plain["candidates"]) == 4
-    assert (
-        location.loglik[location.candidates["cell"]].tolist()
-        == location.candidates["loglik"].to_list()
-    )
-    assert ["explanation" in candidate for candidate in plain["candidates"]] == [
-        True,
-        True,
-        False,
-        False,
-    ]
+    table = location.candidates
+    assert location.loglik[table["cell"]].tolist() == table["loglik"].to_list()
+    explained = ["explanation" in candidate for candidate in plain["candidates"]]
+    assert explained == [True, True, False, False]
     place = plain["place"]
     assert place["within_m"] == 50.0
     assert [place["x"], place["y"]] == [location.estimate.x, location.estimate.y]
