@@ -59,7 +59,8 @@ def test_distances_are_symmetric_from_zero_if_equal_to_one_without_common_values
     measure: Distances, queries: Sequences, rows: Sequences
 ) -> None:
     result = between(measure, queries, rows)
-    assert (result.shape, result.dtype) == ((len(queries), len(rows)), np.float32)
+    assert result.shape == (len(queries), len(rows))
+    assert result.dtype == np.float32
     assert ((result >= 0) & (result <= 1)).all()
     assert not np.diagonal(between(measure, rows, rows)).any()
     for normalized in (True, False):

@@ -105,12 +105,8 @@ def in_intervals(
     codes = {item.name: item.code for item in TAXONOMY.classes}
     rows = estimate.rates[estimate.rates["class"] != ALL].to_dict("records")
     truth = truth or (lambda quantity, code, _: TRUTH[quantity][code])
-    return [
-        row["low_95"]
-        <= truth(row["quantity"], codes[row["class"]], row["distance"])
-        <= row["high_95"]
-        for row in rows
-    ]
+    truths = [truth(row["quantity"], codes[row["class"]], row["distance"]) for row in rows]
+    return [row["low_95"] <= true <= row["high_95"] for row, true in zip(rows, truths, strict=True)]
 
 
 @pytest.fixture(scope="module")
