@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -104,7 +104,10 @@ def test_nearer_cell_is_selected_of_equal_ones() -> None:
     database = random_database(2, cells=1)
     many = np.arange(30)
     repeated = database.select(np.zeros(30, np.int64))
-    places = {"columns": np.zeros(30, np.int32), "rows": (many * 10).astype(np.int32)}
+    places: dict[str, Any] = {
+        "columns": np.zeros(30, np.int32),
+        "rows": (many * 10).astype(np.int32),
+    }
     row = dataclasses.replace(repeated, **places)
     columns = symbol_columns(build_index(row, named_noise("light")))
     result = find_lookalikes(columns, temperature=0.5, radius=20.0, places=2)
