@@ -336,7 +336,8 @@ def _read_all(batch: Batch, numbers: range, corpus: Path, folder: Path, writing:
         _report(writing, number, "")
         fault = ""
         try:
-            if form.read(path) != contents and form.ours:
+            result = form.read(path)
+            if form.ours and result != contents:
                 fault = "read differently"
         except sg.SemsigError as error:
             words = str(error)

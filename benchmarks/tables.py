@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
@@ -106,6 +107,27 @@ _SPEED = """## Speed
 times are for 312,134 cells, on its own machine.
 """
 
+# Titles of the columns of tables.
+_ACCURACY_HEAD = (
+    "noise | method | setting | <= 25 m | <= 50 m | interval | ten objects or more | "
+    "recall@10 % | ms"
+)
+_CHANCE_HEAD = (
+    "city | noise | method | setting | stated | came true | region: stated | holds | just 90 %"
+)
+_ANSWER_HEAD = "city | noise | queries | answered | right, of these"
+_BAYES_HEAD = (
+    "degrees | ranges | detections | at most | by Bayes | the likelihood method | interval | stated"
+)
+_REAL_HEAD = "city | chance | queries | stated | came true | interval"
+_OLD_HEAD = (
+    "city | map | settings | within 50 m | stated | answered | right, of these | "
+    "interval | right, of those below 0.99"
+)
+_BAR_HEAD = "city | figure | target | measured | reached"
+_PAPER_HEAD = "experiment | case | figure | ours | interval | the paper"
+_SPEED_HEAD = "figure | ours | peer | times better | target | the paper"
+
 
 def main() -> None:
     """Write the page of figures, and the table of the soak."""
@@ -139,44 +161,42 @@ def page(
     if plain:
         parts.append(_ACCURACY.format(queries=plain[0]["queries"]))
     for city in dict.fromkeys(row["city"] for row in plain):
-        rows = [row for row in plain if row["city"] == city]
-        parts += [f"### {city}, {rows[0]['cells']:,} cells\n", _accuracy_table(rows)]
+        in_city = [row for row in plain if row["city"] == city]
+        parts += [
+            f"### {city}, {in_city[0]['cells']:,} cells\n",
+            _table(_ACCURACY_HEAD, _accuracy_cells, in_city),
+        ]
     with_regions = [row for row in plain if row["in_region"] is not None]
     sure = [row for row in accuracy if row["coverage"] is not None]
     real = [row for row in chances if row["map"] == TODAY]
     old = [row for row in chances if row["map"] != TODAY]
     bars = [{**bar, "city": row["city"]} for row in accuracy for bar in row["bars"]]
     view_bars = [{**bar.to_dict(), "city": city} for city, bar in bars_of_views(views)]
-    for text, rows, table in (
-        (_CHANCES, with_regions, _chance_table),
-        (_SURE, sure, _answer_table),
-        (_views_text(views), list(views), _view_table),
-        (_VIEW_CHANCES, list(views), _view_chance_table),
-        (_VIEW_BARS, view_bars, _bar_table),
-        (_bayes_text(bayes), list(bayes), _bayes_table),
+    sections = (
+        (_CHANCES, with_regions, partial(_table, _CHANCE_HEAD, _chance_cells)),
+        (_SURE, sure, partial(_table, _ANSWER_HEAD, _answer_cells)),
+        (_views_text(views), views, partial(_view_table, _view_cell)),
+        (_VIEW_CHANCES, views, partial(_view_table, _view_chance_cell)),
+        (_VIEW_BARS, view_bars, partial(_table, _BAR_HEAD, _bar_cells)),
+        (_bayes_text(bayes), bayes, partial(_table, _BAYES_HEAD, _bayes_cells)),
         (_each_level(_REAL, real), real, _real_table),
-        (_each_level(_OLD, old), old, _old_table),
-        (_BARS, bars, _bar_table),
-        (_PAPER, list(paper), _paper_table),
-        (_SPEED, list(speed), _speed_table),
-    ):
+        (_each_level(_OLD, old), old, partial(_table, _OLD_HEAD, _old_cells)),
+        (_BARS, bars, partial(_table, _BAR_HEAD, _bar_cells)),
+        (_PAPER, paper, partial(_table, _PAPER_HEAD, _paper_cells)),
+        (_SPEED, speed, partial(_table, _SPEED_HEAD, _speed_cells)),
+    )
+    for text, rows, table in sections:
         if rows:
             parts += [text, table(rows)]
     return "\n".join(parts)
 
 
-def _paper_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "experiment | case | figure | ours | interval | the paper",
-        (
-            (
-                *(row["section"], row["row"], row["column"]),
-                _number(row["ours"], row["unit"]),
-                "" if row["low"] is None else f"{row['low']:.4f}-{row['high']:.4f}",
-                _number(row["paper"], row["unit"]),
-            )
-            for row in rows
-        ),
+def _paper_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["section"], row["row"], row["column"]),
+        _number(row["ours"], row["unit"]),
+        "" if row["low"] is None else f"{row['low']:.4f}-{row['high']:.4f}",
+        _number(row["paper"], row["unit"]),
     )
 
 
@@ -185,47 +205,28 @@ def _number(value: float, unit: str) -> str:
     return f"{value:,.0f}{unit and ' '}{unit}" if large else f"{value:.4g}{unit and ' '}{unit}"
 
 
-def _accuracy_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "noise | method | setting | <= 25 m | <= 50 m | interval | ten objects or more | "
-        "recall@10 % | ms",
-        (
-            (
-                *(row["distortion"], f"`{row['method']}`", row["setting"]),
-                *(_share(row["p25"]), _share(row["p50"])),
-                f"{_share(row['p50_low'])}-{_share(row['p50_high'])}",
-                *(_share(row["p50_ten"]), _share(row["recall10pct"])),
-                f"{row['ms_per_query']:.3g}",
-            )
-            for row in rows
-        ),
+def _accuracy_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["distortion"], f"`{row['method']}`", row["setting"]),
+        *(_share(row["p25"]), _share(row["p50"])),
+        f"{_share(row['p50_low'])}-{_share(row['p50_high'])}",
+        *(_share(row["p50_ten"]), _share(row["recall10pct"])),
+        f"{row['ms_per_query']:.3g}",
     )
 
 
-def _chance_table(rows: Iterable[dict[str, Any]]) -> str:
+def _chance_cells(row: Mapping[str, Any]) -> Sequence[str]:
     names = ("chance", "p50", "region_mass", "in_region", "in_exact_region")
-    return _table(
-        "city | noise | method | setting | stated | came true | region: stated | holds | just 90 %",
-        (
-            (
-                *(row["city"], row["distortion"], f"`{row['method']}`", row["setting"]),
-                *(_share(row[name]) for name in names),
-            )
-            for row in rows
-        ),
+    return (
+        *(row["city"], row["distortion"], f"`{row['method']}`", row["setting"]),
+        *(_share(row[name]) for name in names),
     )
 
 
-def _answer_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | noise | queries | answered | right, of these",
-        (
-            (
-                *(row["city"], row["distortion"], f"{row['queries']:,}"),
-                *(_share(row["coverage"]), _share(row["precision"])),
-            )
-            for row in rows
-        ),
+def _answer_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["city"], row["distortion"], f"{row['queries']:,}"),
+        *(_share(row["coverage"]), _share(row["precision"])),
     )
 
 
@@ -242,22 +243,13 @@ def _views_text(rows: Sequence[dict[str, Any]]) -> str:
     return _VIEWS.format(queries=f"{queries:,}", photos=photos)
 
 
-def _view_table(rows: Iterable[dict[str, Any]]) -> str:
-    def cell(row: Mapping[str, Any]) -> str:
-        shares = _share(row["p50"]), _share(row["p50_low"]), _share(row["p50_high"])
-        last = f"; last only {_share(row[LAST_ONLY])}" if LAST_ONLY in row else ""
-        return "{} ({}-{}){}".format(*shares, last)
-
-    return _of_views(rows, cell)
+def _view_cell(row: Mapping[str, Any]) -> str:
+    last = f"; last only {_share(row[LAST_ONLY])}" if LAST_ONLY in row else ""
+    return f"{_share(row['p50'])} ({_share(row['p50_low'])}-{_share(row['p50_high'])}){last}"
 
 
-def _view_chance_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _of_views(
-        rows,
-        lambda row: (
-            _share(row["in_region"]) + (f", off {_share(row['off'])}" if row["off"] else "")
-        ),
-    )
+def _view_chance_cell(row: Mapping[str, Any]) -> str:
+    return _share(row["in_region"]) + (f", off {_share(row['off'])}" if row["off"] else "")
 
 
 def _bayes_text(rows: Sequence[dict[str, Any]]) -> str:
@@ -267,72 +259,53 @@ def _bayes_text(rows: Sequence[dict[str, Any]]) -> str:
     return _BAYES.format(**{name: f"{rows[0][name]:,}" for name in ("queries", "cells")})
 
 
-def _bayes_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "degrees | ranges | detections | at most | by Bayes | the likelihood method | interval | "
-        "stated",
-        (
-            (
-                *(str(row["degrees"]), "yes" if row["ranges"] else "no"),
-                f"{row['detections']:.1f}",
-                f"{_share(row['limit'])} ± {_share(row['limit_error'])}",
-                *(_share(row["bayes"]), _share(row["ours"]), _interval(row)),
-                _share(row["stated"]),
-            )
-            for row in rows
-        ),
+def _bayes_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(str(row["degrees"]), "yes" if row["ranges"] else "no"),
+        f"{row['detections']:.1f}",
+        f"{_share(row['limit'])} ± {_share(row['limit_error'])}",
+        *(_share(row["bayes"]), _share(row["ours"]), _interval(row)),
+        _share(row["stated"]),
     )
 
 
-def _of_views(rows: Iterable[dict[str, Any]], cell: Callable[[Mapping[str, Any]], str]) -> str:
+def _view_table(cell: Callable[[Mapping[str, Any]], str], rows: Iterable[dict[str, Any]]) -> str:
     """Return a table with a line for each kind of view, and a column for the inputs."""
     columns = (FULL_TURN, SECTORS, RANGES)
     names = ("city", "seen_from", "photos", "degrees", "queries", "least", "heading")
     lines: dict[tuple[Any, ...], dict[str, str]] = {}
     for row in rows:
         lines.setdefault(tuple(row[name] for name in names), {})[row[INPUTS]] = cell(row)
-    return _table(
-        " | ".join(
-            ["city", "from", "photos", "degrees", "queries", "detections", "heading", *columns]
-        ),
-        (
-            [*map(str, key[:4]), f"{key[4]:,}", f"{key[5]} or more", key[6]]
-            + [values.get(column, "") for column in columns]
-            for key, values in lines.items()
-        ),
+    titles = ("city", "from", "photos", "degrees", "queries", "detections", "heading", *columns)
+    cells = (
+        [*map(str, key[:4]), f"{key[4]:,}", f"{key[5]} or more", key[6]]
+        + [values.get(column, "") for column in columns]
+        for key, values in lines.items()
     )
+    return _table(" | ".join(titles), list, cells)
 
 
 def _real_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | chance | queries | stated | came true | interval",
-        (
-            (
-                *(row["city"], f"{tenth['from']:g} to {tenth['to']:g}", f"{tenth['n']:,}"),
-                *(_share(tenth["stated"]), _share(tenth["true"])),
-                _interval(tenth),
-            )
-            for row in rows
-            for tenth in row["bins"]
-        ),
+    tenths = ({"city": row["city"], **tenth} for row in rows for tenth in row["bins"])
+    return _table(_REAL_HEAD, _real_cells, tenths)
+
+
+def _real_cells(tenth: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(tenth["city"], f"{tenth['from']:g} to {tenth['to']:g}", f"{tenth['n']:,}"),
+        *(_share(tenth["stated"]), _share(tenth["true"])),
+        _interval(tenth),
     )
 
 
-def _old_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | map | settings | within 50 m | stated | answered | right, of these | interval | "
-        "right, of those below 0.99",
-        (
-            (
-                *(row["city"], row["map"], f"`{row[INPUTS]}`" if row[INPUTS] else "nothing"),
-                *(_share(row["p50"]), _share(row["stated"])),
-                f"{row['answered']} of {row['queries']}",
-                f"{row['right'] / row['answered']:.3f}",
-                _interval(row),
-                f"{row['nearly_right']} of {row['nearly']}",
-            )
-            for row in rows
-        ),
+def _old_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["city"], row["map"], f"`{row[INPUTS]}`" if row[INPUTS] else "nothing"),
+        *(_share(row["p50"]), _share(row["stated"])),
+        f"{row['answered']} of {row['queries']}",
+        f"{row['right'] / row['answered']:.3f}",
+        _interval(row),
+        f"{row['nearly_right']} of {row['nearly']}",
     )
 
 
@@ -341,35 +314,23 @@ def _interval(values: Mapping[str, Any]) -> str:
     return "" if low is None else f"{_share(low)}-{_share(high)}"
 
 
-def _bar_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | figure | target | measured | reached",
-        (
-            (
-                *(row["city"], row["what"]),
-                " to ".join(f"{end:g}" for end in (row["low"], row["high"]) if end is not None),
-                "infinite" if row["value"] is None else f"{row['value']:.3f}",
-                "yes" if row["met"] else "no",
-            )
-            for row in rows
-        ),
+def _bar_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["city"], row["what"]),
+        " to ".join(f"{end:g}" for end in (row["low"], row["high"]) if end is not None),
+        "infinite" if row["value"] is None else f"{row['value']:.3f}",
+        "yes" if row["met"] else "no",
     )
 
 
-def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "figure | ours | peer | times better | target | the paper",
-        (
-            (
-                row["name"],
-                f"{row['ours']:,.4g} {row['unit']}",
-                f"{row['peer']:,.4g} {row['unit']} ({row['peer_name']})",
-                f"{row['ratio']:.3g}",
-                "" if row["bar"] is None else f"{row['bar']:.3g}{'' if row['met'] else ', missed'}",
-                "" if row["paper"] is None else f"{row['paper']:,.4g} {row['unit']}",
-            )
-            for row in rows
-        ),
+def _speed_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        row["name"],
+        f"{row['ours']:,.4g} {row['unit']}",
+        f"{row['peer']:,.4g} {row['unit']} ({row['peer_name']})",
+        f"{row['ratio']:.3g}",
+        "" if row["bar"] is None else f"{row['bar']:.3g}{'' if row['met'] else ', missed'}",
+        "" if row["paper"] is None else f"{row['paper']:,.4g} {row['unit']}",
     )
 
 
@@ -387,14 +348,15 @@ def soak_table(rows: Iterable[dict[str, Any]]) -> str:
     total = {"part": "all"} | {name: sum(row[name] for row in rows) for name in counts}
     return _table(
         " | ".join(["trial", *counts]),
-        ([row["part"], *(f"{row[name]:,}" for name in counts)] for row in [*rows, total]),
+        lambda row: [row["part"], *(f"{row[name]:,}" for name in counts)],
+        [*rows, total],
     )
 
 
-def _table(head: str, rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; the titles of `head` are separated by bars."""
+def _table(head: str, cells: Callable[[Any], Sequence[str]], rows: Iterable[Any]) -> str:
+    """Return a table with the cells of each row; the titles of `head` are separated by bars."""
     titles = head.split(" | ")
-    lines = [titles, ["---"] * len(titles), *rows]
+    lines = [titles, ["---"] * len(titles), *map(cells, rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 

@@ -42,23 +42,17 @@ def write_gallery(folder: Path) -> None:
         return
     with tempfile.TemporaryDirectory() as place:
         for kind, code in BLOCK.findall(text):
-            run = _commands if kind == "console" else _python
-            run(code, Path(place))
+            if kind == "python":
+                _run([sys.executable, "-c", code], Path(place))
+                continue
+            for line in code.splitlines():
+                _run(shlex.split(line.removeprefix("$ ")), Path(place))
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         for path in Path(place).iterdir():
             if path.suffix in SHOWN:
                 shutil.copy(path, folder)
     mark.write_text(state, encoding="utf-8")
-
-
-def _commands(code: str, place: Path) -> None:
-    for line in code.splitlines():
-        _run(shlex.split(line.removeprefix("$ ")), place)
-
-
-def _python(code: str, place: Path) -> None:
-    _run([sys.executable, "-c", code], place)
 
 
 def _run(command: list[str], place: Path) -> None:

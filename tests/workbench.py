@@ -19,7 +19,7 @@ from PIL.ExifTags import IFD
 from semsig_gis.serve import make_server, open_listener
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from semsig_gis.serve import Workbench
 
@@ -59,15 +59,19 @@ class Page:
         assert code == 200, content
         return json.loads(content)
 
-    def refused(self, path: str, body: object = None, **headers: str) -> tuple[int, str]:
-        """Return the status code and the message of a refused request."""
+    def refused(
+        self, path: str, body: object = None, *words: str, code: int = 422, **headers: str
+    ) -> None:
+        """Check that a request is refused with a code and one line with some words."""
         data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-        code, answer_headers, content = self.send(path, data, **headers)
+        status, answer_headers, content = self.send(path, data, **headers)
         assert answer_headers["content-type"] == "application/json"
         text = json.loads(content)["error"]
+        assert status == code, text
         assert text.endswith(".")
         assert "\n" not in text
-        return code, text
+        assert "/tmp" not in text  # noqa: S108 - no path of the server
+        assert [word for word in words if word not in text] == [], text
 
 
 @contextlib.contextmanager
@@ -96,7 +100,7 @@ def decompression_bomb() -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
 
 
-def picture(form: str = "JPEG", **sections: dict[int, Any]) -> bytes:
+def picture(form: str = "JPEG", **sections: Mapping[Any, Any]) -> bytes:
     """Return a picture with EXIF tags in the sections ``image``, ``exif`` and ``gps``."""
     exif = Image.Exif()
     exif.update(sections.get("image", {}))

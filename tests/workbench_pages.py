@@ -72,6 +72,16 @@ class WorkbenchPage(BrowserPage):
         self.one(selector).send_keys("\n".join(map(str, files)))
         return self.settle()
 
+    def give_new(self, selector: str, name: str, content: str | bytes) -> str:
+        """Write a file, and choose it in a file input; return the sentence of the answer."""
+        file = self.folder / name
+        file.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return self.give(selector, file)
+
+    def notice(self) -> str:
+        """Wait for a notice of the page; return it."""
+        return str(self.until("return document.querySelector('#notice span')?.textContent"))
+
     def slide(self, selector: str, value: float) -> str:
         self.ask(
             "const [at, value] = arguments; const input = document.querySelector(at);"

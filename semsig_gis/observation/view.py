@@ -219,7 +219,6 @@ class View(Signature):
 
     def _check(self) -> None:
         """Raise InputError if arrays do not fit each other or numbers are out of range."""
-        count = len(self)
         plain = self.photos == (FULL_VIEW,) and self.ranges is None
         if self.bearings is None and not plain:
             raise InputError(
@@ -228,9 +227,9 @@ class View(Signature):
         shapes = {"ranges": (), "range_errors": (), "photo": (), "scores": (CLASSES,)}
         for name, rest in shapes.items():
             value = getattr(self, name)
-            if value is not None and value.shape != (count, *rest):
+            if value is not None and value.shape != (len(self), *rest):
                 raise InputError(
-                    f"{len(value)} {name.replace('_', ' ')} were given for {count} objects; "
+                    f"{len(value)} {name.replace('_', ' ')} were given for {len(self)} objects; "
                     "give one for each."
                 )
         for name, most in (("ranges", MAX_RANGE_M), ("range_errors", MOST_RANGE_ERROR)):
@@ -242,7 +241,7 @@ class View(Signature):
                 raise InputError(
                     f"a {what} is {bad[0]:g}; give a number above 0 and up to {most:,.0f}."
                 )
-        if self.scores is not None and count:
+        if self.scores is not None and len(self.scores):
             sums = self.scores.sum(axis=1)
             if not ((self.scores >= 0).all() and np.allclose(sums, 1.0, atol=ROUNDING)):
                 raise InputError(
@@ -255,7 +254,7 @@ class View(Signature):
         numbers = self.photo
         if (
             numbers is not None
-            and count
+            and len(numbers)
             and not 0 <= numbers.min() <= numbers.max() < len(self.photos)
         ):
             raise InputError(

@@ -104,15 +104,10 @@ def test_nearer_cell_is_selected_of_equal_ones() -> None:
     database = random_database(2, cells=1)
     many = np.arange(30)
     repeated = database.select(np.zeros(30, np.int64))
-    row = dataclasses.replace(
-        repeated, columns=np.zeros(30, np.int32), rows=(many * 10).astype(np.int32)
-    )
-    result = find_lookalikes(
-        symbol_columns(build_index(row, named_noise("light"))),
-        temperature=0.5,
-        radius=20.0,
-        places=2,
-    )
+    places = {"columns": np.zeros(30, np.int32), "rows": (many * 10).astype(np.int32)}
+    row = dataclasses.replace(repeated, **places)
+    columns = symbol_columns(build_index(row, named_noise("light")))
+    result = find_lookalikes(columns, temperature=0.5, radius=20.0, places=2)
     assert sorted(result.cells[10].tolist()) == [9, 11]
     assert np.allclose(result.sums[10], 1.0, rtol=1e-3)
     assert math.isclose(result.far[10], 29.0, rel_tol=1e-3)

@@ -121,7 +121,7 @@ def test_invalid_row_of_table_does_not_affect_others(tmp_path: Path) -> None:
     assert [line.line for line in result if isinstance(line.query, InputError)] == [3, 4, 6]
 
 
-def test_route_has_legs_between_views() -> None:
+def test_route_has_legs_between_views(tmp_path: Path) -> None:
     lines = """
 {"id": "start", "types": "DB", "bearings": [10, 200]}
 {"dx": 3, "dy": -4, "sigma": 2}
@@ -131,15 +131,10 @@ def test_route_has_legs_between_views() -> None:
     assert [name for name, _ in views] == ["start", 3, 4]
     assert [len(view) for _, view in views] == [2, 0, 1]
     assert legs == [Leg(dx=3.0, dy=-4.0, sigma=2.0), Leg.towards(90.0, 20.0, sigma=0.0)]
-
-
-def test_bearings_of_route_are_from_given_north() -> None:
-    lines = ['{"types": "D"}', '{"types": "D", "bearing": 80, "distance": 20}']
-    (leg,) = parse_route(lines, "x", taxonomy=TAXONOMY, north=North(name="true", turn=10.0))[1]
+    north = North(name="true", turn=10.0)
+    rows = ['{"types": "D"}', '{"types": "D", "bearing": 80, "distance": 20}']
+    (leg,) = parse_route(rows, "x", taxonomy=TAXONOMY, north=north)[1]
     assert (leg.dx, leg.dy) == pytest.approx((20.0, 0.0))
-
-
-def test_route_in_table_is_read(tmp_path: Path) -> None:
     (tmp_path / "route.csv").write_text("types,dx,dy\nDB,,\nD,0,5.5\n")
     views, legs = read_route(tmp_path / "route.csv", taxonomy=TAXONOMY)
     assert [name for name, _ in views] == [2, 3]

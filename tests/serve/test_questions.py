@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import numpy as np
 import pytest
+from noisy_cells import parts_of
 from PIL import Image
 from PIL.ExifTags import GPS, Base
 from pyproj import Transformer
 from workbench import coco, decompression_bomb, picture
 
 from semsig_gis.database import visible_objects_at
-from semsig_gis.observation import Camera, View
+from semsig_gis.observation import Camera
 from semsig_gis.serve import Question, Workbench, city_streets
 
 if TYPE_CHECKING:
@@ -141,8 +142,7 @@ def test_panorama_is_recognized_by_its_ratio(page: Page) -> None:
     ids=["text", "nothing", "svg", "heic", "bomb", "cut", "postscript"],
 )
 def test_invalid_picture_is_refused(page: Page, content: bytes, word: str) -> None:
-    code, text = page.refused("/api/photo?name=x.jpg", content)
-    assert (code, word in text, "x.jpg" in text) == (422, True, True)
+    page.refused("/api/photo?name=x.jpg", content, word, "x.jpg")
 
 
 @pytest.mark.parametrize("heading", [None, 80.0])
@@ -288,11 +288,9 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
     photos[0]["marks"].append(dict(photos[0]["marks"][2]))
     question = Question.parse({"views": [{"photos": photos}]}, taxonomy=bench.taxonomy, radius=30.0)
     (view,), (numbers,) = question.views, question.marks
-    assert isinstance(view, View)
     assert sorted(numbers) == [(0, n, m) for n in range(3) for m in range(len(photos[n]["marks"]))]
     camera = Camera(width=WIDTH, height=HEIGHT, fov=FOV)
-    assert view.bearings is not None
-    for bearing, (_, row, mark) in zip(view.bearings.tolist(), numbers, strict=True):
+    for bearing, (_, row, mark) in zip(parts_of(view)[1].tolist(), numbers, strict=True):
         x = photos[row]["marks"][mark]["x"]
         away = math.degrees(math.atan((x - WIDTH / 2) / camera.focal))
         expected = ((photos[row]["heading"] or 0.0) + away) % 360
@@ -331,30 +329,22 @@ def test_marks_keep_their_numbers_in_sorted_views(bench: Workbench) -> None:
 )
 def test_invalid_question_is_refused(page: Page, change: dict[str, Any], word: str) -> None:
     mark = {"x": 10, "y": 10, "class": "street_light"} | change.get("mark", {})
-    inner = {
-        key: value
-        for key, value in change.items()
-        if key in SIDE or key.startswith(("fov", "head"))
-    }
-    marked_photo = {**SIDE, "fov": FOV, "heading": 0.0, "marks": [mark], **inner}
+    marked_photo = {**SIDE, "fov": FOV, "heading": 0.0, "heading_error": None, "marks": [mark]}
+    inner = {key: value for key, value in change.items() if key in marked_photo}
     outer = {key: value for key, value in change.items() if key not in {"mark", *inner}}
-    code, text = page.refused("/api/answer", {"views": [{"photos": [marked_photo]}], **outer})
-    assert (code, word in text) == (422, True), text
+    marked_photo |= inner
+    page.refused("/api/answer", {"views": [{"photos": [marked_photo]}], **outer}, word)
 
 
 def test_detector_boxes_become_marks(page: Page) -> None:
-    document = coco(
-        "a.jpg",
-        (WIDTH, HEIGHT),
+    boxes: list[tuple[str, list[float], float]] = [
         ("bench", [1900, 1500, 200, 100], 0.9),
         ("dog", [100, 100, 50, 50], 0.9),
         ("bench", [100, 100, 50, 50], 0.1),
-    )
-    body = {
-        "text": document,
-        "name": "../../boxes.json",
-        "photos": [{**SIDE, "fov": FOV, "heading": 90.0}],
-    }
+    ]
+    photos = [{**SIDE, "fov": FOV, "heading": 90.0}]
+    document = coco("a.jpg", (WIDTH, HEIGHT), *boxes)
+    body = {"text": document, "name": "../../boxes.json", "photos": photos}
     reply = page.ask("/api/boxes", body)
     (mark,) = reply["photos"]["a.jpg"]
     assert (mark["box"], mark["score"]) == ([1900, 1500, 2100, 1600], 0.9)
@@ -370,8 +360,7 @@ def test_detector_boxes_become_marks(page: Page) -> None:
         ({"photos": [{**SIDE, "name": "z.jpg", "fov": FOV}]}, "a.jpg"),
         ({"photos": [SIDE]}, "field of view"),
     ):
-        code, text = page.refused("/api/boxes", body | change)
-        assert (code, word in text, "/tmp" in text) == (422, True, False), text  # noqa: S108
+        page.refused("/api/boxes", body | change, word)
 
 
 def test_yolo_boxes_use_the_list_of_labels(page: Page) -> None:
@@ -415,8 +404,7 @@ def test_cell_request_returns_the_view_from_its_middle(page: Page) -> None:
     question = {"views": [reply["view"]], "seen_from": "cells", "top": 3}
     best = page.ask("/api/answer", question)["candidates"][0]
     assert (best["cell"], best["types"]) == (reply["cell"], reply["types"])
-    code, text = page.refused("/api/cell", {"place": [0.0, 0.0]})
-    assert (code, "no cell" in text) == (422, True), text
+    page.refused("/api/cell", {"place": [0.0, 0.0]}, "no cell")
 
 
 @pytest.mark.parametrize("fov", [None, 120.0])
@@ -451,9 +439,8 @@ def test_simulated_view_is_answered(page: Page, fov: float | None) -> None:
     ],
 )
 def test_invalid_simulation_is_refused(page: Page, change: dict[str, Any], word: str) -> None:
-    body = {"place": latlon(page.bench, longest(page.bench)), **change}
-    code, text = page.refused("/api/simulate", body)
-    assert (code, word in text) == (422, True), text
+    place = latlon(page.bench, longest(page.bench))
+    page.refused("/api/simulate", {"place": place, **change}, word)
 
 
 @pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml"])

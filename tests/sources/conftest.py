@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from machine import PATIENCE_S
@@ -40,7 +40,12 @@ def read_as(tmp_path: Path) -> Callable[..., RawLayer]:
     """Read a layer from a file of this name and content: text, bytes, or what becomes JSON."""
 
     def call(
-        name: str, content: object, spec: LayerSpec, *, by: str = "opendatasoft", **options: object
+        name: str,
+        content: object,
+        spec: LayerSpec,
+        *,
+        by: str = "opendatasoft",
+        **options: Any,  # noqa: ANN401
     ) -> RawLayer:
         text = content if isinstance(content, str | bytes) else json.dumps(content)
         path = tmp_path / name

@@ -484,7 +484,7 @@ LOG_IN = Answer(b'{"message": "Log in"}', status=403)
 
 
 @pytest.mark.parametrize(
-    ("change", "answers", "error", "words"),
+    "case",
     [
         ({"dataset": "arbres"}, {}, CatalogError, UNKNOWN_DATASET),
         (
@@ -504,14 +504,9 @@ LOG_IN = Answer(b'{"message": "Log in"}', status=403)
     ],
 )
 def test_error_of_a_portal_names_the_cause(
-    server: Server,
-    fetched: Fetch,
-    *,
-    change: dict[str, Any],
-    answers: dict[str, Answer],
-    error: type[Exception],
-    words: list[str],
+    server: Server, fetched: Fetch, case: tuple[Any, ...]
 ) -> None:
+    change, answers, error, words = case
     for path, answer in answers.items():
         server.on(path, answer)
     with refused(error, *words):

@@ -314,7 +314,7 @@ NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T
 
 
 @pytest.mark.parametrize(
-    ("resources", "files", "expected"),
+    "case",
     [
         ([CSV, {"format": "GeoJSON", "url": "/files/lamps.geojson"}], (), "lamps.geojson"),
         ([CSV, {"format": "", "url": "/files/lamps.geojson?a=b"}], ("*.CSV",), "lamps_2023.csv"),
@@ -323,15 +323,10 @@ NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T
     ],
 )
 def test_ckan_file_has_the_best_format(
-    server: Server,
-    fetched: Fetch,
-    *,
-    resources: list[dict[str, Any]],
-    files: tuple[str, ...],
-    expected: str,
+    server: Server, fetched: Fetch, case: tuple[Any, ...]
 ) -> None:
     service = Ckan(server)
-    service.resources = resources
+    service.resources, files, expected = case
     table = "OBJECTID,KIND,lon,lat\n" + "".join(
         f"{row['OBJECTID']},{row['KIND']},{row['xy'][0]},{row['xy'][1]}\n" for row in ROWS
     )

@@ -486,7 +486,7 @@ DEGREES, PLANE = (3, 43), (765277, 6275109)
 
 
 @pytest.mark.parametrize(
-    ("members", "place", "stated", "crs", "notes"),
+    "case",
     [
         ({}, DEGREES, None, "EPSG:4326", ()),
         ({}, DEGREES, "EPSG:2154", "EPSG:2154", (STATED,)),
@@ -494,14 +494,8 @@ DEGREES, PLANE = (3, 43), (765277, 6275109)
         (CRS84, DEGREES, "EPSG:2154", "EPSG:4326", (OTHER,)),
     ],
 )
-def test_crs_of_geojson(  # noqa: PLR0917
-    tmp_path: Path,
-    members: dict[str, object],
-    place: tuple[float, float],
-    stated: str | None,
-    crs: str,
-    notes: tuple[str, ...],
-) -> None:
+def test_crs_of_geojson(tmp_path: Path, case: tuple[Any, ...]) -> None:
+    members, place, stated, crs, notes = case
     # A property of that name says nothing.
     path = write_geojson(tmp_path, point(*place), rows=[{"crs": "EPSG:2154"}], **members)
     layer = read(path, crs=stated)

@@ -131,23 +131,19 @@ def test_quoted_cells_may_contain_commas_and_line_breaks(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("text", "table", "words"),
+    ("name", "text", "words"),
     [
-        ("", False, ["no rows", "one thing"]),
-        ("a,b\n", True, ["no rows"]),
-        ("{", False, ["line 1", "not JSON"]),
-        ("\n[1]", False, ["line 2", "names and values"]),
-        ("[" * 100_000, False, ["line 1"]),
-        ("types\n" + "D" * 200_000, True, ["not CSV"]),
+        ("x.jsonl", "", ["no rows", "one thing"]),
+        ("x.csv", "a,b\n", ["no rows"]),
+        ("x.jsonl", "{", ["line 1", "not JSON"]),
+        ("x.jsonl", "\n[1]", ["line 2", "names and values"]),
+        ("x.jsonl", "[" * 100_000, ["line 1"]),
+        ("x.csv", "types\n" + "D" * 200_000, ["not CSV"]),
     ],
 )
 def test_error_names_the_unusable_row(
-    tmp_path: Path,
-    text: str,
-    table: bool,  # noqa: FBT001
-    words: list[str],
+    tmp_path: Path, name: str, text: str, words: list[str]
 ) -> None:
-    path = tmp_path / ("x.csv" if table else "x.jsonl")
-    path.write_text(text)
-    with refused(InputError, path.name, *words):
-        read_rows(path, dict, what="thing")
+    (tmp_path / name).write_text(text)
+    with refused(InputError, name, *words):
+        read_rows(tmp_path / name, dict, what="thing")

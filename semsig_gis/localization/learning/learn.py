@@ -299,7 +299,14 @@ def _true_views(
         )
     photos = np.array([len(View.of(sample.signature).photos) for sample in samples])
     if isinstance(city, SignatureDatabase):
-        true_ids = np.array([_cell_id(sample, city) for sample in samples])
+        true_ids = np.array(
+            [
+                cell_ids(*city.grid.cells_at(np.array([sample.xy])))[0]
+                if sample.cell_id is None
+                else sample.cell_id
+                for sample in samples
+            ]
+        )
         cells = np.minimum(np.searchsorted(city.cell_ids, true_ids), len(city) - 1)
         used = np.flatnonzero(city.cell_ids[cells] == true_ids)
         views = visible_objects_in(city, np.repeat(cells[used], photos[used]))
@@ -323,12 +330,6 @@ def _true_views(
             "cell ids."
         )
     return views, used.tolist()
-
-
-def _cell_id(sample: Sample, database: SignatureDatabase) -> int:
-    if sample.cell_id is not None:
-        return sample.cell_id
-    return int(cell_ids(*database.grid.cells_at(np.array([sample.xy])))[0])
 
 
 def _spec(

@@ -286,7 +286,7 @@ def associate_pairs(
 
     Returns the chance that each pair is one thing, and the logarithm of the sum of each problem.
     """
-    from semsig_gis.localization.likelihood.association_kernels import associate  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.association_kernels import associate  # noqa: PLC0415 - numba, 0.25 s
 
     chances = np.empty(len(weights))
     log_sums = np.empty(len(pairs.starts) - 1)
@@ -410,7 +410,7 @@ def _replace_best(
     `rank` returns log-likelihoods and turns of cells: it is called for the `first` cells, then for
     more and more up to `count`. The others are shifted by a `sample` of them.
     """
-    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba, 0.25 s
 
     total = old if log_prior is None else old + log_prior
     count = min(count, len(old))
@@ -483,7 +483,7 @@ def _score_cells(
     off_centre: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood of some cells, and the likeliest turns of the photos in each."""
-    from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba, 0.25 s
 
     models, points = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
     views = (

@@ -150,7 +150,7 @@ def photo_loglik(
     turns, or only the sum over the `whole`, in which likely places come first, then terms that are
     negligible in the sum (`LOST_SHARE`) are not computed: they get an upper bound.
     """
-    from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba takes 250 ms
+    from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba, 0.25 s
 
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)

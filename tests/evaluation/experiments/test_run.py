@@ -97,10 +97,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a town, and the same town after some objects moved."""
     place = tmp_path_factory.mktemp("towns")
     save_town(place)
-    moved = World(
-        tuple((x + 40.0 * (row % 4 == 0), y, code) for row, (x, y, code) in enumerate(TOWN.objects))
-    )
-    save_town(place, moved, "later.parquet")
+    rows = enumerate(TOWN.objects)
+    moved = tuple((x + 40.0 * (row % 4 == 0), y, code) for row, (x, y, code) in rows)
+    save_town(place, World(moved), "later.parquet")
     west, nook = shapely.box(-50, -50, 100, 250), shapely.box(100, 0, 150, 9)
     boxes = gpd.GeoSeries([west, nook], crs="EPSG:2154").translate(*CORNER)
     parts = gpd.GeoDataFrame({"part": ["west", "nook"]}, geometry=boxes)
@@ -162,9 +161,7 @@ def test_all_methods_answer_the_same_queries(results: Path) -> None:
 
 def test_a_case_equals_a_single_evaluation(results: Path) -> None:
     case = open_results(results)["none/paper-top3"]
-    single = evaluate(
-        TOWN.database, queries=13, method=Method.parse("edit+edit:5%"), distortion="", top=3
-    )
+    single = evaluate(TOWN.database, queries=13, method="edit+edit:5%", distortion="", top=3)
     assert_geodataframe_equal(case.queries, single.queries)
 
 
@@ -244,20 +241,14 @@ def test_failed_batches_are_reported_and_the_others_are_kept(
     resume(folder, tmp_path, results)
 
 
-def test_run_killed_after_its_rename_is_cleaned_up(
-    folder: Path, results: Path, tmp_path: Path
-) -> None:
-    shutil.copytree(results, tmp_path / "out")
-    (tmp_path / "out" / "_parts").mkdir()
-    (tmp_path / "out" / "_parts" / "none.paper.00000.parquet").write_bytes(b"left")
-    resume(folder, tmp_path, results)
-
-
-def test_run_killed_before_its_inputs_are_written_is_resumed(
+def test_run_killed_before_its_inputs_are_written_or_after_its_rename_is_resumed(
     folder: Path, results: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "out.partial").mkdir()
     shutil.copy(results / "experiment.toml", tmp_path / "out.partial")
+    resume(folder, tmp_path, results)
+    (tmp_path / "out" / "_parts").mkdir()
+    (tmp_path / "out" / "_parts" / "none.paper.00000.parquet").write_bytes(b"left")
     resume(folder, tmp_path, results)
 
 

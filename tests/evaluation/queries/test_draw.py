@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -85,9 +86,7 @@ def test_queries_do_not_depend_on_their_number_seeds_and_parts(seen_from: SeenFr
         return [(item.seed, item.number, item.xy, item.pick, rows(item)) for item in queries]
 
     whole = draw(spec)
-    assert [item[:2] for item in whole] == [
-        (seed, number) for seed in (7, 2) for number in range(5)
-    ]
+    assert [item[:2] for item in whole] == list(itertools.product((7, 2), range(5)))
     assert len({item[2] for item in whole}) == 10
     assert draw(replace(spec, number=3)) == whole[:3] + whole[5:8]
     assert draw(replace(spec, seeds=(2,))) == whole[5:]
@@ -157,9 +156,8 @@ def test_classes_are_matched_by_name_and_unknown_ones_are_dropped() -> None:
 
 def monaco(geodata: Path, year: int) -> tuple[SignatureDatabase, ObjectStore]:
     catalog = load_catalog("openstreetmap")
-    layers, _ = read_files(
-        choose_layers(catalog, surroundings=True), [geodata / "osm" / f"monaco_{year}.osm.pbf"]
-    )
+    file = geodata / "osm" / f"monaco_{year}.osm.pbf"
+    layers, _ = read_files(choose_layers(catalog, surroundings=True), [file])
     loaded = assemble(layers, catalog)
     database = build_database(
         loaded.objects, viewpoints=ViewpointSpec(mode="outdoor"), footprints=loaded.buildings

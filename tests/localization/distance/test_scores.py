@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from noisy_cells import METHODS, NOTHING, asked, database_of, random_cells
+from noisy_cells import METHODS, asked, database_of, random_cells
 
 from semsig_gis.core import InputError, Signature
 from semsig_gis.localization import DistanceMemo, Method, metric, score_cells
@@ -94,6 +94,7 @@ def test_queries_with_different_parts_may_be_mixed() -> None:
         *(Signature(None, query.bearings) for query in whole[4:]),
     ]
     assert_scores_equal_single_scores([queries[place] for place in (2, 0, 4, 1, 5, 3)], Method())
+    assert list(score_cells(CITY, [])) == []
 
 
 @pytest.mark.parametrize("keep", [None, 5.0])
@@ -144,12 +145,6 @@ def test_query_without_compared_part_is_refused_before_iteration(
 ) -> None:
     with pytest.raises(InputError, match=words):
         score_cells(CITY, [query], Method.parse(text))
-
-
-def test_empty_query_has_distance_one_to_every_cell() -> None:
-    (scores,) = score_cells(CITY, [NOTHING])
-    assert scores.tolist() == [1] * len(CITY)
-    assert list(score_cells(CITY, [])) == []
 
 
 def test_memo_computes_distances_once_and_counts_saved_time() -> None:

@@ -218,6 +218,7 @@ def test_absent_class_is_false_detection(tmp_path: Path, text: str) -> None:
 def test_all_cells_tie_for_empty_query(query: Signature, text: str) -> None:
     result = localize(CITY, query, method=Method.parse(text), top=3)
     assert result.candidates["tied"].tolist() == [len(CITY)] * 3
+    assert result.candidates["distance"].tolist() == [1.0] * 3
     assert len(result.notes) == 1
 
 

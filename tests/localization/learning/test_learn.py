@@ -32,6 +32,7 @@ from semsig_gis.localization import (
 from semsig_gis.observation import Photo, View
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from semsig_gis.database import SignatureDatabase
@@ -46,21 +47,30 @@ TRUTH = {"detection": DETECTION, "misnamed": MISNAMED, "clutter": CLUTTER, "bear
 DATABASE = random_database(1, cells=200)
 
 
-def detector(seed: int, objects: list[tuple[int, float]]) -> Signature:
+def drawn_name(dice: random.Random, code: int) -> int:
+    """Draw the class that is given to an object."""
+    misnamed = dice.random() < MISNAMED[code]
+    return dice.choice([other for other in DETECTION if other != code]) if misnamed else code
+
+
+def false_detections(dice: random.Random, scale: float = 1.0) -> Iterator[int]:
+    """Draw classes of false detections; each number of a class is a Poisson number by Knuth."""
+    for code, rate in CLUTTER.items():
+        alive = dice.random()
+        while alive > math.exp(-scale * rate):
+            yield code
+            alive *= dice.random()
+
+
+def detector(seed: int, objects: list[tuple[int, float, float]]) -> Signature:
     """Detect things as a plain loop over the throws of dice."""
     dice = random.Random(seed)  # noqa: S311
     detections: list[tuple[float, int]] = []
-    for code, bearing in objects:
+    for code, bearing, _ in objects:
         if dice.random() < DETECTION[code]:
-            name = code
-            if dice.random() < MISNAMED[code]:
-                name = dice.choice([other for other in DETECTION if other != code])
+            name = drawn_name(dice, code)
             detections.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name))
-    for code, rate in CLUTTER.items():
-        alive = dice.random()
-        while alive > math.exp(-rate):  # Knuth's Poisson numbers
-            detections.append((dice.uniform(0, 360), code))
-            alive *= dice.random()
+    detections += [(dice.uniform(0, 360), code) for code in false_detections(dice)]
     detections.sort()
     return Signature(
         np.array([code for _, code in detections], np.uint8),
@@ -68,26 +78,35 @@ def detector(seed: int, objects: list[tuple[int, float]]) -> Signature:
     )
 
 
-def simulated(database: SignatureDatabase, count: int, *, seed: int = 0) -> list[Sample]:
+def simulated(
+    database: SignatureDatabase,
+    count: int,
+    *,
+    seed: int = 0,
+    observe: Callable[[int, list[tuple[int, float, float]]], Signature] = detector,
+) -> list[Sample]:
+    """Return what a detector observes in the cells, one after the other."""
     views = visible_objects_in(database, np.arange(len(database)))
+    columns = (views.codes, views.bearings, views.distances)
     samples = []
     for number in range(count):
         cell = number % len(database)
         part = slice(views.offsets[cell], views.offsets[cell + 1])
-        objects = zip(views.codes[part].tolist(), views.bearings[part].tolist(), strict=True)
-        signature = detector(seed * 100_000 + number, list(objects))
+        objects = list(zip(*(column[part].tolist() for column in columns), strict=True))
+        signature = observe(seed * 100_000 + number, objects)
         samples.append(Sample(signature=signature, cell_id=int(database.cell_ids[cell])))
     return samples
 
 
-def truths(estimate: NoiseEstimate) -> list[tuple[float, float, float]]:
-    """Return the true value of each rate of a class, and its interval."""
+def in_intervals(
+    estimate: NoiseEstimate, truth: Callable[[str, int, float], float] | None = None
+) -> list[bool]:
+    """Return whether each true rate of a class is in its interval."""
     codes = {item.name: item.code for item in TAXONOMY.classes}
-    rows = estimate.rates[estimate.rates["class"] != "all"]
-    return [
-        (TRUTH[row["quantity"]][codes[row["class"]]], row["low_95"], row["high_95"])
-        for row in rows.to_dict("records")
-    ]
+    rows = estimate.rates[estimate.rates["class"] != ALL].to_dict("records")
+    truth = truth or (lambda quantity, code, _: TRUTH[quantity][code])
+    truths = [truth(row["quantity"], codes[row["class"]], row["distance"]) for row in rows]
+    return [row["low_95"] <= true <= row["high_95"] for row, true in zip(rows, truths, strict=True)]
 
 
 @pytest.fixture(scope="module")
@@ -96,9 +115,9 @@ def estimate() -> NoiseEstimate:
 
 
 def test_the_true_rates_are_recovered_within_their_intervals(estimate: NoiseEstimate) -> None:
-    rows = truths(estimate)
-    assert len(rows) == 16
-    assert sum(low <= true <= high for true, low, high in rows) >= 14
+    inside = in_intervals(estimate)
+    assert len(inside) == 16
+    assert sum(inside) >= 14
     assert (estimate.rates["low_95"] <= estimate.rates["low_90"]).all()
     assert (estimate.rates["high_95"] >= estimate.rates["high_90"]).all()
     assert np.isfinite(estimate.rates["value"]).all()
@@ -118,8 +137,7 @@ def test_intervals_have_their_coverage() -> None:
     database = random_database(2, cells=100, longest=8)
     inside = []
     for seed in range(12):
-        estimate = learn_noise(simulated(database, 250, seed=seed + 1), database)
-        inside += [low <= true <= high for true, low, high in truths(estimate)]
+        inside += in_intervals(learn_noise(simulated(database, 250, seed=seed + 1), database))
     assert 0.88 <= np.mean(inside) <= 0.995
 
 
@@ -129,20 +147,17 @@ def test_rates_of_a_rare_class_are_shrunk_to_the_overall_rate() -> None:
     codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
     estimate = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
     name = TAXONOMY.by_code(rare).name
-    row = estimate.rates[
-        (estimate.rates["quantity"] == "detection") & (estimate.rates["class"] == name)
-    ]
+    row = estimate.rates.set_index(["quantity", "class"]).loc["detection", name]
     overall = estimate.spec.detection
-    assert row["samples"].item() == 2
-    assert abs(row["value"].item() - overall) < abs(row["own"].item() - overall) + 1e-9
-    assert row["value"].item() == pytest.approx(overall, abs=0.2)
+    assert row["samples"] == 2
+    assert abs(row["value"] - overall) < abs(row["own"] - overall) + 1e-9
+    assert row["value"] == pytest.approx(overall, abs=0.2)
 
 
 def test_position_uncertainty_is_not_learnt_as_bearing_noise() -> None:
     rng = np.random.default_rng(0)
-    world = World(
-        tuple((x, y, int(rng.choice(CODES[:2]))) for x, y in rng.uniform(0, 300, (90, 2)))
-    )
+    places = rng.uniform(0, 300, (90, 2))
+    world = World(tuple((x, y, int(rng.choice(CODES[:2]))) for x, y in places))
     database, objects = world.database, world.street_objects
     samples = []
     for _ in range(400):
@@ -197,16 +212,13 @@ def photographer(seed: int, objects: list[tuple[int, float, float]]) -> View:
         detections = []
         for code, bearing, distance in objects:
             if dice.random() < DETECTION[code] * left(distance):
-                name = code
-                if dice.random() < MISNAMED[code]:
-                    name = dice.choice([other for other in DETECTION if other != code])
+                name = drawn_name(dice, code)
                 metres = max(distance, 0.1) * math.exp(dice.gauss(0, RANGE_SIGMA[code]))
                 detections.append(((bearing + dice.gauss(0, SIGMA[code])) % 360, name, metres))
-        for code, rate in CLUTTER.items():
-            alive = dice.random()
-            while alive > math.exp(-3 * rate):
-                detections.append((dice.uniform(0, 360), code, 30 * math.sqrt(dice.random())))
-                alive *= dice.random()
+        detections += [
+            (dice.uniform(0, 360), code, 30 * math.sqrt(dice.random()))
+            for code in false_detections(dice, 3.0)
+        ]
         rows += [(*detection, number) for detection in detections if photo.sees(detection[0])]
     scores = np.zeros((len(rows), 256))
     for row, (_, name, _, _) in enumerate(rows):
@@ -227,21 +239,6 @@ def photographer(seed: int, objects: list[tuple[int, float, float]]) -> View:
     )
 
 
-def photographed(count: int, *, seed: int = 0) -> NoiseEstimate:
-    """Learn from photos from the cells of a random city."""
-    database = random_database(seed, cells=100, longest=14)
-    views = visible_objects_in(database, np.arange(len(database)))
-    samples = []
-    for number in range(count):
-        cell = number % len(database)
-        part = slice(views.offsets[cell], views.offsets[cell + 1])
-        columns = (views.codes, views.bearings, views.distances)
-        objects = list(zip(*(column[part].tolist() for column in columns), strict=True))
-        view = photographer(seed * 100_000 + number, objects)
-        samples.append(Sample(signature=view, cell_id=int(database.cell_ids[cell])))
-    return learn_noise(samples, database)
-
-
 def photo_truth(quantity: str, code: int, distance: float) -> float:
     if quantity in {"detection", "fading"}:
         return DETECTION[code] * left(distance)
@@ -251,15 +248,12 @@ def photo_truth(quantity: str, code: int, distance: float) -> float:
 
 
 def test_photos_recover_rates_ranges_and_fading() -> None:
-    codes = {item.name: item.code for item in TAXONOMY.classes}
     inside = []
     for seed in range(2):
-        estimate = photographed(800, seed=seed)
-        rows = estimate.rates[estimate.rates["class"] != ALL].to_dict("records")
-        assert len(rows) == 4 * (5 + 4)
-        for row in rows:
-            true = photo_truth(row["quantity"], codes[row["class"]], row["distance"])
-            inside.append(row["low_95"] <= true <= row["high_95"])
+        database = random_database(seed, cells=100, longest=14)
+        samples = simulated(database, 800, seed=seed, observe=photographer)
+        inside += in_intervals(learn_noise(samples, database), photo_truth)
+    assert len(inside) == 2 * 4 * (5 + 4)
     assert np.mean(inside) >= 0.87
 
 
@@ -369,12 +363,8 @@ def test_intervals_of_certain_associations_equal_the_textbook() -> None:
         for row in range(300)
     ]
     evidence = gather_evidence(views, signatures, taxonomy=TAXONOMY)
-    model = replace(
-        evidence.start,
-        missed=np.array([[0.1]]),
-        clutter=np.array([1e-6]),
-        sigma=np.array([1.0]),
-    )
+    known = {"missed": np.array([[0.1]]), "clutter": np.array([1e-6]), "sigma": np.ones(1)}
+    model = replace(evidence.start, **known)
     rates = estimated_rates(evidence, expected_counts(evidence, model), model)
     rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
     detection = rows["detection"]

@@ -475,11 +475,8 @@ def test_objects_outside_the_photo_are_not_missed_or_counted() -> None:
     query = View(np.array([LAMP]), np.array([92.0]), ranges=np.array([18.0]), photos=(east,))
     explanation = explained(query)
     rows = explanation.to_dict()["rows"]
-    assert [(row["verdict"], row["object"]) for row in rows] == [
-        ("matched", 1),
-        ("outside", 0),
-        ("outside", 2),
-    ]
+    verdicts = [(row["verdict"], row["object"]) for row in rows]
+    assert verdicts == [("matched", 1), ("outside", 0), ("outside", 2)]
     assert (rows[0]["query_range"], rows[0]["distance"]) == (18.0, pytest.approx(20.0))
     assert rows[0]["photo"] is None
     assert explanation.counts == {"matched": 1, "misnamed": 0, "missed": 0, "false": 0}
@@ -490,18 +487,14 @@ def test_objects_outside_the_photo_are_not_missed_or_counted() -> None:
 
 def test_photos_have_their_own_headings() -> None:
     photos = (Photo.looking(heading=10, fov=60), Photo.looking(heading=70, fov=60))
-    query = View(
-        np.array([LAMP, TREE]), np.array([70.0, 10.0]), photo=np.array([1, 0]), photos=photos
-    )
+    codes, bearings = np.array([LAMP, TREE]), np.array([70.0, 10.0])
+    query = View(codes, bearings, photo=np.array([1, 0]), photos=photos)
     explanation = explained(query, heading=(-10.0, 20.0))
-    rows = explanation.to_dict()["rows"]
-    assert [(row["verdict"], row["object"], row["photo"]) for row in rows] == [
-        ("matched", 1, 1),
-        ("matched", 0, 0),
-        ("outside", 2, None),
-    ]
+    plain = explanation.to_dict()
+    verdicts = [(row["verdict"], row["object"], row["photo"]) for row in plain["rows"]]
+    assert verdicts == [("matched", 1, 1), ("matched", 0, 0), ("outside", 2, None)]
     assert (explanation.heading, explanation.headings) == (-10.0, (-10.0, 20.0))
-    assert explanation.to_dict()["headings"] == [-10.0, 20.0]
+    assert plain["headings"] == [-10.0, 20.0]
 
 
 def test_ranges_distinguish_objects_in_one_direction() -> None:

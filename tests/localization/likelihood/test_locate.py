@@ -57,12 +57,9 @@ def seen_from(xy: np.ndarray, *, objects: StreetObjects = STORE.objects) -> Sign
 
 def test_omissions_of_a_person_hardly_count_against_a_place() -> None:
     marked = CELLS.taxonomy.encode("DBH"), np.array([20.0, 140.0, 260.0])
-    street = (
-        "DDDDBDDDDHDD",
-        [20.0, 40.0, 60.0, 80.0, 140.0, 160.0, *range(180, 241, 20), 260.0, 280.0],
-    )
+    street = "DDDDBDDDDHDD", [*range(20, 81, 20), *range(140, 281, 20)]
     crossing = "DBH", [33.0, 127.0, 273.0]
-    database = database_of([(street[0], sorted(street[1])[:12]), crossing])
+    database = database_of([street, crossing])
     chances = {
         name: locate(build_index(database, named_noise(name)), Signature(*marked)).chances[0]
         for name in ("by-hand", "generic", "medium")
@@ -244,16 +241,10 @@ def test_a_location_converts_to_plain_values_and_points() -> None:
     assert plain["cells"] == len(CITY)
     assert plain["answered"] == location.answer.given
     assert len(plain["candidates"]) == 4
-    assert (
-        location.loglik[location.candidates["cell"]].tolist()
-        == location.candidates["loglik"].to_list()
-    )
-    assert ["explanation" in candidate for candidate in plain["candidates"]] == [
-        True,
-        True,
-        False,
-        False,
-    ]
+    table = location.candidates
+    assert location.loglik[table["cell"]].tolist() == table["loglik"].to_list()
+    explained = ["explanation" in candidate for candidate in plain["candidates"]]
+    assert explained == [True, True, False, False]
     place = plain["place"]
     assert place["within_m"] == 50.0
     assert [place["x"], place["y"]] == [location.estimate.x, location.estimate.y]

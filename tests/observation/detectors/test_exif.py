@@ -39,6 +39,8 @@ def test_exif_of_phone_has_camera_heading_and_position(tmp_path: Path) -> None:
     assert shot.focal == pytest.approx(26 / math.hypot(36, 24) * 500 / 400)
     assert (shot.heading, shot.north, shot.heading_error) == (123.5, "magnetic", 10.0)
     assert shot.position == pytest.approx((43.735, -7.5))
+    # The size is that of the upright picture.
+    assert read_exif(save(tmp_path, image={Base.Orientation: 6})).size == (300, 400)
 
 
 UTC = {GPS.GPSDateStamp: "2026:05:31", GPS.GPSTimeStamp: (10.0, 5.0, 9.0)}
@@ -74,10 +76,6 @@ def test_focal_length_from_pixels_of_sensor(
     }
     # 20 mm with 200 pixels per millimetre and a width of 4,000 pixels; then a smaller copy.
     assert read_exif(save(tmp_path, exif=exif)).focal == pytest.approx(1.0)
-
-
-def test_size_is_that_of_the_upright_picture(tmp_path: Path) -> None:
-    assert read_exif(save(tmp_path, image={Base.Orientation: 6})).size == (300, 400)
 
 
 @pytest.mark.parametrize(

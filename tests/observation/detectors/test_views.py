@@ -118,12 +118,6 @@ def test_ignored_boxes_are_counted() -> None:
     }
 
 
-def test_missing_heading_has_infinite_error() -> None:
-    view = single_view(replace(BUILDER, shot=Shot(fov=90.0)), picture(box()))
-    assert view.photos[0].north_sigma == math.inf
-    assert column(view, "bearings").tolist() == [0.0]
-
-
 def test_data_of_picture_has_priority_over_data_of_all_and_of_file() -> None:
     builder = replace(
         BUILDER,
@@ -169,6 +163,7 @@ def test_view_is_written_and_parsed_again() -> None:
     assert line.query.to_dict(TAXONOMY) == view.to_dict(TAXONOMY)
     assert line.query.photos == view.photos
     assert [photo.north_sigma for photo in view.photos] == [math.inf, 3.0]
+    assert 0.0 in column(view, "bearings")  # of the middle of the photo without heading
 
 
 def test_size_is_read_from_picture_file(tmp_path: Path) -> None:
@@ -193,12 +188,9 @@ def test_size_of_all_is_used_only_for_unknown_sizes(tmp_path: Path) -> None:
     assert (len(without_boxes), without_boxes.photos[0].width) == (0, 90)
 
 
-def test_table_of_other_pictures_is_refused() -> None:
+def test_unknown_field_of_view_and_table_of_other_pictures_are_refused() -> None:
     with refused(InputError, "--photos names b.jpg, but none", "name them as a.jpg"):
         replace(BUILDER, shots={"b.jpg": Shot()}).views([picture()])
-
-
-def test_unknown_field_of_view_is_refused() -> None:
     with refused(InputError, "the field of view of the picture a.jpg is not known; give --fov"):
         replace(BUILDER, shot=Shot()).views([picture()])
     panorama = single_view(replace(BUILDER, shot=Shot(camera="equirectangular")), picture())
