@@ -1,8 +1,8 @@
-# Everything runs from .venv, which is made on first use and brought up to date when
+# Everything runs from .venv, which is made on first use and updated when
 # pyproject.toml or constraints.txt change. Only python3 with venv and pip is needed.
 
 PYTHON ?= python3
-# Where this is set, as in containers, every process compiles all modules again.
+# If this is set, as in containers, every process compiles all modules again.
 export PYTHONDONTWRITEBYTECODE :=
 
 VENV := .venv
@@ -23,25 +23,25 @@ BIOME := @biomejs/biome@2.6.8
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
 
-demo: $(RUNTIME) ## the embedded city end to end, into demo/: database, evaluation, map, GeoPackage
+demo: $(RUNTIME) ## a made-up city with all steps, into demo/: database, evaluation, map, GeoPackage
 	$(BIN)/semsig demo --out demo
 
 test: $(DEV) ## the whole test suite on all processors
 	$(TESTS)
 
-coverage: $(DEV) ## the same, and whether it runs enough of the lines
+coverage: $(DEV) ## the same, and check that it runs enough of the lines
 	$(TESTS) --cov --cov-report=term:skip-covered
 
-busy: $(DEV) ## the same beside six busy processes, because no test depends on time
+busy: $(DEV) ## the same while six processes are busy, because no test depends on time
 	$(BIN)/python -m benchmarks.busy $(TESTS)
 
-test-all: $(DEV) ## what is installed, over Pythons, dependencies and archives: half an hour
+test-all: $(DEV) ## test the installed package: Pythons, dependencies, archives; half an hour
 	$(NOX) matrix
 
-pythons: $(DEV) ## a few tests of what is installed, on every Python of this machine
+pythons: $(DEV) ## a few tests of the installed package, on every Python of this machine
 	$(NOX) matrix -k 'wheel and newest' -- tests/storage
 
-oldest: $(DEV) ## what test-all calls oldest, into constraints-oldest.txt
+oldest: $(DEV) ## the oldest versions for test-all, into constraints-oldest.txt
 	$(NOX) oldest
 
 size: ## the megabytes and seconds that the plain installation takes
@@ -87,7 +87,7 @@ views: $(DEV) ## how well photos localize, with sectors and rough ranges: figure
 	$(BIN)/python -m benchmarks.views
 	$(BIN)/python -m benchmarks.tables
 
-bayes: $(DEV) ## what no method can pass, by exact sums in a small city: figures, half an hour
+bayes: $(DEV) ## upper bound for all methods, by exact sums in a small city: figures, half an hour
 	$(BIN)/python -m benchmarks.bayes
 	$(BIN)/python -m benchmarks.tables
 
@@ -100,14 +100,14 @@ reproduce: $(DEV) ## the paper's experiments, into reproduction/: report and fig
 	mv reproduction.json benchmarks/reproduction.json
 	$(BIN)/python -m benchmarks.tables
 
-docs: $(DEV) ## the site, into docs/_build/html, with all that it shows run; then its checks
+docs: $(DEV) ## the site, into docs/_build/html, with all its examples run; then its checks
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 	SEMSIG_SITE=docs/_build/html $(BIN)/python -m pytest -q tests/project/test_site.py
 
-golden: $(DEV) ## what must not change, into golden/: outputs and files of all commands
+golden: $(DEV) ## outputs and files of all commands, to compare before and after a change, into golden/
 	$(BIN)/python -m benchmarks.golden golden
 
-soak: $(DEV) ## kill, starve and damage everything, some thousand times: half an hour
+soak: $(DEV) ## kill, interrupt and damage runs, some thousand times: half an hour
 	$(BIN)/python -m benchmarks.soak
 	$(BIN)/python -m benchmarks.tables
 
@@ -117,7 +117,7 @@ stranger: $(DEV) ## the commands of the README on a bare machine, from clone to 
 walks: $(DEV) ## the functions and modules that a row of trees and a query cross
 	$(BIN)/python -m benchmarks.walks
 
-pictures: $(DEV) ## every kind of map in a browser, light and dark, desk and phone: pictures to look at
+pictures: $(DEV) ## screenshots of every kind of map, light and dark, desktop and phone
 	$(BIN)/python -m benchmarks.pictures
 
 plugin: ## the QGIS plugin, into dist/: a zip file to install
@@ -131,7 +131,7 @@ clean: ## remove .venv and everything that the targets write
 		.hypothesis .import_linter_cache .nox .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The demonstration needs no tools, so it has a smaller set-up of its own.
+# The demonstration needs no development tools, so it has a smaller set-up.
 $(RUNTIME): $(FRAME) | $(BIN)/python
 	$(INSTALL) -e .
 	@touch $@

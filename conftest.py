@@ -1,4 +1,4 @@
-"""How many tests run at once, and the small made-up town that examples in docstrings begin from."""
+"""Number of parallel test processes, and the made-up town for the examples in docstrings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def demo_objects() -> StreetObjects:
 
 @pytest.fixture(scope="session")
 def demo_database(demo_objects: StreetObjects) -> SignatureDatabase:
-    """Return the signatures of its cells."""
+    """Return the database of the signatures of its cells."""
     from semsig_gis import build_database
 
     return build_database(demo_objects)

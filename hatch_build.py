@@ -1,10 +1,10 @@
 """Build hooks: the pinned map files (Leaflet, jQuery), and the metadata that depends on a build.
 
-A map can be opened without a network when the package carries the files, which are brought with
-``npm pack``. The build never depends on it: where ``npm`` is absent, the download fails or a file
-has the wrong SHA-256, one line says so and the package is built without the files; its maps then
-link them. The metadata has the licences of what the package carries, and, where the environment
-variable ``SEMSIG_REPOSITORY`` is the address of the project, all addresses.
+A map can be opened without a network if the package contains these files. They are downloaded with
+``npm pack``. The build does not depend on it: if ``npm`` is missing, the download fails or a file
+has the wrong SHA-256, one line is printed and the package is built without the files; its maps then
+link them. The metadata contains the licences of the files, and, if the environment variable
+``SEMSIG_REPOSITORY`` is the address of the project, all addresses.
 """
 
 from __future__ import annotations
@@ -38,24 +38,24 @@ ASSETS = Path("semsig_gis", "assets")
 TEST_ASSETS = Path("tests", "assets")
 NPM_SECONDS = 120
 PAPER = "https://doi.org/10.1007/s11042-020-08992-6"
-# Where a link or a picture of a page in Markdown or HTML points to, if it is beside the page.
-_BESIDE = re.compile(r"""(\]\(|\b(?:src|href)=["'])(?![a-z]+:|[#/])([^)\s"'#]+)""")
+# Relative addresses of links and pictures on a page in Markdown or HTML.
+_RELATIVE_LINK = re.compile(r"""(\]\(|\b(?:src|href)=["'])(?![a-z]+:|[#/])([^)\s"'#]+)""")
 
 
 class AssetsError(Exception):
-    """The files could not be brought; the message is one line."""
+    """The files could not be downloaded; the message is one line."""
 
 
 class ReleaseMetadataHook(MetadataHookInterface):
-    """Say what a package holds and where its project is."""
+    """Set the licences of the package and the addresses of its project."""
 
     def update(self, metadata: dict[str, Any]) -> None:
-        """Bring the map files, and set their licences, the addresses and the README.
+        """Download the map files, and set their licences, the addresses and the README.
 
         Parameters
         ----------
         metadata : dict
-            The table ``[project]``; in an unpacked sdist, with what that was built with.
+            The table ``[project]``; in an unpacked sdist, with the values of its build.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class ReleaseMetadataHook(MetadataHookInterface):
 
 
 class AssetsBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its parameter is private to hatchling
-    """List the map files in a wheel, and bring the files of the tests to who works on it."""
+    """List the map files in a wheel; download the files of the tests for editable installs."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Do what the kind of build needs; a failure is a warning, never an error.
@@ -121,7 +121,7 @@ class AssetsBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # its para
 
 
 def absolute_links(text: str, repository: str, tag: str) -> str:
-    """Return a page whose links to files beside it point into a repository.
+    """Return a page with its links to files of the project pointing into a repository.
 
     Parameters
     ----------
@@ -130,23 +130,23 @@ def absolute_links(text: str, repository: str, tag: str) -> str:
     repository : str
         The address of the project.
     tag : str
-        Which version of the files is meant.
+        The version of the files.
 
     Returns
     -------
     str
-        The page; links to its own sections, and to elsewhere, are as before.
+        The page; links to its own sections, and to other sites, are not changed.
     """
 
     def link(match: re.Match[str]) -> str:
         kind = "raw" if Path(match[2]).suffix in {".gif", ".jpg", ".png", ".svg"} else "blob"
         return f"{match[1]}{repository}/{kind}/{tag}/{match[2]}"
 
-    return _BESIDE.sub(link, text)
+    return _RELATIVE_LINK.sub(link, text)
 
 
 def bring_assets(folder: Path) -> tuple[str, ...]:
-    """Bring the files that the manifest of a folder names and that are not there yet.
+    """Download the files that the manifest of a folder names, except files that are there.
 
     Nothing is written before every missing file is there and has the right sum, and each file
     appears by rename.
@@ -154,7 +154,7 @@ def bring_assets(folder: Path) -> tuple[str, ...]:
     Parameters
     ----------
     folder : Path
-        Folder with ``manifest.toml``; the files are put beside it.
+        Folder with ``manifest.toml``, into which the files are written.
 
     Returns
     -------
@@ -164,8 +164,8 @@ def bring_assets(folder: Path) -> tuple[str, ...]:
     Raises
     ------
     AssetsError
-        If ``npm`` is not on the machine, a package cannot be brought, or a file is missing from
-        its package or has another SHA-256 than the manifest says.
+        If ``npm`` is not on the machine, a package cannot be downloaded, or a file is missing from
+        its package or does not have the SHA-256 of the manifest.
     """
     contents: dict[str, bytes] = {}
     for package in _packages(folder):
@@ -178,7 +178,7 @@ def bring_assets(folder: Path) -> tuple[str, ...]:
 
 
 def _bring(folder: Path, otherwise: str) -> None:
-    """Bring the files of a folder, or say in one line what their absence means."""
+    """Download the files of a folder, or print the consequence in one line."""
     try:
         bring_assets(folder)
     except AssetsError as error:
@@ -193,19 +193,21 @@ def _packages(folder: Path) -> list[dict[str, Any]]:
 
 
 def _carried(folder: Path) -> list[dict[str, Any]]:
-    """Return the packages of which the files are there."""
+    """Return the packages with all their files in the folder."""
     return [
-        one for one in _packages(folder) if all(_is_there(folder, file) for file in one["file"])
+        package
+        for package in _packages(folder)
+        if all(_is_there(folder, file) for file in package["file"])
     ]
 
 
 def _bill(name: str, version: str, packages: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return a bill of materials (CycloneDX) of what a wheel carries of other projects."""
+    """Return a bill of materials (CycloneDX) of the files of other projects in a wheel."""
 
     def component(name: str, version: str, index: str) -> dict[str, Any]:
         address = f"pkg:{index}/{name}@{version}"
-        told = {"type": "library", "bom-ref": address, "name": name, "version": version}
-        return told | {"purl": address}
+        library = {"type": "library", "bom-ref": address, "name": name, "version": version}
+        return library | {"purl": address}
 
     return {
         "bomFormat": "CycloneDX",
@@ -213,8 +215,8 @@ def _bill(name: str, version: str, packages: list[dict[str, Any]]) -> dict[str, 
         "version": 1,
         "metadata": {"component": component(name, version, "pypi")},
         "components": [
-            component(one["name"], one["version"], "npm")
-            | {"licenses": [{"license": {"id": one["license"]}}]}
+            component(package["name"], package["version"], "npm")
+            | {"licenses": [{"license": {"id": package["license"]}}]}
             | {
                 "components": [
                     {
@@ -222,10 +224,10 @@ def _bill(name: str, version: str, packages: list[dict[str, Any]]) -> dict[str, 
                         "name": file["target"],
                         "hashes": [{"alg": "SHA-256", "content": file["sha256"]}],
                     }
-                    for file in one["file"]
+                    for file in package["file"]
                 ]
             }
-            for one in packages
+            for package in packages
         ],
     }
 
@@ -236,7 +238,7 @@ def _is_there(folder: Path, file: dict[str, str]) -> bool:
 
 
 def _from_npm(package: str, files: list[dict[str, str]]) -> dict[str, bytes]:
-    """Return the wanted files of one package, each checked against its sum."""
+    """Return files of a package, each checked against its SHA-256."""
     npm = shutil.which("npm")
     if npm is None:
         message = f"npm is not on this machine, so {package} was not brought."
@@ -260,7 +262,7 @@ def _from_npm(package: str, files: list[dict[str, str]]) -> dict[str, bytes]:
 
 
 def _checked(archive: Path, package: str, file: dict[str, str]) -> bytes:
-    """Read one member straight from the archive, so that no path in it is ever trusted."""
+    """Return a checked member of an archive, which is never unpacked to a path that it gives."""
     try:
         with tarfile.open(archive) as tar:
             member = tar.extractfile(f"package/{file['path']}")

@@ -1,7 +1,7 @@
-"""The package as its users install it: every Python, oldest and newest dependencies, both archives.
+"""Test the package as users install it: each Python, oldest and newest dependencies, both archives.
 
-`make test-all` runs it over the interpreters that are there. Each session installs an archive in
-an environment of its own and tests what is installed. The results go into
+`make test-all` runs it for all Pythons of the machine. Each session installs an archive in an
+environment of its own and tests the installed package. The results go into
 ``benchmarks/installs.json`` and, as a table, into ``docs/install.md``, unless only some tests were
 chosen. `make oldest` writes ``constraints-oldest.txt``.
 """
@@ -36,7 +36,7 @@ TOOLS = (
     "selenium",
 )
 # Both archives install the same files, so a few tests are enough for the second.
-TESTS = {"wheel": ("core", "likelihood", "matching", "objects", "storage"), "sdist": ("storage",)}
+TESTS = {"wheel": ("core", "localization", "objects", "storage"), "sdist": ("storage",)}
 RESULTS = HERE / "benchmarks" / "installs.json"
 PAGE = HERE / "docs" / "install.md"
 MARKS = ("<!-- make test-all -->\n", "<!-- end -->")
@@ -45,7 +45,7 @@ COLUMNS = ("Python", "versions", "archive", "installed", "passed", "failed", "sk
 
 @nox.session(python=False)
 def build(session: nox.Session) -> None:
-    """Make both archives anew."""
+    """Build both archives."""
     dist = Path(session.cache_dir, "dist")
     shutil.rmtree(dist, ignore_errors=True)
     session.run("uv", "build", "--quiet", "--out-dir", str(dist), str(HERE), external=True)
@@ -55,7 +55,7 @@ def build(session: nox.Session) -> None:
 @nox.parametrize("archive", ["wheel", "sdist"])
 @nox.parametrize("versions", [nox.param(name, tags=[name]) for name in CONSTRAINTS])
 def matrix(session: nox.Session, versions: str, archive: str) -> None:
-    """Install an archive and test what is installed; arguments are the tests to run."""
+    """Install an archive and test the installation; arguments are the tests to run."""
     dist = Path(session.cache_dir, "dist").resolve()
     work = Path(session.create_tmp(), "checkout").resolve()
     (file,) = dist.glob("*.whl" if archive == "wheel" else "*.tar.gz")
@@ -70,33 +70,33 @@ def matrix(session: nox.Session, versions: str, archive: str) -> None:
         session.install(f"semsig_gis[{EXTRAS}] @ {file.as_uri()}", "-c", CONSTRAINTS[versions])
         row |= {"installed": True, "install_s": round(time.perf_counter() - start, 1)}
         session.install(*TOOLS, "-c", CONSTRAINTS[versions])
-        # Away from the checkout, whose package would be found first.
+        # Outside of the checkout, or its package would be imported instead of the installed one.
         shutil.rmtree(work, ignore_errors=True)
         for name in ("tests", "qgis_plugin", "data_sources", "benchmarks"):
             shutil.copytree(HERE / name, work / name)
         for name in ("conftest.py", "pyproject.toml"):
             shutil.copy(HERE / name, work)
         report = work / "report.xml"
-        chosen = session.posargs or [f"tests/{name}" for name in TESTS[archive]]
+        arguments = session.posargs or [f"tests/{name}" for name in TESTS[archive]]
         # Old packages warn of each other.
-        chosen = [*chosen, "-W", "default"] if versions == "oldest" else chosen
+        arguments = [*arguments, "-W", "default"] if versions == "oldest" else arguments
         with session.chdir(work):
             start = time.perf_counter()
-            # As a module, so that tests find the benchmarks beside them.
+            # As a module, so that the tests can import the benchmarks from this folder.
             command = ("python", "-m", "pytest", "-q", f"--junit-xml={report}")
-            session.run(*command, *chosen, success_codes=[0, 1])
+            session.run(*command, *arguments, success_codes=[0, 1])
         row |= {"test_s": round(time.perf_counter() - start, 1), **_counts(report)}
     finally:
         if not session.posargs:
-            _keep(row)
+            _record(row)
     if row["failed"]:
         session.error(f"{row['failed']} tests failed")
 
 
 @nox.session(python=False)
 def oldest(session: nox.Session) -> None:
-    """Write the lower bounds of pyproject.toml, raised where a Python has no wheel of them."""
-    found: dict[str, dict[str, str]] = {}
+    """Write the oldest allowed versions that have a wheel, by Python where they differ."""
+    pins: dict[str, dict[str, str]] = {}
     extras = [part for name in EXTRAS.split(",") for part in ("--extra", name)]
     for python in PYTHONS:
         text = session.run(
@@ -108,12 +108,12 @@ def oldest(session: nox.Session) -> None:
         )
         for line in str(text).splitlines():
             name, _, version = line.partition("==")
-            found.setdefault(name, {})[python] = version
+            pins.setdefault(name, {})[python] = version
     lines = [
         "# The oldest versions that pyproject.toml allows and that have wheels; `make test-all`",
         "# tests with them, and `make oldest` writes them.",
     ]
-    for name, versions in sorted(found.items()):
+    for name, versions in sorted(pins.items()):
         for version in dict.fromkeys(versions.values()):
             pythons = [python for python in versions if versions[python] == version]
             marker = " or ".join(f"python_version == '{python}'" for python in pythons)
@@ -128,8 +128,8 @@ def _counts(report: Path) -> dict[str, int]:
     return {"passed": total - skipped - failed, "failed": failed, "skipped": skipped}
 
 
-def _keep(row: dict[str, object]) -> None:
-    """Put a row among the results, in place of the one of the same kind, and write the table."""
+def _record(row: dict[str, object]) -> None:
+    """Save a row in the results, replacing a row of the same kind, and write the table."""
     rows = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
     of_kind = {tuple(map(str, _kind(item))): item for item in [*rows, row]}
     rows = [of_kind[kind] for kind in sorted(of_kind)]

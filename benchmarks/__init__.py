@@ -1,1 +1,1 @@
-"""Speed of the package beside a peer measured in the same run: ``python -m benchmarks``."""
+"""Speed of the package compared with peers in the same run: ``python -m benchmarks``."""

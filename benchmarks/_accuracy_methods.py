@@ -1,4 +1,4 @@
-"""What the methods make of queries, and how far off they are."""
+"""Localize queries with the methods, and measure their errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NEAR",
     "Outcome",
-    "Way",
+    "Settings",
     "ask_likelihood",
     "ask_paper",
     "ask_refined",
@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 NEAR = (5.0, 25.0, 50.0)
-"""Metres that count as near."""
+"""Errors in metres for which shares are computed."""
 REGION = 0.9
 
 _T = TypeVar("_T")
@@ -52,27 +52,27 @@ _R = TypeVar("_R")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What came of one query.
+    """The outcome of one query.
 
     Parameters
     ----------
     length : int
-        How many objects are really seen from the place.
+        Number of objects that are really visible from the place.
     within : tuple of float
-        Chance that the answer is within each distance of `NEAR`; below 1 only among ties.
+        Chance that the error is at most each distance of `NEAR`; between 0 and 1 only for ties.
     ranks : tuple of int
-        First and last rank that ties allow for the true cell, from 1.
+        First and last possible rank of the true cell among its ties, from 1.
     seconds : float
         Time of the processor.
     mass : float or None
-        Chance that the answer is right, by the method's own account.
+        Chance that the answer is right, as stated by the method.
     in_region : bool or None
-        Whether the true cell is in the region of 90 %; None where there is no region.
+        Whether the true cell is in the region of 90 %; None without a region.
     region_mass : float or None
-        Chance of that region by the method's own account: of whole cells, so often above 90 %.
+        Chance of that region, as stated by the method; often above 90 %, as it has whole cells.
     in_exact_region : float or None
-        The same where the least likely cells of the region, all alike, belong to it only with
-        the chance that makes it one of just 90 %.
+        The same as `in_region` if the cells of the region with the lowest chance, which tie, count
+        only with the part that makes the chance of the region exactly 90 %.
     """
 
     length: int
@@ -86,17 +86,17 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
-    """How the likelihood method is used.
+class Settings:
+    """Settings of the likelihood method.
 
     Parameters
     ----------
     reranked : bool
-        Whether the best cells are re-ranked by one-to-one alignments.
+        Whether the best cells are re-ranked by one-to-one associations.
     north_sigma : float
         Standard deviation of north in degrees.
     radius : float
-        The answer has most of the chance within so many metres.
+        Radius in metres; the answer is the place with the most chance within it.
     """
 
     reranked: bool = True
@@ -104,17 +104,19 @@ class Way:
     radius: float = 50.0
 
 
-def ask_paper(city: City, queries: Sequence[Query], method: Method, *, kept: bool) -> list[Outcome]:
-    """Rank by one of the paper's methods; `kept` is the order that the objects have on the map."""
+def ask_paper(
+    city: City, queries: Sequence[Query], method: Method, *, unsorted: bool
+) -> list[Outcome]:
+    """Localize by a method of the paper, with objects in the order of the map if `unsorted`."""
     database = city.database
-    asked = [query.kept if kept else query.seen for query in queries]
-    some = [one for one in asked if len(one)]
-    next(iter(score_cells(database, some[:1], method)))  # what is worked out once is not timed
-    rows = iter(score_cells(database, some, method))
+    signatures = [query.unsorted if unsorted else query.signature for query in queries]
+    not_empty = [signature for signature in signatures if len(signature)]
+    next(iter(score_cells(database, not_empty[:1], method)))  # one-time work is not timed
+    rows = iter(score_cells(database, not_empty, method))
     outcomes = []
-    for query, one in zip(queries, asked, strict=True):
-        if not len(one):
-            outcomes.append(_lost(city, query))
+    for query, signature in zip(queries, signatures, strict=True):
+        if not len(signature):
+            outcomes.append(_unlocalized(city, query))
             continue
         start = time.process_time()
         scores = next(rows)
@@ -134,19 +136,24 @@ def ask_paper(city: City, queries: Sequence[Query], method: Method, *, kept: boo
 
 
 def ask_likelihood(
-    city: City, queries: Sequence[Query], index: LikelihoodIndex, way: Way, *, threads: int
+    city: City,
+    queries: Sequence[Query],
+    index: LikelihoodIndex,
+    settings: Settings,
+    *,
+    threads: int,
 ) -> list[Outcome]:
-    """Answer by the likelihood method."""
+    """Localize by the likelihood method."""
 
     def ask(query: Query) -> Outcome:
-        if not len(query.seen):
-            return _lost(city, query)
+        if not len(query.signature):
+            return _unlocalized(city, query)
         start = time.thread_time()
-        loglik = _loglik(index, query, way)
-        found = posterior(city.database, loglik)
-        cell, mass = found.best_place(way.radius)
+        loglik = _loglik(index, query, settings)
+        result = posterior(city.database, loglik)
+        cell, mass = result.best_place(settings.radius)
         seconds = time.thread_time() - start
-        return _told(city, query, found, loglik, (cell, mass, seconds))
+        return _outcome(city, query, result, loglik, (cell, mass, seconds))
 
     return _each(ask, queries, threads)
 
@@ -154,31 +161,31 @@ def ask_likelihood(
 def ask_refined(
     city: City, queries: Sequence[Query], index: LikelihoodIndex, noise: Noise, *, threads: int
 ) -> list[Outcome]:
-    """Answer with a place off the grid; the index is that of `cell_noise`."""
-    stores: SimpleQueue[ObjectStore] = SimpleQueue()  # an R-tree serves one thread at a time
+    """Localize with refinement; the index must have the noise model of `cell_noise`."""
+    stores: SimpleQueue[ObjectStore] = SimpleQueue()  # only one thread can use an R-tree
     for _ in range(threads):
         store = ObjectStore.of(city.objects)
-        _ = store.index
+        _ = store.index  # built now, so that it is not timed
         stores.put(store)
 
     def ask(query: Query) -> Outcome:
-        if not len(query.seen):
-            return _lost(city, query)
+        if not len(query.signature):
+            return _unlocalized(city, query)
         store = stores.get()
         start = time.thread_time()
-        loglik = _loglik(index, query, Way())
+        loglik = _loglik(index, query, Settings())
         count = min(DIVIDED_PARTS[0], len(loglik))
         likely = np.argpartition(-loglik, count - 1)[:count]
         likely = likely[np.argsort(-loglik[likely], kind="stable")]
-        found = refine(
-            query.seen,
+        result = refine(
+            query.signature,
             city.database.xy[likely],
             noise,
             store=store,
             step=city.database.grid.step,
             radius=city.database.spec.radius,
         )
-        error = math.dist(found.xy, query.xy)
+        error = math.dist(result.xy, query.xy)
         seconds = time.thread_time() - start
         stores.put(store)
         return Outcome(
@@ -186,7 +193,7 @@ def ask_refined(
             within=tuple(float(error <= limit) for limit in NEAR),
             ranks=rank_range(-loglik.astype(np.float32), query.cell),
             seconds=seconds,
-            mass=found.mass,
+            mass=result.mass,
         )
 
     return _each(ask, queries, threads)
@@ -200,49 +207,49 @@ def ask_routes(
     *,
     threads: int,
 ) -> list[list[Outcome]]:
-    """Answer where the last panorama was taken; a case is their number and the legs' sigma."""
-    way = Way()
+    """Localize the last panorama of routes; a case is their number and the sigma of the legs."""
+    settings = Settings()
 
     def ask(walk: Walk) -> list[Outcome]:
-        logliks, spent = [], []
+        logliks, times = [], []
         for query in walk.queries:
             start = time.thread_time()
-            logliks.append(_loglik(index, query, way))
-            spent.append(time.thread_time() - start)
+            logliks.append(_loglik(index, query, settings))
+            times.append(time.thread_time() - start)
         outcomes = []
         for count, sigma in cases:
             legs = walk.legs[sigma][: count - 1]
             start = time.thread_time()
-            found = route_posteriors(city.database, logliks[:count], legs)[-1]
-            cell, mass = found.best_place(way.radius)
-            seconds = time.thread_time() - start + sum(spent[:count])
+            result = route_posteriors(city.database, logliks[:count], legs)[-1]
+            cell, mass = result.best_place(settings.radius)
+            seconds = time.thread_time() - start + sum(times[:count])
             with np.errstate(divide="ignore"):
-                logs = np.log(found.chances)
-            told = (cell, mass, seconds)
-            outcomes.append(_told(city, walk.queries[count - 1], found, logs, told))
+                logs = np.log(result.chances)
+            answer = (cell, mass, seconds)
+            outcomes.append(_outcome(city, walk.queries[count - 1], result, logs, answer))
         return outcomes
 
     return [list(outcomes) for outcomes in zip(*_each(ask, routes, threads), strict=True)]
 
 
-def _loglik(index: LikelihoodIndex, query: Query, way: Way) -> NDArray[np.floating]:
-    scores = index.scores(query.seen, north_sigma=way.north_sigma)
-    if way.reranked:
-        scores = rerank(index, query.seen, scores, north_sigma=way.north_sigma)
+def _loglik(index: LikelihoodIndex, query: Query, settings: Settings) -> NDArray[np.floating]:
+    scores = index.scores(query.signature, north_sigma=settings.north_sigma)
+    if settings.reranked:
+        scores = rerank(index, query.signature, scores, north_sigma=settings.north_sigma)
     return scores.loglik
 
 
-def _told(
+def _outcome(
     city: City,
     query: Query,
-    found: Posterior,
+    result: Posterior,
     loglik: NDArray[np.floating],
-    told: tuple[int, float, float],
+    answer: tuple[int, float, float],
 ) -> Outcome:
-    """Return what came of an answer: its cell, its chance, and the seconds it took."""
-    cell, mass, seconds = told
+    """Return the outcome of a query; `answer` is its cell, its chance and the seconds it took."""
+    cell, mass, seconds = answer
     (error,) = _errors(city, query, np.array([cell]))
-    chances, region = found.chances, found.credible_cells(REGION)
+    chances, region = result.chances, result.credible_cells(REGION)
     least, true = chances[region[-1]], chances[query.cell]
     part = (REGION - chances[chances > least].sum()) / chances[chances == least].sum()
     return Outcome(
@@ -257,17 +264,17 @@ def _told(
     )
 
 
-def _lost(city: City, query: Query) -> Outcome:
-    """Return the outcome of a query that has no objects."""
+def _unlocalized(city: City, query: Query) -> Outcome:
+    """Return the outcome of a query without objects."""
     cells = len(city.database)
     return Outcome(length=query.length, within=(0.0,) * len(NEAR), ranks=(cells, cells))
 
 
 def _errors(city: City, query: Query, cells: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return how far the viewpoints of cells are from where a query was seen, in metres."""
-    away = city.database.xy[cells] - np.array(query.xy)
-    # So that a cell 50 m away is not a rounding beyond 50 m.
-    return np.asarray(np.round(np.hypot(away[:, 0], away[:, 1]), 6))
+    """Return the distances in metres of the viewpoints of cells from the place of a query."""
+    offsets = city.database.xy[cells] - np.array(query.xy)
+    # Rounded, or a cell at 50 m could be beyond 50 m by a rounding error.
+    return np.asarray(np.round(np.hypot(offsets[:, 0], offsets[:, 1]), 6))
 
 
 def _each(work: Callable[[_T], _R], items: Sequence[_T], threads: int) -> list[_R]:

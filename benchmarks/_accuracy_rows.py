@@ -1,4 +1,4 @@
-"""Rows of ``accuracy.json``: what came of many queries, and the bars that it is to reach."""
+"""Rows of ``accuracy.json``: figures of many queries, and the bars that they should reach."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from benchmarks._accuracy_methods import NEAR
+from benchmarks._measuring import short
 from semsig_gis.core import wilson_interval
 from semsig_gis.localization import expected_recall
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Bar", "Row"]
 
 MANY = 10
-"""Objects that a place shows at least to count in ``p50_ten``."""
+"""Least number of visible objects of the queries in ``p50_ten``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,11 +30,11 @@ class Bar:
     Parameters
     ----------
     what : str
-        What is asked for.
+        What the figure is.
     value : float
-        What came out.
+        The measured value.
     low, high : float
-        Bounds of what is wanted.
+        Bounds of the values that meet the bar.
     """
 
     what: str
@@ -50,18 +51,18 @@ class Bar:
         """Return the bar as plain values."""
         return {
             "what": self.what,
-            "value": _short(self.value),
-            "low": _short(self.low),
-            "high": _short(self.high),
+            "value": short(self.value),
+            "low": short(self.low),
+            "high": short(self.high),
             "met": self.met,
         }
 
     def __str__(self) -> str:
-        """Return the bar for people."""
-        wanted = f"at least {self.low:g}" if math.isfinite(self.low) else ""
-        if math.isfinite(self.high):
-            wanted += f"{', ' if wanted else ''}at most {self.high:g}"
-        return f"{self.what}: {self.value:.3f}, {wanted} wanted: {'met' if self.met else 'NOT met'}"
+        """Return the bar as text."""
+        bounds = [f"at least {self.low:g}"] if math.isfinite(self.low) else []
+        bounds += [f"at most {self.high:g}"] if math.isfinite(self.high) else []
+        state = "met" if self.met else "NOT met"
+        return f"{self.what}: {self.value:.3f}, {', '.join(bounds)} wanted: {state}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,16 +72,16 @@ class Row:
     Parameters
     ----------
     city : City
-        Where.
+        The city.
     distortion, method, setting : str
-        How the queries were spoiled, what answered them, and what else was known.
+        Distortion of the queries, method, and other settings such as the error of north.
     outcomes : sequence of Outcome
-        What came of each query.
+        The outcome of each query.
     coverage, precision : float or None
-        Share of the queries that were answered where a method may decline, and of right answers
-        in them.
+        Share of the queries that were answered, if the method may decline, and of right answers
+        among them.
     bars : list of Bar
-        What is to be reached.
+        Bars for figures of this row.
     """
 
     city: City
@@ -93,37 +94,39 @@ class Row:
     bars: list[Bar] = field(default_factory=list)
 
     def share(self, limit: float = 50.0) -> float:
-        """Return the share of the queries that are so near."""
+        """Return the share of the queries with an error of at most `limit` metres."""
         place = NEAR.index(limit)
-        return _mean([one.within[place] for one in self.outcomes])
+        return _mean([outcome.within[place] for outcome in self.outcomes])
 
     @property
     def many(self) -> list[Outcome]:
-        """The outcomes of places that show ten objects or more."""
-        return [one for one in self.outcomes if one.length >= MANY]
+        """The outcomes of places with ten visible objects or more."""
+        return [outcome for outcome in self.outcomes if outcome.length >= MANY]
 
     @property
     def share_of_many(self) -> float:
-        """The share of these that are within 50 m."""
-        return _mean([one.within[NEAR.index(50.0)] for one in self.many])
+        """The share of these with an error of at most 50 m."""
+        return _mean([outcome.within[NEAR.index(50.0)] for outcome in self.many])
 
-    def _told(self, name: str) -> float | None:
-        """Return the mean of what the outcomes tell beside the place; None where none does."""
-        values = [getattr(one, name) for one in self.outcomes]
-        told = [float(value) for value in values if value is not None]
-        return _mean(told) if told else None
+    def _mean_of(self, name: str) -> float | None:
+        """Return the mean of a field of the outcomes that is not None; None if all are None."""
+        fields = (getattr(outcome, name) for outcome in self.outcomes)
+        values = [float(value) for value in fields if value is not None]
+        return _mean(values) if values else None
 
     @property
     def in_exact_region(self) -> float | None:
-        """How often the region of just 90 % holds the true cell; None where there is none."""
-        return self._told("in_exact_region")
+        """How often the region of exactly 90 % contains the true cell; None without regions."""
+        return self._mean_of("in_exact_region")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as plain values."""
         count, cells = len(self.outcomes), len(self.city.database)
         low, high = wilson_interval(self.share(), count)
         recalls = expected_recall(
-            *zip(*(one.ranks for one in self.outcomes), strict=True), cells=cells, percent=10
+            *zip(*(outcome.ranks for outcome in self.outcomes), strict=True),
+            cells=cells,
+            percent=10,
         )
         values = {
             "p5": self.share(5.0),
@@ -132,12 +135,12 @@ class Row:
             "p50_low": low,
             "p50_high": high,
             "recall10pct": float(recalls.mean()),
-            "ms_per_query": 1e3 * _mean([one.seconds for one in self.outcomes]),
+            "ms_per_query": 1e3 * _mean([outcome.seconds for outcome in self.outcomes]),
             "p50_ten": self.share_of_many,
-            "chance": self._told("mass"),
+            "chance": self._mean_of("mass"),
             "in_exact_region": self.in_exact_region,
-            "in_region": self._told("in_region"),
-            "region_mass": self._told("region_mass"),
+            "in_region": self._mean_of("in_region"),
+            "region_mass": self._mean_of("region_mass"),
             "coverage": self.coverage,
             "precision": self.precision,
         }
@@ -148,13 +151,13 @@ class Row:
             "distortion": self.distortion,
             "method": self.method,
             "setting": self.setting,
-            **{name: _short(value) for name, value in values.items()},
+            **{name: short(value) for name, value in values.items()},
             "queries_ten": len(self.many),
             "bars": [bar.to_dict() for bar in self.bars],
         }
 
     def __str__(self) -> str:
-        """Return the row for people."""
+        """Return the row as text."""
         values = self.to_dict()
         line = (
             f"{self.city.name}, {self.distortion}, {self.method}, {self.setting} "
@@ -178,8 +181,3 @@ class Row:
 
 def _mean(values: Sequence[float]) -> float:
     return math.fsum(values) / len(values) if values else math.nan
-
-
-def _short(value: float | None) -> float | None:
-    """Return a number to four digits; JSON has no infinity."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.4g}")

@@ -1,4 +1,4 @@
-"""The cities of the benchmarks: made up, or from the folder of open data."""
+"""Cities of the benchmarks: made-up ones, and real ones from the folder of open data."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def made_up(spec: CitySpec) -> StreetObjects:
 
 
 def made_up_streets(spec: CitySpec, objects: StreetObjects) -> SignatureDatabase:
-    """Return the database of a made-up city, with viewpoints along its streets alone."""
+    """Return the database of a made-up city, with viewpoints only along its streets."""
     _, streets = synthetic_surroundings(spec)
     return build_database(objects, viewpoints=ViewpointSpec(mode="streets"), streets=streets.table)
 
 
 def real(geodata: Path, name: str) -> StreetObjects:
-    """Return the street objects of a city of the folder of open data."""
+    """Return the street objects of a city from the folder of open data."""
     catalog_name, path, crs = _WHERE_FROM[name]
     catalog = load_catalog(catalog_name)
     layers, _ = read_files(choose_layers(catalog), [geodata / path])

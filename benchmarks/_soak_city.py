@@ -1,4 +1,4 @@
-"""The small city that the soak works on: its files, its commands, and what these write."""
+"""The small city of the soak: its files, its commands, and the results of the commands."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from semsig_gis.sources import LayerSpec
 
 TABLE = tomllib.loads(Path(__file__).with_name("soak.toml").read_text(encoding="utf-8"))
-_TIMED = (".lock", ".meta.json")  # of the cache: when something was fetched
-_SEEN = 5  # objects at least, of cells that queries are made from
+_TIMED = (".lock", ".meta.json")  # files of the cache that contain times
+_LEAST_OBJECTS = 5  # of the cells from which queries are made
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """A command, the names in the folder that it writes under, and how it went.
+    """A command, the names that it writes in the folder, and the result of a normal run.
 
-    `before` is a folder with what lies under these names before it is run; `old` and `new` are the
+    `before` is a folder with the files of these names before the run; `old` and `new` are the
     digests of these files before and after.
     """
 
@@ -47,31 +47,31 @@ class Command:
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """A folder in which every command has been run once, and the commands."""
+    """A folder in which every command was run once, and the commands."""
 
     folder: Path
     commands: tuple[Command, ...]
 
     def command(self, number: int) -> Command:
-        """Return the command of a trial: each in turn, of the long ones one in every other turn."""
-        quick = [one for one in self.commands if not one.long]
-        long = [one for one in self.commands if one.long]
+        """Return the command of a trial: quick ones in turn, and sometimes a long one."""
+        quick = [command for command in self.commands if not command.long]
+        long = [command for command in self.commands if command.long]
         turn, at = divmod(number, len(quick))
         return long[turn // 2 % len(long)] if at == 0 and turn % 2 == 0 else quick[at]
 
     def copy(self, command: Command, to: Path) -> None:
-        """Make a folder in which a command is about to be run."""
+        """Copy the folder for a new run of a command."""
         shutil.copytree(self.folder, to, ignore=shutil.ignore_patterns(*command.names))
         shutil.copytree(command.before, to, dirs_exist_ok=True)
 
 
 def made_world(folder: Path, kills: int) -> World:
-    """Make the city and its queries, run all commands on it, and keep what they change.
+    """Make the city and its queries, run all commands, and save what they change.
 
-    Of the long ones, no more are run than so many kills come to.
+    Only as many long commands are run as are needed for the number of kills.
 
-    Before a command is run again, its results are there already, with a byte more in each; but for
-    folders, with which it goes on.
+    When a command is run again, its results are already there, with a byte added to each file;
+    except for folders, because commands continue with them.
     """
     now = folder / "now"
     commands = []
@@ -84,7 +84,7 @@ def made_world(folder: Path, kills: int) -> World:
         before.mkdir(parents=True)
         shutil.copytree(now, earlier)
         states = files_in(now)
-        ending = _done(text, now)
+        ending = _run_ok(text, now)
         changed = [name for name, state in files_in(now).items() if states.get(name) != state]
         names = sorted({Path(name).parts[0] for name in changed})
         for name in changed:
@@ -113,7 +113,7 @@ def _put(path: Path, content: bytes) -> None:
 
 
 def digests(folder: Path, names: tuple[str, ...] | list[str]) -> dict[str, str]:
-    """Return the digest of every file that lies under these names, by its path."""
+    """Return the digest of every file under these names, by its path."""
     return {
         name: _digest(folder / name)
         for name in files_in(folder)
@@ -126,7 +126,7 @@ def digests(folder: Path, names: tuple[str, ...] | list[str]) -> dict[str, str]:
 def _digest(path: Path) -> str:
     try:
         return file_digest(path)
-    except Exception:  # noqa: BLE001 - a file of this kind that is no such file
+    except Exception:  # noqa: BLE001 - a damaged file
         return digest(path.read_bytes())
 
 
@@ -150,8 +150,8 @@ def _lines(table: str, words: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _done(command: str, folder: Path) -> Ending:
-    """Run a command that must go well."""
+def _run_ok(command: str, folder: Path) -> Ending:
+    """Run a command; raise if it fails."""
     ending = run(command, folder)
     if ending.code or ending.fault:
         raise RuntimeError(f"semsig {command} ended with {ending.code}:\n{ending.err}")
@@ -159,23 +159,23 @@ def _done(command: str, folder: Path) -> Ending:
 
 
 def _prepared(folder: Path, port: int) -> dict[str, str]:
-    """Make a city, its queries and all that its commands read; return words of the commands."""
+    """Make a city, its queries and all inputs of the commands; return words for the commands."""
     folder.mkdir()
     for command in _lines("city", {}):
-        _done(command, folder)
+        _run_ok(command, folder)
     words: dict[str, str] = forked(lambda: _write_inputs(folder, port))
     for command in _lines("prepare", words):
-        _done(command, folder)
+        _run_ok(command, folder)
     return words
 
 
 def _write_inputs(folder: Path, port: int) -> dict[str, str]:
-    """Write the city as OpenStreetMap and as a portal's file, and views of it."""
+    """Write the city as files of OpenStreetMap and of a portal, and views of it."""
     database = open_database(folder / "known.parquet")
     views: list[dict[str, Any]] = []
     for cell, (x, y) in enumerate(database.xy.tolist()):
         bearings = database.signature(cell).bearings
-        if bearings is not None and len(bearings) >= _SEEN:
+        if bearings is not None and len(bearings) >= _LEAST_OBJECTS:
             view = {"types": database.types(cell), "bearings": bearings.round(1).tolist()}
             views.append(view | {"x": x + 2, "y": y - 1})
     _write_rows(folder / "samples.jsonl", views[:30])
@@ -183,7 +183,7 @@ def _write_inputs(folder: Path, port: int) -> dict[str, str]:
         folder / "queries.jsonl",
         [{"id": f"q{number}"} | view for number, view in enumerate(views[:5])],
     )
-    rows = [f"{one['types']},{' '.join(map(str, one['bearings']))}" for one in views[:5]]
+    rows = [f"{view['types']},{' '.join(map(str, view['bearings']))}" for view in views[:5]]
     (folder / "queries.csv").write_text("\n".join(["types,bearings", *rows, ""]), encoding="utf-8")
     (folder / "experiment.toml").write_text(TABLE["experiment"], encoding="utf-8")
     (folder / "service.toml").write_text(
@@ -228,20 +228,20 @@ def _write_rows(path: Path, rows: list[dict[str, object]]) -> None:
 
 
 class _Portal(http.server.SimpleHTTPRequestHandler):
-    """Sends files of a folder: of ``/CITY/.../objects`` a description, of others the export."""
+    """Server of a folder: a description for ``/CITY/.../objects``, the export for others."""
 
     def translate_path(self, path: str) -> str:
-        """Return the file that is meant by an address."""
+        """Return the file of an address."""
         parts = path.partition("?")[0].split("/")
         name = "portal.json" if parts[-1] == "objects" else "portal.geojson"
         return str(Path(self.directory) / parts[1] / name)
 
     def log_message(self, *_: object) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 def _portal(folder: Path) -> int:
-    """Serve a folder on the loopback, as long as this process lives; return the port."""
+    """Serve a folder on the loopback until this process ends; return the port."""
     folder.mkdir(parents=True, exist_ok=True)
     server = http.server.HTTPServer(
         ("127.0.0.1", 0), functools.partial(_Portal, directory=str(folder))

@@ -1,4 +1,4 @@
-"""Commands that are killed, find no room, or are many at once, and what that leaves."""
+"""Kill commands, fill their disks or run several at once, and check the files afterwards."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from benchmarks._soak_city import Command, World
 
-# How many trials there are of each part for one kill.
+# Number of trials of each part, per kill.
 PARTS = {
     "kills": 1.0,
     "Ctrl-C": 0.15,
@@ -53,7 +53,7 @@ _ENVIRONMENTS: tuple[dict[str, str | None], ...] = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One trial; `moment` is the part of the time, of the changes or of the room that is left."""
+    """One trial; `moment` is the share of the time, of the changes or of the free space."""
 
     part: str
     number: int
@@ -61,7 +61,7 @@ class Case:
 
 
 def cases(kills: int, *, seed: int) -> Iterator[Case]:
-    """Yield so many kills, and of the other trials their share of it; commands take turns."""
+    """Yield the given number of kills, and other trials in proportion."""
     generator = random.Random(seed)  # noqa: S311 - no secrets
     parts = [part for part, share in PARTS.items() for _ in range(max(1, round(kills * share)))]
     for number, part in enumerate(parts):
@@ -69,13 +69,13 @@ def cases(kills: int, *, seed: int) -> Iterator[Case]:
 
 
 def faults(world: World, case: Case, folder: Path) -> list[str]:
-    """Return what goes wrong in a trial, each after the kind of fault that it is."""
+    """Run a trial and return its faults, each as ``kind: details``."""
     command = world.command(case.number)
     place = folder / "city"
     if case.part.endswith("disks"):
         _mount_own(folder)
     if case.part == "eight processes":
-        command = next(one for one in world.commands if "cold" in one.text)
+        command = next(item for item in world.commands if "cold" in item.text)
     world.copy(command, place)
     if case.part == "odd environments":
         environment = _ENVIRONMENTS[case.number % len(_ENVIRONMENTS)]
@@ -109,41 +109,41 @@ def _stop(case: Case, command: Command) -> Stop | None:
 def _after(
     world: World, command: Command, place: Path, endings: list[Ending], *, killed: bool = False
 ) -> list[str]:
-    """Return what is wrong after a trial, and after the command was run again."""
-    found = [
+    """Return the faults after a trial, and after another run of the command."""
+    faults = [
         f"{ending.fault}: {ending.code} {ending.err[-2000:]}"
         for ending in endings
         if ending.fault and not (killed and ending.code == -signal.SIGKILL)
     ]
-    # A run that was not killed leaves at most what the next one goes on with.
-    left = [] if killed else _leftovers(world, place)
-    found += [f"leftovers: {name}" for name in left if _top(name) not in command.names]
-    found += [f"lost or half-written: {name}" for name in _broken(command, place)]
+    # A run that was not killed leaves only files with which the next run continues.
+    leftovers = [] if killed else _leftovers(world, place)
+    faults += [f"leftovers: {name}" for name in leftovers if _top(name) not in command.names]
+    faults += [f"lost or half-written: {name}" for name in _broken(command, place)]
     again = run(command.text, place)
     if again.code or again.fault:
-        found.append(f"next run: {again.code} {again.err[-2000:]}")
+        faults.append(f"next run: {again.code} {again.err[-2000:]}")
     elif (state := digests(place, command.names)) != command.new:
         wrong = [
             name for name in {**state, **command.new} if state.get(name) != command.new.get(name)
         ]
-        found.append(f"next run: other results: {' '.join(wrong)}")
-    told = [f"leftovers: {name}" for name in _leftovers(world, place)]
-    return found + [one for one in told if one not in found]
+        faults.append(f"next run: other results: {' '.join(wrong)}")
+    again_left = [f"leftovers: {name}" for name in _leftovers(world, place)]
+    return faults + [fault for fault in again_left if fault not in faults]
 
 
 def _leftovers(world: World, place: Path) -> list[str]:
-    """Return the files that a command leaves beside its results, and in the temporary folder."""
-    beside = sorted(files_in(place).keys() - files_in(world.folder).keys())
-    return beside + [f"TMPDIR/{name}" for name in files_in(Path(f"{place}.tmp"))]
+    """Return the files of a command that are not results, also in the temporary folder."""
+    names = sorted(files_in(place).keys() - files_in(world.folder).keys())
+    return names + [f"TMPDIR/{name}" for name in files_in(Path(f"{place}.tmp"))]
 
 
 def _top(name: str) -> str:
-    """Return the name in the folder of a file in it, or of that which it becomes a part of."""
+    """Return the first part of a path; for an unfinished run, the name of its result."""
     return Path(name).parts[0].removesuffix(".partial")
 
 
 def _broken(command: Command, place: Path) -> list[str]:
-    """Return what is neither as it was before nor as it shall be; a half pair is read first."""
+    """Return results that are neither old nor new; an interrupted replacement is undone first."""
     wrong = _neither(command, place)
     for name in wrong:
         if (place / f"{name}.parquet").exists():
@@ -159,7 +159,7 @@ def _neither(command: Command, place: Path) -> list[str]:
             states[top.removesuffix(".parquet").removesuffix(".objects")][which][name] = digest
     wrong = []
     for name, (old, new, now) in states.items():
-        # A run that goes on where it was ended has whole files so far.
+        # A run that can be continued has whole new files.
         begun = not old and all(new[file] == digest for file, digest in now.items() if file in new)
         if now not in (old, new) and not begun:
             wrong.append(name)
@@ -167,9 +167,9 @@ def _neither(command: Command, place: Path) -> list[str]:
 
 
 def _started(command: str, folder: Path, environment: Mapping[str, str | None]) -> Ending:
-    """Run a command in a Python of its own, because some of the environment is read only once."""
+    """Run a command in a new Python, because some variables are read only at its start."""
     own = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1]), **environment}
-    done = subprocess.run(  # noqa: S603 - as the table says
+    run = subprocess.run(  # noqa: S603 - a command of the table
         [sys.executable, "-c", _START, *command.split()],
         cwd=folder,
         env={name: value for name, value in own.items() if value is not None},
@@ -178,9 +178,9 @@ def _started(command: str, folder: Path, environment: Mapping[str, str | None]) 
         check=False,
         timeout=LIMIT_S,
     )
-    err = done.stderr.decode(errors="backslashreplace")
+    out, err = (text.decode(errors="backslashreplace") for text in (run.stdout, run.stderr))
     Path(f"{folder}.tmp").mkdir(exist_ok=True)
-    return Ending(done.returncode, done.stdout.decode(errors="backslashreplace"), err, (), 0.0)
+    return Ending(run.returncode, out, err, (), 0.0)
 
 
 def _together(command: str, folder: Path) -> list[Ending]:
@@ -208,7 +208,7 @@ _LARGEST = 256 * 2**20  # bytes
 
 
 def disks_possible(folder: Path) -> bool:
-    """Tell whether this machine lets the soak mount disks of its own."""
+    """Whether the soak can mount disks on this machine."""
     try:
         forked(lambda: _mount_own(folder))
     except RuntimeError:
@@ -217,7 +217,7 @@ def disks_possible(folder: Path) -> bool:
 
 
 def _mount_own(folder: Path) -> None:
-    """Give this process, and those that it starts, an empty disk of their own on a folder."""
+    """Mount an empty disk on a folder, visible only to this process and its children."""
     user, group = os.getuid(), os.getgid()
     _call("unshare", ctypes.c_int(_NEW_MOUNTS if user == 0 else _NEW_MOUNTS | _NEW_USER))
     if user:
@@ -233,7 +233,7 @@ def _remount(folder: Path, flags: int, options: str) -> None:
 
 
 def _resize(folder: Path, *, room: int) -> None:
-    """Leave so many bytes of a disk free."""
+    """Change the size of a disk so that `room` bytes are free."""
     disk = os.statvfs(folder)
     used = (disk.f_blocks - disk.f_bfree) * disk.f_frsize
     _remount(folder, 0, f"size={used + room}")

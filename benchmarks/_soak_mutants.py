@@ -1,4 +1,4 @@
-"""Damaged files of every format that is read: each is refused in a sentence, or read."""
+"""Damage files of every format: each must be refused in one sentence, or read."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from benchmarks._soak_city import World
 
 BATCH = 200
-_RESPELT = 0.6  # of the damages to texts
-_SMALL = 30  # objects in files that others write
-_MEMORY = 6 * 2**30  # bytes more than there are at the beginning
+_RESPELT = 0.6  # share of the damages to texts that change a number, a word or a line
+_SMALL = 30  # objects in files of foreign formats
+_MEMORY = 6 * 2**30  # bytes, in addition to those in use at the beginning
 
 _CATALOG = """
 name = "fuzz"
@@ -70,9 +70,10 @@ _WORD = re.compile(rb"[A-Za-z_]\w*")
 
 @dataclass(frozen=True, kw_only=True)
 class Format:
-    """A kind of file, and what reads it from a folder of its own.
+    """A kind of file, and the function that reads it.
 
-    `ours` are files that only we write; read without a word, they must hold what they held.
+    `ours` are files that only the package writes; if a damaged one is read, its contents must be
+    the same as before.
     """
 
     name: str
@@ -88,9 +89,9 @@ def _database(path: Path) -> object:
 def _arrays(database: sg.SignatureDatabase) -> str:
     parts = (database.columns, database.rows, database.offsets, database.codes,
              database.bearing_units, database.distance_units)  # fmt: skip
-    said = (database.grid, database.spec, database.taxonomy, database.crs.to_wkt(),
+    specs = (database.grid, database.spec, database.taxonomy, database.crs.to_wkt(),
             database.licenses, database.viewpoints, database.occlusion)  # fmt: skip
-    return digest(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)) + repr(said)
+    return digest(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)) + repr(specs)
 
 
 def _objects(path: Path) -> str:
@@ -205,7 +206,7 @@ FORMATS = (
 
 
 def made_corpus(world: World, folder: Path) -> None:
-    """Put a sound file of every format into a folder."""
+    """Write an undamaged file of every format into a folder."""
     here = world.folder
     folder.mkdir()
     for name in ("known.parquet", "plain.parquet", "known.gpkg", "noise.toml", "rule.json",
@@ -263,7 +264,7 @@ class Batch:
 
 
 def batches(mutants: int, *, seed: int) -> Iterator[Batch]:
-    """Yield at least so many mutants, as many of each format."""
+    """Yield batches with at least the given number of mutants, equally many of each format."""
     each = -(-mutants // len(FORMATS))
     for first in range(0, each, BATCH):
         for number in range(len(FORMATS)):
@@ -271,12 +272,12 @@ def batches(mutants: int, *, seed: int) -> Iterator[Batch]:
 
 
 def faults(batch: Batch, corpus: Path, folder: Path) -> list[tuple[int, str]]:
-    """Return the numbers of mutants that are not as they should be, and what is wrong with them.
+    """Return the numbers of mutants with a fault, and the faults.
 
-    Each batch is read in a process of its own, which is followed, so that one that crashes or hangs
-    is known.
+    A child process reads the batch and reports each number, so that this process knows the mutant
+    if it crashes or hangs.
     """
-    found: list[tuple[int, str]] = []
+    faults: list[tuple[int, str]] = []
     start, end = batch.first, batch.first + batch.count
     while start < end:
         reading, writing = os.pipe()
@@ -300,22 +301,22 @@ def faults(batch: Batch, corpus: Path, folder: Path) -> list[tuple[int, str]]:
                     break
                 *lines, text = (text + part).split(b"\n")
                 for line in lines:
-                    last, told = json.loads(line)
-                    if told:
-                        found.append((last, told))
+                    last, report = json.loads(line)
+                    if report:
+                        faults.append((last, report))
         if fault:
             os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
         if last == end:
             break
         fault = fault or f"crashes: {os.waitstatus_to_exitcode(status)}"
-        found.append((last, fault))
+        faults.append((last, fault))
         start = last + 1
-    return found
+    return faults
 
 
 def _read_all(batch: Batch, numbers: range, corpus: Path, folder: Path, writing: int) -> None:
-    """Read mutants, and say each number before and each fault after it."""
+    """Read mutants, and report each number before and each fault after reading."""
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 1)
     os.dup2(nothing, 2)
@@ -326,35 +327,35 @@ def _read_all(batch: Batch, numbers: range, corpus: Path, folder: Path, writing:
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(corpus, folder)
     path, sound = folder / form.file, (corpus / form.file).read_bytes()
-    held = form.read(path) if form.ours else None
+    contents = form.read(path) if form.ours else None
     form.read(path)
     for number in numbers:
         generator = random.Random(f"{batch.seed} {form.name} {number}")  # noqa: S311
         mutant = mutated(sound, generator, text=form.file.endswith(_TEXTS))
         path.write_bytes(mutant)
-        _say(writing, number, "")
-        told = ""
+        _report(writing, number, "")
+        fault = ""
         try:
-            got = form.read(path)
-            if form.ours and got != held:
-                told = "read differently"
+            result = form.read(path)
+            if form.ours and result != contents:
+                fault = "read differently"
         except sg.SemsigError as error:
             words = str(error)
             if not words.endswith(".") or "\n" in words:
-                told = f"no sentence: {words}"
+                fault = f"no sentence: {words}"
         except BaseException:  # noqa: BLE001 - what a user would see
-            told = "tracebacks: " + "".join(traceback.format_exc().splitlines(keepends=True)[-7:])
-        if told:
-            _say(writing, number, told[:3000])
-    _say(writing, numbers.stop, "")
+            fault = "tracebacks: " + "".join(traceback.format_exc().splitlines(keepends=True)[-7:])
+        if fault:
+            _report(writing, number, fault[:3000])
+    _report(writing, numbers.stop, "")
 
 
-def _say(writing: int, number: int, told: str) -> None:
-    os.write(writing, json.dumps([number, told]).encode() + b"\n")
+def _report(writing: int, number: int, fault: str) -> None:
+    os.write(writing, json.dumps([number, fault]).encode() + b"\n")
 
 
 def mutated(sound: bytes, generator: random.Random, *, text: bool) -> bytes:
-    """Return bytes with one to three damages; in texts, of numbers and words as well."""
+    """Return bytes with one to three damages; in texts, also to numbers and words."""
     damaged = bytearray(sound)
     for _ in range(generator.choice((1, 1, 1, 2, 3))):
         if text and generator.random() < _RESPELT:

@@ -1,4 +1,4 @@
-"""Run `semsig` in a forked process that ends, or is ended, as the soak wants it to."""
+"""Run `semsig` in a forked process, which may be killed or interrupted."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import semsig_gis
+from semsig_gis import evaluation
 from semsig_gis.cli import main as semsig
-from semsig_gis.evaluation.identifiability import analysis
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 LIMIT_S = 600.0
-"""What takes longer hangs, on the busiest machine."""
+"""Seconds after which a command counts as hanging, even on a busy machine."""
 
-# What Python reports of files before it changes them; `open` counts if it is for writing.
+# Audit events of Python before it changes files; `open` counts only for writing.
 _CHANGES = frozenset(
     {"open", "os.link", "os.mkdir", "os.remove", "os.rename", "os.rmdir", "os.symlink",
      "os.truncate"}
@@ -39,7 +39,7 @@ _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """When a command gets a signal: before its n-th change of a file, or after some seconds."""
+    """The moment of a signal: before the n-th change of a file, or after some seconds."""
 
     change: int | None = None
     after_s: float | None = None
@@ -48,7 +48,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How a command ended, how long it took, and what it changed in files, or was about to."""
+    """The end of a command: exit code, output, its changes of files, and its seconds."""
 
     code: int  # below zero: the signal that ended it
     out: str
@@ -59,7 +59,7 @@ class Ending:
 
     @property
     def fault(self) -> str:
-        """What no command may do, whatever it is given; empty where all is well."""
+        """Kind of fault that no command may have; empty if there is none."""
         if self.hung:
             return "hangs"
         if self.code < 0:
@@ -73,22 +73,22 @@ class Ending:
 
 
 def load_all() -> None:
-    """Import all modules, so that the processes that are forked have them at once."""
+    """Import all modules, so that forked processes need not import them."""
     modules = [module.name for module in pkgutil.walk_packages(semsig_gis.__path__, "semsig_gis.")]
     for name in (*modules, "rich.progress", "rich.table"):
         if not name.endswith("__main__"):
             importlib.import_module(name)
     shorten()
-    gc.freeze()  # or else every process would copy what it looks through
+    gc.freeze()  # or each process would copy the memory that its garbage collector visits
 
 
 def shorten() -> None:
-    """Let `identify` try less often: what it writes is as large."""
-    analysis.identify = functools.partial(analysis.identify, trials=60, class_trials=5)
+    """Reduce the trials of `identify`, which does not change the size of its results."""
+    evaluation.identify = functools.partial(evaluation.identify, trials=60, class_trials=5)
 
 
 def main() -> None:
-    """Run the command that this process was started with."""
+    """Run the command in the arguments of this process."""
     shorten()
     semsig()
 
@@ -101,10 +101,10 @@ def run(
     stop: Stop | None = None,
     pipe: bool = False,
 ) -> Ending:
-    """Run a command in a folder, with HOME and TMPDIR beside it; `pipe` closes its output early."""
+    """Run a command in a folder, with new HOME and TMPDIR; with `pipe`, its output is closed."""
     own = {"HOME": f"{folder}.home", "TMPDIR": f"{folder}.tmp"}
     for path in own.values():
-        with contextlib.suppress(OSError):  # a read-only disk, on which nothing can be
+        with contextlib.suppress(OSError):  # a read-only disk
             Path(path).mkdir(exist_ok=True)
     with contextlib.ExitStack() as stack:
         files = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(3)]
@@ -125,12 +125,12 @@ def _text(file: IO[bytes]) -> str:
 
 
 def _wait(child: int, stop: Stop | None) -> tuple[bool, int]:
-    """Wait for a process, and end what it left; return whether it hung, and its exit code."""
+    """Wait for a process, and kill its children; return whether it hung, and its exit code."""
     start, hung = time.perf_counter(), False
     due = None if stop is None else stop.after_s
     while True:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
             break
         passed = time.perf_counter() - start
         if due is not None and stop is not None and passed >= due:
@@ -155,7 +155,7 @@ def _child(
     *,
     pipe: bool,
 ) -> None:
-    """Run the command in this process, which ends with it."""
+    """Run the command in this process, and end the process."""
     code = 1
     out, err, changes = files
     try:
@@ -173,7 +173,7 @@ def _child(
         _note_changes(changes, stop)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         code = exit_code(command)
-    except BaseException:  # noqa: BLE001 - told, and the process ends
+    except BaseException:  # noqa: BLE001 - printed, and the process ends
         sys.excepthook(*sys.exc_info())
     finally:
         with contextlib.suppress(BaseException):
@@ -201,30 +201,30 @@ def exit_code(command: str) -> int:
 
 
 def _note_changes(file: int, stop: Stop | None) -> None:
-    """From now on, write a line before every change of a file, and stop before the n-th."""
-    done = 0
+    """Write a line before every change of a file from now on, and stop before the n-th."""
+    count = 0
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
-        nonlocal done
+        nonlocal count
         if event not in _CHANGES:
             return
         if event == "open":
             path = os.fsdecode(arguments[0]) if isinstance(arguments[0], str | bytes) else "/dev/"
             if not arguments[2] & _WRITING or path.startswith(("/dev/", "/proc/")):
                 return
-        done += 1
-        names = [os.fsdecode(one) for one in arguments if isinstance(one, str | bytes | Path)]
+        count += 1
+        names = [os.fsdecode(name) for name in arguments if isinstance(name, str | bytes | Path)]
         os.write(file, (" ".join([event, *names]) + "\n").encode(errors="backslashreplace"))
-        if stop is not None and stop.change == done:
+        if stop is not None and stop.change == count:
             os.killpg(os.getpgrp(), stop.signal)
 
     sys.addaudithook(hook)
 
 
 def forked(task: Callable[[], Any]) -> Any:  # noqa: ANN401 - any JSON
-    """Return what a task gives, as JSON can say it, in a process of its own.
+    """Run a task in a new process, and return its result by way of JSON.
 
-    A process in which a task has started threads (as reading Parquet does) can fork no more.
+    A process with threads, which reading Parquet starts, must not fork.
     """
     reading, writing = os.pipe()
     child = os.fork()
@@ -234,7 +234,7 @@ def forked(task: Callable[[], Any]) -> Any:  # noqa: ANN401 - any JSON
             with open(writing, "w", encoding="utf-8") as file:  # noqa: PTH123 - a descriptor
                 json.dump(task(), file)
             code = 0
-        except BaseException:  # noqa: BLE001 - told, and the parent raises
+        except BaseException:  # noqa: BLE001 - printed, and the parent raises
             sys.excepthook(*sys.exc_info())
         finally:
             os._exit(code)

@@ -1,26 +1,22 @@
 """Measure how well the methods localize: ``python -m benchmarks.accuracy``.
 
-Cities: one made up as large and as furnished as the paper's Paris, and Montpellier from its open
-data. All methods answer the same spoiled queries. Results go to ``benchmarks/accuracy.json``, in
-which rows of cities that are not measured stay. Times are those of the processor, so that other
-programs do not count.
+Cities: a made-up one with as many cells and objects as the paper's Paris, and Montpellier from its
+open data. All methods get the same distorted queries. Results are written to
+``benchmarks/accuracy.json``, which keeps the rows of cities that are not measured. Times are
+processor times, so that other programs do not count.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-import json
 import math
-import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from benchmarks._accuracy_methods import (
-    Way,
+    Settings,
     ask_likelihood,
     ask_paper,
     ask_refined,
@@ -30,6 +26,7 @@ from benchmarks._accuracy_queries import City, off_grid, on_grid, turned, walks
 from benchmarks._accuracy_rows import Bar, Row
 from benchmarks._cities import MONTPELLIER, made_up, made_up_streets, real
 from benchmarks._cities import PARIS_LIKE as PARIS
+from benchmarks._measuring import add_geodata, option_parser, read_rows, write_rows
 from semsig_gis.core import ObjectIndex
 from semsig_gis.database import build_database
 from semsig_gis.localization import Method, build_index, calibrate, cell_noise, named_noise
@@ -37,6 +34,7 @@ from semsig_gis.sources import PARIS_LIKE, CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
     from benchmarks._accuracy_methods import Outcome
     from benchmarks._accuracy_queries import Query
@@ -61,7 +59,7 @@ OFF_GRID = "north known; off the grid"
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """How much is measured: the city, and the queries of each row."""
+    """The made-up city, and the number of queries of each row."""
 
     city: CitySpec
     queries: int
@@ -74,33 +72,23 @@ _SIZES = {
 
 
 def main() -> None:
-    """Read the options, measure, print and write; row by row, so that a part is there early."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__)
-    parser.add_argument("--size", choices=list(_SIZES), default="full")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_name("accuracy.json"))
-    parser.add_argument(
-        "--geodata",
-        type=Path,
-        default=os.environ.get("SEMSIG_GEODATA"),
-        metavar="FOLDER",
-        help="folder of open data with montpellier in it (default: what SEMSIG_GEODATA names)",
-    )
+    """Measure, and print and write each row."""
+    parser = option_parser("accuracy", __doc__)
+    add_geodata(parser)
     parser.add_argument("--city", choices=(PARIS, MONTPELLIER), help="default: both")
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
     size = _SIZES[options.size]
     cities = [options.city] if options.city else [PARIS, MONTPELLIER]
-    kept = json.loads(options.out.read_bytes()) if options.out.exists() else []
-    kept = [one for one in kept if one["city"] not in cities]
+    others = [row for row in read_rows(options.out) if row["city"] not in cities]
     rows: list[Row] = []
     for city in _cities(cities, size, options.geodata):
         print(f"{city.name}: {len(city.database):,} cells", flush=True)
         for row in _rows(city, size, options.threads):
             print(row, flush=True)
             rows.append(row)
-            values = [one.to_dict() for one in rows] + kept
-            values.sort(key=lambda one: one["city"] != PARIS)
-            options.out.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+            values = [measured.to_dict() for measured in rows] + others
+            write_rows(options.out, sorted(values, key=lambda value: value["city"] != PARIS))
     bars = [bar for row in rows for bar in row.bars]
     print(f"{sum(bar.met for bar in bars)} of {len(bars)} bars met")
     for row in rows:
@@ -137,12 +125,12 @@ def _rows(city: City, size: _Size, threads: int) -> Iterator[Row]:
         for row in _paper_rows(city, level, queries[level]):
             best = max(best, row.share())
             yield row
-        for method, way in ((INDEX, Way(reranked=False)), (RERANKED, Way())):
-            outcomes = ask_likelihood(city, queries[level], generic, way, threads=threads)
+        for method, settings in ((INDEX, Settings(reranked=False)), (RERANKED, Settings())):
+            outcomes = ask_likelihood(city, queries[level], generic, settings, threads=threads)
             row = Row(
                 city=city, distortion=level, method=method, setting=ON_GRID, outcomes=outcomes
             )
-            if way.reranked:
+            if settings.reranked:
                 reranked[level] = row
                 row.bars.extend(_main_bars(row, best))
             yield row
@@ -151,17 +139,17 @@ def _rows(city: City, size: _Size, threads: int) -> Iterator[Row]:
     yield from _north_rows(queries["medium"], reranked["medium"], generic, threads)
     yield from _route_rows(city, generic, size.queries, threads)
     del generic  # an index takes a quarter of a gigabyte
-    yield from _told_rows(city, queries["medium"], threads)
+    yield from _noise_rows(city, queries["medium"], threads)
 
 
 def _paper_rows(city: City, level: str, queries: Sequence[Query]) -> Iterator[Row]:
-    for kept, order in ((True, "order kept"), (False, "sorted after the noise")):
+    for unsorted, order in ((True, "order kept"), (False, "sorted after the noise")):
         yield Row(
             city=city,
             distortion=level,
             method=f"{PAPER}, {order}",
             setting=ON_GRID,
-            outcomes=ask_paper(city, queries, PAPER, kept=kept),
+            outcomes=ask_paper(city, queries, PAPER, unsorted=unsorted),
         )
 
 
@@ -178,16 +166,16 @@ def _main_bars(row: Row, best: float) -> Iterator[Bar]:
 
 
 def _abstention_rows(reranked: dict[str, Row]) -> Iterator[Row]:
-    """Calibrate when to answer on half of the medium queries, and try it on the other halves."""
+    """Calibrate the rule on half of the medium queries; apply it to the other halves."""
     half = len(reranked["medium"].outcomes) // 2
     first = reranked["medium"].outcomes[:half]
-    rule = calibrate([one.mass or 0.0 for one in first], [_right(one) for one in first])
+    rule = calibrate([outcome.mass or 0.0 for outcome in first], [*map(_right, first)])
     for level, row in reranked.items():
         rest = row.outcomes[half:]
-        given = [_right(one) for one in rest if rule.answers(one.mass or 0.0)]
-        coverage = len(given) / len(rest)
-        precision = sum(given) / len(given) if given else None
-        found = dataclasses.replace(
+        right = [_right(outcome) for outcome in rest if rule.answers(outcome.mass or 0.0)]
+        coverage = len(right) / len(rest)
+        precision = sum(right) / len(right) if right else None
+        answers = dataclasses.replace(
             row,
             setting=f"{ON_GRID}; answers only where sure, by other queries at medium",
             outcomes=rest,
@@ -196,13 +184,15 @@ def _abstention_rows(reranked: dict[str, Row]) -> Iterator[Row]:
             bars=[],
         )
         if level == "medium" and row.city.name == PARIS:
-            found.bars.append(Bar(what="answers that are right", value=precision or 0.0, low=0.98))
-            found.bars.append(Bar(what="queries answered", value=coverage, low=0.4))
-        yield found
+            answers.bars.append(
+                Bar(what="answers that are right", value=precision or 0.0, low=0.98)
+            )
+            answers.bars.append(Bar(what="queries answered", value=coverage, low=0.4))
+        yield answers
 
 
 def _north_rows(
-    queries: Sequence[Query], known: Row, generic: LikelihoodIndex, threads: int
+    queries: Sequence[Query], reference: Row, generic: LikelihoodIndex, threads: int
 ) -> Iterator[Row]:
     rng = np.random.default_rng(1)
     slips = rng.normal(0.0, NORTH_SIGMA, len(queries)).tolist()
@@ -212,14 +202,18 @@ def _north_rows(
         (f"north off by N(0, {NORTH_SIGMA:g} deg), ignored", slips, 0.0),
         ("north unknown", anyhow, math.inf),
     ):
-        way = Way(north_sigma=sigma)
-        asked = turned(queries, turns)
-        outcomes = ask_likelihood(known.city, asked, generic, way, threads=threads)
-        row = dataclasses.replace(
-            known, setting=f"{setting}; on the grid", outcomes=outcomes, bars=[]
+        outcomes = ask_likelihood(
+            reference.city,
+            turned(queries, turns),
+            generic,
+            Settings(north_sigma=sigma),
+            threads=threads,
         )
-        if sigma == math.inf and known.city.name == PARIS:
-            ratio = row.share() / known.share() if known.share() else math.inf
+        row = dataclasses.replace(
+            reference, setting=f"{setting}; on the grid", outcomes=outcomes, bars=[]
+        )
+        if sigma == math.inf and reference.city.name == PARIS:
+            ratio = row.share() / reference.share() if reference.share() else math.inf
             row.bars.append(Bar(what="P50, to that with north known", value=ratio, low=0.8))
         yield row
 
@@ -228,8 +222,8 @@ def _route_rows(city: City, generic: LikelihoodIndex, count: int, threads: int) 
     cases = [(panoramas, 0.0) for panoramas in PANORAMAS]
     cases += [(panoramas, LEG_SIGMA) for panoramas in PANORAMAS if panoramas > 1]
     routes = walks(city, "medium", count, max(PANORAMAS), leg_sigmas=(0.0, LEG_SIGMA))
-    found = ask_routes(city, routes, generic, cases, threads=threads)
-    for (panoramas, sigma), outcomes in zip(cases, found, strict=True):
+    results = ask_routes(city, routes, generic, cases, threads=threads)
+    for (panoramas, sigma), outcomes in zip(cases, results, strict=True):
         legs = f"legs known to {sigma:g} m" if sigma else "legs known"
         setting = f"{panoramas} panoramas 20 m apart, {legs}" if panoramas > 1 else "1 panorama"
         row = Row(
@@ -251,14 +245,14 @@ def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: in
         dataclasses.replace(row, setting=OFF_GRID) for row in _paper_rows(city, "medium", queries)
     )
     noise = named_noise("generic")
-    way = Way(radius=25.0)
+    settings = Settings(radius=25.0)
     wide = build_index(city.database, cell_noise(noise, city.database.grid.step))
     shares = []
     for method, outcomes in (
-        (RERANKED, ask_likelihood(city, queries, generic, way, threads=threads)),
+        (RERANKED, ask_likelihood(city, queries, generic, settings, threads=threads)),
         (
             f"{RERANKED}, place in the cell unknown",
-            ask_likelihood(city, queries, wide, way, threads=threads),
+            ask_likelihood(city, queries, wide, settings, threads=threads),
         ),
         (f"{RERANKED}, refined", ask_refined(city, queries, wide, noise, threads=threads)),
     ):
@@ -272,23 +266,23 @@ def _off_grid_rows(city: City, generic: LikelihoodIndex, count: int, threads: in
         yield row
 
 
-def _told_rows(city: City, queries: Sequence[Query], threads: int) -> Iterator[Row]:
-    """Tell the right level of noise, and wrong ones."""
-    for told in ("medium", "light", "strong"):
-        index = build_index(city.database, named_noise(told))
-        outcomes = ask_likelihood(city, queries, index, Way(), threads=threads)
+def _noise_rows(city: City, queries: Sequence[Query], threads: int) -> Iterator[Row]:
+    """Localize with the right noise model, and with wrong ones."""
+    for noise in ("medium", "light", "strong"):
+        index = build_index(city.database, named_noise(noise))
+        outcomes = ask_likelihood(city, queries, index, Settings(), threads=threads)
         row = Row(
             city=city,
             distortion="medium",
-            method=f"likelihood, noise {told}, re-ranked",
+            method=f"likelihood, noise {noise}, re-ranked",
             setting=ON_GRID,
             outcomes=outcomes,
         )
-        if told == "medium":
+        if noise == "medium":
             low, high = REGION_BAR
-            held = row.in_exact_region or 0.0
+            share = row.in_exact_region or 0.0
             row.bars.append(
-                Bar(what="regions of just 90 % that hold", value=held, low=low, high=high)
+                Bar(what="regions of just 90 % that hold", value=share, low=low, high=high)
             )
         yield row
 

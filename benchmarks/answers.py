@@ -1,4 +1,4 @@
-"""Whole answers over a city like Paris: warm, in a batch, and from a process that starts cold."""
+"""Time of complete answers in a city like Paris: warm, in a batch, and from a new process."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,27 +30,27 @@ if TYPE_CHECKING:
 
 __all__ = ["comparisons"]
 
-# The city, the queries of a batch, and how often a single query is timed.
+# The city, the number of queries of a batch, and of single queries that are timed.
 _SIZES = {"full": (PARIS_LIKE, 1000, 15), "small": (CitySpec(size=300.0), 5, 2)}
 _SEED = 20
 _WARM, _WARM_REFINED = 15.0, 4.0
-_COLD, _MEMORY = 1 / 1.3, 1 / 1.5  # of what edit+edit takes
+_COLD, _MEMORY = 1 / 1.3, 1 / 1.5  # ratios to edit+edit
 _LOADING = 1 / 0.7
 _MOST_HELP_MS = 500.0
 _EXPLAINED = 3
 _IMPORTS = "import numba, pandas, geopandas, pyarrow, typer, rich"
 _DISTANCE = ("--method", "edit+edit")
-# The command, which tells at last how many seconds it answered and how many MB it needed.
-_TOLD = """
+# The command; it prints at its end the seconds of the answer and its peak memory in MB.
+_TIMED_COMMAND = """
 import sys, time
 from benchmarks.memory import own_peak
 from semsig_gis.cli import main
 from semsig_gis.cli import localize as command
 seconds = 0.0
-def timed(*given):
+def timed(*arguments):
     global seconds
     start = time.perf_counter()
-    answer(*given)
+    answer(*arguments)
     seconds = time.perf_counter() - start
 answer, command._answer = command._answer, timed
 try:
@@ -60,18 +61,7 @@ finally:
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure whole answers, warm and cold, and what a process needs beside answering.
-
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        One result after the other.
-    """
+    """Measure complete answers, warm and cold, and the time and memory of a process."""
     spec, batch, repeats = _SIZES[size]
     objects = made_up(spec)
     database = made_up_streets(spec, objects)
@@ -93,14 +83,14 @@ def _texts(database: SignatureDatabase) -> list[str]:
 def _warm_rows(
     database: SignatureDatabase, store: ObjectStore, queries: Sequence[Signature]
 ) -> Iterator[Comparison]:
-    """Measure answers to single queries, all that can be kept being there."""
+    """Measure answers to single queries, with the database and the index in memory."""
     noise = cell_noise(named_noise("generic"), database.grid.step)  # as the command does
     index = build_index(database, noise)
     texts = _texts(database)
-    asked = [database.taxonomy.decode(query.codes) for query in queries if query.codes is not None]
+    types = [database.taxonomy.decode(query.codes) for query in queries if query.codes is not None]
 
     def peer(repeat: int) -> None:
-        cdist([asked[repeat]], texts, scorer=Levenshtein.distance, dtype=np.uint8)
+        cdist([types[repeat]], texts, scorer=Levenshtein.distance, dtype=np.uint8)
 
     def answered(repeat: int) -> None:
         locate(index, queries[repeat])
@@ -133,11 +123,11 @@ def _batch_row(
     lines = [json.dumps(query.to_dict(database.taxonomy)) for query in queries]
     file.write_text("\n".join(lines), encoding="utf-8")
     texts = _texts(database)
-    asked = [json.loads(line)["types"] for line in lines]
+    types = [json.loads(line)["types"] for line in lines]
     return timed(
         f"a process that answers {len(queries):,} queries by likelihood, {len(database):,} cells",
         lambda _: _process(*_localize(city), "--queries", str(file)),
-        lambda _: cdist(asked, texts, scorer=Levenshtein.distance, dtype=np.uint8),
+        lambda _: cdist(types, texts, scorer=Levenshtein.distance, dtype=np.uint8),
         peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
         repeats=1,
     )
@@ -150,9 +140,9 @@ def _cold_rows(
     query: Signature,
     repeats: int,
 ) -> Iterator[Comparison]:
-    """Measure whole processes of the command."""
-    asked = query.to_dict(database.taxonomy)
-    options = "--types", asked["types"], "--bearings", ",".join(map(str, asked["bearings"]))
+    """Measure new processes of the command."""
+    view = query.to_dict(database.taxonomy)
+    options = "--types", view["types"], "--bearings", ",".join(map(str, view["bearings"]))
     cells = f"{len(database):,} cells"
     plain = *_localize(city), *options
     before = sorted(city.parent.iterdir())
@@ -164,8 +154,10 @@ def _cold_rows(
         repeats=repeats,
         bar=_COLD,
     )
-    told = [[_told(*plain[2:], *method) for _ in range(repeats)] for method in ((), _DISTANCE)]
-    by_likelihood, by_distance = (statistics.median(peak for _, peak in runs) for runs in told)
+    runs = [
+        [_timed_command(*plain[2:], *method) for _ in range(repeats)] for method in ((), _DISTANCE)
+    ]
+    by_likelihood, by_distance = (statistics.median(peak for _, peak in part) for part in runs)
     yield Comparison(
         name=f"peak memory of semsig localize by likelihood, {cells}",
         unit="MB",
@@ -189,15 +181,8 @@ def _cold_rows(
         peer_name="python that imports numba, pandas, geopandas, pyarrow, typer and rich",
         repeats=repeats,
     )
-    answering = 1e3 * statistics.median(seconds for seconds, _ in told[1])
-    yield Comparison(
-        name=whole.name,
-        unit=whole.unit,
-        ours=whole.ours - answering,
-        peer=whole.peer,
-        peer_name=whole.peer_name,
-        bar=_LOADING,
-    )
+    answering = 1e3 * statistics.median(seconds for seconds, _ in runs[1])
+    yield replace(whole, ours=whole.ours - answering, bar=_LOADING)
     yield timed(
         "cold: semsig --help",
         lambda _: _process("-m", "semsig_gis.cli", "--help"),
@@ -212,13 +197,13 @@ def _localize(city: Path) -> tuple[str, ...]:
 
 
 def _process(*arguments: str) -> str:
-    """Run Python, and return what it says on standard error."""
+    """Run Python, and return its standard error."""
     command = [sys.executable, *arguments]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
-    return done.stderr
+    run = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
+    return run.stderr
 
 
-def _told(*arguments: str) -> tuple[float, float]:
-    """Return how many seconds the command answered, and its peak memory in MB."""
-    seconds, peak = _process("-c", _TOLD, *arguments).splitlines()[-1].split()
+def _timed_command(*arguments: str) -> tuple[float, float]:
+    """Return the seconds of the answer of a command, and its peak memory in MB."""
+    seconds, peak = _process("-c", _TIMED_COMMAND, *arguments).splitlines()[-1].split()
     return float(seconds), float(peak)

@@ -1,27 +1,25 @@
-"""Measure what no method can pass: ``python -m benchmarks.bayes``.
+"""Measure the upper bound for all methods: ``python -m benchmarks.bayes``.
 
 In a made-up city of some thousand cells, the likelihood of every cell is summed exactly over all
-one-to-one associations of what is seen with what is there, by the noise that spoils the queries.
-Its chances are those that Bayes' rule gives, and the best place by them is right as often as any
-can be. Beside it stands what the likelihood method finds, for the same queries of a full turn, of
-120 and of 70 degrees, without and with rough distances. Results go to ``benchmarks/bayes.json``.
+one-to-one associations of detections and objects, with the noise model that distorts the queries.
+Its chances follow from Bayes' rule, so no method is right more often than its best place. The
+likelihood method is measured for the same queries of a full turn, of 120 and of 70 degrees, with
+and without rough distances. Results are written to ``benchmarks/bayes.json``.
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import json
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import norm
 
 from benchmarks._cities import MADE_UP, made_up, made_up_streets
+from benchmarks._measuring import option_parser, write_rows
 from benchmarks.views import DEGREES, NOISE
 from semsig_gis.core import FULL_TURN, signed_degrees, wilson_interval
 from semsig_gis.database import visible_objects_in
@@ -45,27 +43,25 @@ __all__ = ["ExactPosterior", "association_sum", "main"]
 
 NEAR_M = 50.0
 RANGE_ERROR = 0.25
-MOST = 14  # detections of a query: the sums over their subsets are kept
-NEGLIGIBLE = 30.0  # nats below the best cell, from which on a cell is left out
+MOST = 14  # detections of a query: memory is needed for every subset of them
+NEGLIGIBLE = 30.0  # a cell that is more nats below the best cell is left out
 LAPS = 360.0 * np.arange(-2, 3)
 
 
 def main() -> None:
-    """Read the options, measure, print and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.bayes", description=__doc__)
-    parser.add_argument("--size", choices=["full", "small"], default="full")
+    """Measure, print and write."""
+    parser = option_parser("bayes", __doc__)
     parser.add_argument("--queries", type=int, metavar="N", help="of each line (default: 1,000)")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_name("bayes.json"))
     options = parser.parse_args()
     small = options.size == "small"
     spec = CitySpec(size=250.0 if small else 700.0)
     database = made_up_streets(spec, made_up(spec))
-    wanted = options.queries or (5 if small else 1000)
+    count = options.queries or (5 if small else 1000)
     rows = []
     for degrees, ranges in itertools.product(reversed(DEGREES), (False, True)):
-        rows.append(_row(database, degrees, wanted, ranges=ranges))
+        rows.append(_row(database, degrees, count, ranges=ranges))
         print(_text(rows[-1]), flush=True)
-    options.out.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+    write_rows(options.out, rows)
 
 
 def association_sum(weights: NDArray[np.float64]) -> float:
@@ -74,21 +70,21 @@ def association_sum(weights: NDArray[np.float64]) -> float:
     Parameters
     ----------
     weights : ndarray, shape (objects, detections)
-        How much likelier each pair is one thing than a miss and a false detection.
+        Ratio of the likelihoods of each pair as a match, and as a miss and a false detection.
 
     Returns
     -------
     float
         The logarithm; the empty association counts as one.
     """
-    # By subset of the detections: the sum over all ways in which the objects so far are just these.
+    # sums[subset]: sum over all associations of the first objects with exactly these detections.
     sums = np.zeros(2 ** weights.shape[1])
     sums[0] = 1.0
     for row in weights:
         before = sums.copy()
-        for one in np.flatnonzero(row).tolist():
-            with_it, without = (part.reshape(-1, 2, 2**one) for part in (sums, before))
-            with_it[:, 1] += row[one] * without[:, 0]
+        for detection in np.flatnonzero(row).tolist():
+            with_it, without = (part.reshape(-1, 2, 2**detection) for part in (sums, before))
+            with_it[:, 1] += row[detection] * without[:, 0]
     return math.log(sums.sum())
 
 
@@ -115,13 +111,13 @@ class ExactPosterior:
 
     @cached_property
     def near(self) -> NDArray[np.float32]:
-        """Which cells are within 50 m of which, shape (n, n)."""
+        """Whether two cells are within 50 m of each other, 0 or 1, shape (n, n)."""
         xy = self.database.xy
-        away = np.hypot(*(xy[:, None, axis] - xy[None, :, axis] for axis in (0, 1)))
-        return np.asarray(away <= NEAR_M, np.float32)
+        distances = np.hypot(*(xy[:, None, axis] - xy[None, :, axis] for axis in (0, 1)))
+        return np.asarray(distances <= NEAR_M, np.float32)
 
     def loglik(self, query: Signature) -> NDArray[np.float64]:
-        """Return the log-likelihood of each cell, exact where it may matter, otherwise -inf."""
+        """Return the log-likelihood of each cell, exact, or -inf if the cell is negligible."""
         view = View.of(query)
         (photo,) = view.photos
         offsets, table = self._views.offsets, self._table
@@ -134,7 +130,7 @@ class ExactPosterior:
         weights = hits / false
         empty = np.add.reduceat(np.log(missed), offsets[:-1]) + np.log(false).sum()
         empty -= table.clutter.sum() * photo.width / FULL_TURN
-        # Where one object may be several detections, the sum is a product, and never smaller.
+        # If one object could be several detections, the sum would be this product: an upper bound.
         most = empty + np.log1p(np.add.reduceat(weights, offsets[:-1], axis=0)).sum(axis=1)
         loglik = np.full(len(most), -np.inf)
         best = -math.inf
@@ -147,7 +143,7 @@ class ExactPosterior:
         return loglik
 
     def _inside(self, photo: Photo, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how likely the bearing of each object comes out in the sectors."""
+        """Return the chance that the measured bearing of each object is in the sectors."""
         if not photo.sectors:
             return np.ones(len(sigma))
         inside = np.zeros(len(sigma))
@@ -159,14 +155,14 @@ class ExactPosterior:
         return inside
 
     def _hits(self, view: View, kinds: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the density of each object being each detection, 0 far beyond the noise."""
+        """Return the density of each detection for each object, 0 beyond 8 standard deviations."""
         table = self._table
         if view.bearings is None:
             raise ValueError("a query without bearings has no exact likelihood here")
         sigma = table.sigma[kinds][:, None]
-        away = signed_degrees(view.bearings - self._views.bearings[:, None])
-        near = np.abs(away) < 8.0 * sigma
-        hits = np.where(near, norm.pdf(away / sigma) / sigma, 0.0)
+        errors = signed_degrees(view.bearings - self._views.bearings[:, None])
+        near = np.abs(errors) < 8.0 * sigma
+        hits = np.where(near, norm.pdf(errors / sigma) / sigma, 0.0)
         hits *= table.detected[0, kinds][:, None] * table.named[0][kinds][:, table.query_rows(view)]
         if view.ranges is not None:
             distances = np.maximum(self._views.distances, table.distances[0])[:, None]
@@ -174,23 +170,23 @@ class ExactPosterior:
         return hits
 
 
-def _row(database: SignatureDatabase, degrees: int, wanted: int, *, ranges: bool) -> dict[str, Any]:
-    """Ask for photos of so many degrees, and return what came of them."""
+def _row(database: SignatureDatabase, degrees: int, count: int, *, ranges: bool) -> dict[str, Any]:
+    """Localize photos of a field of view in degrees, and return their figures."""
     exact = ExactPosterior(database)
     locator = LikelihoodLocator(index=build_index(database, NOISE), top=1)
     right, limit, stated, lengths = [], [], [], []
-    for query in itertools.islice(_queries(database, degrees, ranges=ranges), wanted):
-        asked = query.asked.signature
-        loglik = exact.loglik(asked)
+    for query in itertools.islice(_queries(database, degrees, ranges=ranges), count):
+        signature = query.asked.signature
+        loglik = exact.loglik(signature)
         chances = np.exp(loglik - np.logaddexp.reduce(loglik))
         masses = exact.near @ chances
-        found = locator.locate(asked)
-        places = database.xy[int(masses.argmax())], (found.answer.x, found.answer.y)
+        answer = locator.locate(signature).answer
+        places = database.xy[int(masses.argmax())], (answer.x, answer.y)
         right.append([math.dist(place, query.xy) <= NEAR_M + 1e-6 for place in places])
         limit.append(float(masses.max()))
-        stated.append(found.answer.mass)
-        lengths.append(len(asked))
-    (bayes, ours), count = np.mean(right, axis=0).tolist(), len(right)
+        stated.append(answer.mass)
+        lengths.append(len(signature))
+    bayes, ours = np.mean(right, axis=0).tolist()
     spread = float(np.std(limit) / math.sqrt(count))
     low, high = wilson_interval(ours, count)
     return {
@@ -213,9 +209,9 @@ def _row(database: SignatureDatabase, degrees: int, wanted: int, *, ranges: bool
 def _queries(
     database: SignatureDatabase, degrees: int, *, ranges: bool
 ) -> Iterator[SimulatedQuery]:
-    """Yield queries from cells that are seen by the noise and have one to fourteen detections."""
-    told = f"ranges:{100 * RANGE_ERROR:g}, " if ranges else ""
-    chain = parse_chain(f"detector:views, {told}view:{degrees}", noises={NOISE.name: NOISE})
+    """Yield queries of cells, distorted by the noise model, with one to fourteen detections."""
+    distances = f"ranges:{100 * RANGE_ERROR:g}, " if ranges else ""
+    chain = parse_chain(f"detector:views, {distances}view:{degrees}", noises={NOISE.name: NOISE})
     for seed in itertools.count():
         spec = QuerySpec(number=len(database), seeds=(seed,), distortions=chain)
         for query in draw_queries(database, spec):
@@ -224,7 +220,7 @@ def _queries(
 
 
 def _text(row: dict[str, Any]) -> str:
-    """Return a line for people."""
+    """Return a row as text."""
     return (
         f"{row['degrees']} degrees{', ranges' * row['ranges']} (n={row['queries']}): at most "
         f"{row['limit']:.3f} +- {row['limit_error']:.3f}, by Bayes {row['bayes']:.3f}, ours "

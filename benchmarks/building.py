@@ -1,4 +1,4 @@
-"""Building, saving and opening a signature database, beside the bare parts of that work."""
+"""Time of building, saving and opening a signature database, and of the core of that work."""
 
 from __future__ import annotations
 
@@ -31,18 +31,7 @@ _REPEATS = {"full": 5, "small": 1}
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure two cities.
-
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        The next result.
-    """
+    """Measure building one city, and the file of another."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "city.parquet"
         yield _building(made_up(_BUILT[size]), path, repeats=_REPEATS[size])
@@ -53,7 +42,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 
 def _building(objects: StreetObjects, path: Path, *, repeats: int) -> Comparison:
-    """Compare building and saving with the search for the pairs behind it."""
+    """Compare building and saving with only the search for pairs of viewpoints and objects."""
     viewpoints, points = build_database(objects).xy, objects.xy
 
     def ours(_: int) -> None:
@@ -67,14 +56,14 @@ def _building(objects: StreetObjects, path: Path, *, repeats: int) -> Comparison
         f"building and saving a database from {len(objects):,} objects",
         ours,
         peer,
-        peer_name="scipy.spatial.cKDTree, the pairs alone",
+        peer_name="scipy.spatial.cKDTree, only the pairs",
         repeats=repeats,
         bar=1 / 3,
     )
 
 
 def _storing(database: SignatureDatabase, path: Path, *, repeats: int) -> Iterator[Comparison]:
-    """Compare a file with the same numbers kept plainly."""
+    """Compare a file with the same numbers in compressed arrays."""
     mean = database.offsets[-1] / len(database)
     what = f"{len(database):,} signatures of mean length {mean:.1f}"
     plain = path.with_suffix(".npz")

@@ -1,18 +1,15 @@
-"""Measure whether the chances that are stated come true: ``python -m benchmarks.chances``.
+"""Measure whether stated chances come true: ``python -m benchmarks.chances``.
 
-Queries are seen from anywhere in real cities, spoiled, and answered by likelihood as
-`semsig localize` does it: generic noise, refined. First with the map of the day, then with one that
-is older than the queries: by the real changes of Monaco, and by three made-up years of other
-cities. Results go to ``benchmarks/chances.json``, row by row; rows that are there already stay, so
-that a run goes on where it was interrupted.
+Queries from anywhere in real cities are distorted and localized by likelihood with the settings of
+`semsig localize`: generic noise, refined. This is done with a current map, and with a map that is
+older than the queries: by the real changes of Monaco, and by three simulated years of other cities.
+Results are written to ``benchmarks/chances.json``, row by row. Rows that are there are not measured
+again, so that an interrupted run continues.
 """
 
 from __future__ import annotations
 
-import argparse
 import functools
-import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +18,15 @@ import pandas as pd
 
 from benchmarks._cities import MADE_UP, MONTPELLIER, made_up, real
 from benchmarks._later_city import later_city
+from benchmarks._measuring import (
+    INPUTS,
+    add_geodata,
+    available_cities,
+    option_parser,
+    read_rows,
+    short,
+    write_rows,
+)
 from benchmarks.tables import TODAY
 from semsig_gis.core import wilson_interval
 from semsig_gis.database import ObjectStore, build_database
@@ -65,7 +71,7 @@ CITIES = ("Helsinki", "Monaco", MONTPELLIER, MADE_UP)
 
 @dataclass(frozen=True, eq=False)
 class _City:
-    """The street objects of a city, and what is built of them."""
+    """The street objects of a city, with its database and object store."""
 
     objects: StreetObjects
 
@@ -79,42 +85,30 @@ class _City:
 
 
 def main() -> None:
-    """Read the options, measure, print and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.chances", description=__doc__)
-    parser.add_argument("--size", choices=["full", "small"], default="full")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_name("chances.json"))
-    parser.add_argument(
-        "--geodata",
-        type=Path,
-        default=os.environ.get("SEMSIG_GEODATA"),
-        metavar="FOLDER",
-        help="folder of open data (default: what SEMSIG_GEODATA names)",
-    )
+    """Measure, print and write."""
+    parser = option_parser("chances", __doc__)
+    add_geodata(parser)
     parser.add_argument("--city", choices=CITIES, action="append", help="default: all of them")
     options = parser.parse_args()
-    names = options.city or CITIES
-    if options.geodata is None:
-        names = [name for name in names if name == MADE_UP]
-        print("Real cities are left out: SEMSIG_GEODATA does not name the folder of open data.")
-    rows = json.loads(options.out.read_text("utf-8")) if options.out.exists() else []
-    for name in names:
-        for case, ask in _cases(name, options.geodata, small=options.size == "small"):
+    rows = read_rows(options.out)
+    for name in available_cities(options.city or CITIES, options.geodata, made_up=MADE_UP):
+        for case, measure in _cases(name, options.geodata, small=options.size == "small"):
             if any(case.items() <= row.items() for row in rows):
                 continue
-            row = {**case, **ask()}
+            row = {**case, **measure()}
             print(
-                f"{row['city']}, {row['map']}, {row['told']} (n={row['queries']}): within 50 m "
+                f"{row['city']}, {row['map']}, {row[INPUTS]} (n={row['queries']}): within 50 m "
                 f"{row['p50']:.3f}; {row['answered']} from 0.9 on, {row['right']} right",
                 flush=True,
             )
-            rows = sorted([*rows, row], key=lambda one: CITIES.index(one["city"]))
-            options.out.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+            rows = sorted([*rows, row], key=lambda item: CITIES.index(item["city"]))
+            write_rows(options.out, rows)
 
 
 def _cases(
     name: str, geodata: Path | None, *, small: bool
 ) -> Iterator[tuple[dict[str, Any], Callable[[], dict[str, Any]]]]:
-    """Yield what to ask of a city, one case for each map and noise model, and what asks it."""
+    """Yield the cases of a city, one for each map and noise model, with functions to measure."""
     if name == MADE_UP:
         objects = made_up(CitySpec(size=200.0 if small else 1000.0))
         read: Callable[[str], StreetObjects] = {name: objects}.__getitem__
@@ -122,9 +116,9 @@ def _cases(
         read = functools.partial(real, Path(str(geodata)))
     city = _City(read(name))
     if name != MADE_UP:
-        case = {"city": name, "map": TODAY, "told": "", "levels": [*LEVELS]}
+        case = {"city": name, "map": TODAY, INPUTS: "", "levels": [*LEVELS]}
         count = 5 if small else 300
-        yield case, functools.partial(_asked, city, city, LEVELS, count)
+        yield case, functools.partial(_figures, city, city, LEVELS, count)
     if name == "Monaco":
         now, years, drifts = _City(read("Monaco a year later")), MONACO_YEARS, [named_drift()]
     else:
@@ -132,20 +126,20 @@ def _cases(
         changes = compare_objects(city.objects, later_city(city.objects, 1, seed=2))
         drifts = [Drift(years=1.0, classes=changes.classes), named_drift()]
     for drift in (None, *drifts):
-        told, noise = "", GENERIC
+        settings, noise = "", GENERIC
         if drift is not None:
-            told = f"--map-age {years:g}" + " --drift-report" * (drift is not named_drift())
+            settings = f"--map-age {years:g}" + " --drift-report" * (drift is not named_drift())
             noise = aged_noise(noise, years, database=city.database, drift=drift)
         map_ = f"{years:g} years old"
-        case = {"city": name, "map": map_, "told": told, "levels": [*OLD_LEVELS]}
+        case = {"city": name, "map": map_, INPUTS: settings, "levels": [*OLD_LEVELS]}
         count = 5 if small else 200
-        yield case, functools.partial(_asked, city, now, OLD_LEVELS, count, noise)
+        yield case, functools.partial(_figures, city, now, OLD_LEVELS, count, noise)
 
 
-def _asked(
+def _figures(
     city: _City, now: _City, levels: Sequence[str], count: int, noise: Noise = GENERIC
 ) -> dict[str, Any]:
-    """Ask for what is seen now with the map of a city, and return what came of it."""
+    """Localize views of the city `now` with the map of a city, and return the figures."""
     database = city.database
     locator = LikelihoodLocator(
         index=build_index(database, cell_noise(noise, database.grid.step)),
@@ -166,24 +160,19 @@ def _asked(
     return {
         "cells": len(database),
         "queries": len(table),
-        "p50": _short(table["p50"].mean()),
-        "stated": _short(table["chance"].fillna(0.0).mean()),
+        "p50": short(table["p50"].mean()),
+        "stated": short(table["chance"].fillna(0.0).mean()),
         "answered": len(sure),
         "right": int(sure.sum()),
-        "low": _short(low),
-        "high": _short(high),
+        "low": short(low),
+        "high": short(high),
         "nearly": len(nearly),
         "nearly_right": int(nearly.sum()),
         "bins": [
-            {key: _short(value) for key, value in one.items()}
-            for one in plain_records(calibration_bins(table))
+            {key: short(value) for key, value in tenth.items()}
+            for tenth in plain_records(calibration_bins(table))
         ],
     }
-
-
-def _short(value: float | None) -> float | None:
-    """Return a number to four digits."""
-    return value if value is None or isinstance(value, int) else float(f"{value:.4g}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Measure something of ours beside a peer."""
+"""Compare a measurement of the package with a peer."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Comparison:
     peer_name : str
         What ours is compared with.
     bar : float or None
-        The ratio to reach; None where the time is for information.
+        The ratio to reach; None if the time is only for information.
     paper : float, optional
         What the source paper prints, in the same unit.
     """
@@ -52,18 +52,7 @@ class Comparison:
         return None if self.bar is None else self.ratio >= self.bar
 
     def at_most(self, limit: float) -> Comparison:
-        """Return the line with a bar on ours alone.
-
-        Parameters
-        ----------
-        limit : float
-            What ours may be at most, whatever the peer is.
-
-        Returns
-        -------
-        Comparison
-            The line; its bar is the ratio that the peer has to the limit.
-        """
+        """Return the line with a limit for ours; its bar is the ratio of the peer to the limit."""
         return replace(self, bar=self.peer / limit)
 
     def to_dict(self) -> dict[str, Any]:
@@ -81,7 +70,7 @@ class Comparison:
         }
 
     def __str__(self) -> str:
-        """Return the line for people."""
+        """Return the line as text."""
         line = (
             f"{self.name}: {self.ours:.3g} {self.unit}; {self.peer_name}: {self.peer:.3g} "
             f"{self.unit}; ratio {self.ratio:.3g}"
@@ -104,7 +93,7 @@ def compare(
     paper: float | None = None,
     warm_up: bool = True,
 ) -> Comparison:
-    """Time two callables in turns and keep the median of each, in milliseconds.
+    """Time two callables in turns and return the median of each, in milliseconds.
 
     Parameters
     ----------
@@ -122,11 +111,6 @@ def compare(
         The milliseconds that the source paper prints.
     warm_up : bool, optional
         Call each once before it is timed.
-
-    Returns
-    -------
-    Comparison
-        The result.
     """
     times: tuple[list[float], list[float]] = ([], [])
     for repeat in range(-1 if warm_up else 0, repeats):

@@ -1,4 +1,4 @@
-"""Building a country of fifty towns in tiles, and updating it, on two processes of dask."""
+"""Building and updating a country of fifty towns in tiles, with two processes of dask."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ _SEED = 50
 _SPACING = 25_000.0  # metres between towns
 _CORNER = np.array([400_000.0, 5_300_000.0])
 _ROW = 10  # towns from west to east
-_SAMPLE = 12  # tiles that are built again and compared
+_SAMPLE = 12  # tiles to build again and compare
 _MOST_MB = 2048.0
 _CHANGED = 0.01  # share of the objects
 
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """How large the country is, and that with which it is compared."""
+    """Size of the country, and number of towns (`few`) of the smaller one for comparison."""
 
     towns: int
     few: int
@@ -61,7 +61,7 @@ _SIZES = {"full": _Size(50, 10, 2_800.0, 2_000.0), "small": _Size(3, 1, 300.0, 2
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What a build cost, and what it gave."""
+    """The result of a build, its time and its memory."""
 
     manifest: Manifest
     seconds: float
@@ -69,18 +69,7 @@ class _Run:
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure one country.
-
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        Seconds and memory.
-    """
+    """Measure time and memory of building and updating one country."""
     scale = _SIZES[size]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -89,12 +78,12 @@ def comparisons(size: str) -> Iterator[Comparison]:
         with _cluster(2) as (client, address):
             few = _build(folder, "few", scale, client, address)
         with _cluster(1) as (client, address):
-            one = _build(folder, "country", scale, client, address)
+            single = _build(folder, "country", scale, client, address)
         with _cluster(2) as (client, address):
             two = _build(folder, "country", scale, client, address)
             equal = _check_sample(folder, "country", scale)
-            if one.manifest != two.manifest:
-                raise ArithmeticError("two processes have built something else than one.")
+            if single.manifest != two.manifest:
+                raise ArithmeticError("the results of one and of two processes differ.")
             updates = list(_updates(folder, scale, address))
     what = f"{two.manifest.cells:,} cells of {scale.towns} towns in {len(two.manifest.parts)} tiles"
     print(
@@ -105,7 +94,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
         name=f"building {what} by 2 processes",
         unit="s",
         ours=two.seconds,
-        peer=one.seconds,
+        peer=single.seconds,
         peer_name="by 1 process",
         bar=None,
     )
@@ -129,18 +118,18 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 
 def _updates(folder: Path, scale: _Size, scheduler: str) -> Iterator[Comparison]:
-    """Move some objects, of one town and of all, and update the country beside a fresh build."""
+    """Compare updates after objects of one town or of all moved with a new build."""
     objects = open_objects(folder / "country.parquet")
     xy, count = objects.xy, int(_CHANGED * len(objects))
     from_first = np.hypot(*(xy - xy[0]).T)
     rng = np.random.default_rng(_SEED)
-    for where, chosen in (
+    for where, rows in (
         ("in one place", np.argsort(from_first, kind="stable")[:count]),
         ("everywhere", rng.permutation(len(objects))[:count]),
     ):
         table = objects.table.copy()
         shifts = np.zeros((len(table), 2))
-        shifts[chosen] = rng.uniform(-5.0, 5.0, (count, 2))
+        shifts[rows] = rng.uniform(-5.0, 5.0, (count, 2))
         table.geometry = gpd.GeoSeries.from_xy(*(xy + shifts).T, index=table.index, crs=table.crs)
         save_objects(replace(objects, table=table), folder / "later.parquet")
         start = time.perf_counter()
@@ -172,7 +161,7 @@ def _updates(folder: Path, scale: _Size, scheduler: str) -> Iterator[Comparison]
 
 
 def _save_country(path: Path, towns: int, metres: float) -> None:
-    """Save the street objects of so many towns, some way apart."""
+    """Save the street objects of several towns, 25 km apart."""
     rng = np.random.default_rng(_SEED)
     layers: list[RawLayer] = []
     for town in range(towns):
@@ -185,7 +174,7 @@ def _save_country(path: Path, towns: int, metres: float) -> None:
 
 @contextmanager
 def _cluster(workers: int) -> Iterator[tuple[Client, str]]:
-    """Start new processes, so that each has little memory, with the modules that they need."""
+    """Start new processes, which have used little memory, and import their modules."""
     with (
         LocalCluster(
             n_workers=workers,
@@ -202,7 +191,7 @@ def _cluster(workers: int) -> Iterator[tuple[Client, str]]:
 
 
 def _build(folder: Path, name: str, scale: _Size, client: Client, scheduler: str) -> _Run:
-    """Build a country on the processes of a scheduler, which have built nothing larger before."""
+    """Build a country with the processes of a scheduler, and measure time and peak memory."""
     start = time.perf_counter()
     manifest = _built(folder, name, scale, scheduler)
     seconds = time.perf_counter() - start
@@ -217,7 +206,7 @@ def _built(folder: Path, name: str, scale: _Size, scheduler: str) -> Manifest:
 
 
 def _check_sample(folder: Path, name: str, scale: _Size) -> int:
-    """Build some tiles in this process and refuse files that differ; return how many there are."""
+    """Build some tiles in this process and raise if a file differs; return their number."""
     plan = plan_tiles(
         folder / f"{name}.parquet",
         folder / "sample",
@@ -227,10 +216,10 @@ def _check_sample(folder: Path, name: str, scale: _Size) -> int:
         viewpoints=ViewpointSpec(),
     )
     files = sorted((folder / name).glob("*.parquet"))
-    chosen = np.random.default_rng(_SEED).permutation(len(files))[:_SAMPLE]
-    for file in (files[number] for number in chosen.tolist()):
+    sample = np.random.default_rng(_SEED).permutation(len(files))[:_SAMPLE]
+    for file in (files[number] for number in sample.tolist()):
         _, column, row = file.stem.split("_")
         part = build_tile(plan, (int(column), int(row)))
         if part is None or (plan.folder / part.file).read_bytes() != file.read_bytes():
             raise ArithmeticError(f"{file.name} differs from what this process builds.")
-    return len(chosen)
+    return len(sample)

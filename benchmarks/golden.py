@@ -1,10 +1,10 @@
-"""Freeze what the commands print and write, to see that new code changes none of it.
+"""Save the output and files of the commands, to check that new code does not change them.
 
 ``python -m benchmarks.golden OUT`` runs the commands of ``golden.toml`` on a made-up city, on
 Helsinki and Monaco, and on Montpellier (from the folder that SEMSIG_GEODATA names).
-``OUT/golden.json`` gets the SHA-256 of what each command printed and of each file that it wrote;
-``OUT/CITY.txt`` what it printed, as a transcript to read with ``diff -F '^[$]'``.
-``--compare OLD NEW`` tells which of it differs. Both need the same versions of other packages.
+``OUT/golden.json`` gets the SHA-256 of the output of each command and of each file that it wrote;
+``OUT/CITY.txt`` gets the output, as a transcript to read with ``diff -F '^[$]'``. ``--compare OLD
+NEW`` prints which of these differ. Both need the same versions of other packages.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from benchmarks._contents import TIMES, digest, file_digest, masked
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-semsig_gis.__version__ = "0"  # it is in the metadata of every file; processes of ours do so, too
+semsig_gis.__version__ = "0"  # in the metadata of every file; worker processes do the same
 from semsig_gis.cli import main as semsig  # noqa: E402
 
 _CITIES = ("general", "synthetic", "helsinki", "montpellier")  # the last one is not quick
 _QUERIES, _SAMPLES = 6, 30
-_SEEN = 6  # objects at least, of cells that queries are made from
+_LEAST_OBJECTS = 6  # of the cells from which queries are made
 
 
 _TABLE = tomllib.loads(Path(__file__).with_name("golden.toml").read_text(encoding="utf-8"))
 
 
 def main() -> None:
-    """Read the options, then freeze or compare."""
+    """Run all commands and save their digests, or compare two results."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.golden", description=__doc__)
     parser.add_argument("out", type=Path, nargs="?", metavar="OUT")
     parser.add_argument("--quick", action="store_true", help="all but Montpellier")
@@ -53,7 +53,7 @@ def main() -> None:
         parser.error("give OUT, and the folder of the open data in SEMSIG_GEODATA")
     out, geodata = options.out.resolve(), Path(os.environ["SEMSIG_GEODATA"]).resolve()
     out.mkdir(parents=True, exist_ok=True)
-    frozen: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for city in _CITIES[:-1] if options.quick else _CITIES:
         start, transcript = time.perf_counter(), []
         with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
@@ -61,16 +61,16 @@ def main() -> None:
             for command in _commands(city):
                 printed, written = _run(command)
                 transcript.append(f"$ semsig {command}\n{printed}\n")
-                frozen[f"{city}: {command}"] = digest(printed.encode())
-                frozen |= {f"{city}: {name}": digest for name, digest in written.items()}
+                digests[f"{city}: {command}"] = digest(printed.encode())
+                digests |= {f"{city}: {name}": digest for name, digest in written.items()}
         (out / f"{city}.txt").write_text("".join(transcript), encoding="utf-8")
-        took = time.perf_counter() - start
-        print(f"{city}: {len(transcript)} commands, {took:.0f} s", flush=True)
-    _write_lines(out / "golden.json", [json.dumps(frozen, indent=1, sort_keys=True)])
+        seconds = time.perf_counter() - start
+        print(f"{city}: {len(transcript)} commands, {seconds:.0f} s", flush=True)
+    _write_lines(out / "golden.json", [json.dumps(digests, indent=1, sort_keys=True)])
 
 
 def _commands(city: str) -> Iterator[str]:
-    """Yield the commands of a city; some need what those before them wrote."""
+    """Yield the commands of a city; some read files that earlier ones write."""
     table = _TABLE[city]
     if city == "general":
         yield from _lines(table["before"])
@@ -107,17 +107,17 @@ def _write_area(west: float, south: float, east: float, north: float) -> None:
 def _write_queries() -> dict[str, str]:
     """Write samples, queries and a route from cells.csv; return a query for the commands."""
     with Path("cells.csv").open(encoding="utf-8", newline="") as file:
-        seen = [row for row in csv.DictReader(file) if int(row["length"]) >= _SEEN]
+        rows = [row for row in csv.DictReader(file) if int(row["length"]) >= _LEAST_OBJECTS]
     views: dict[tuple[float, float], dict[str, Any]] = {
         (float(row["x"]), float(row["y"])): {
             "types": row["types"],
             "bearings": [float(part) for part in row["bearings"].split()],
         }
-        for row in seen
+        for row in rows
     }
     samples = [view | {"x": x + 2, "y": y - 1} for (x, y), view in views.items()]
     _write_rows("samples.jsonl", samples[:: len(samples) // _SAMPLES])
-    # One object is missed, every other time another one is not known.
+    # One object is missed, and in every other query the class of another one is unknown.
     queries = [
         {
             "id": f"q{number}",
@@ -127,8 +127,8 @@ def _write_queries() -> dict[str, str]:
         for number, view in enumerate(samples[:: len(samples) // _QUERIES])
     ]
     _write_rows("queries.jsonl", queries)
-    rows = [f"{one['id']},{one['types']},{_joined(one['bearings'], ' ')}" for one in queries]
-    _write_lines(Path("queries.csv"), ["id,types,bearings", *rows])
+    lines = [f"{row['id']},{row['types']},{_joined(row['bearings'], ' ')}" for row in queries]
+    _write_lines(Path("queries.csv"), ["id,types,bearings", *lines])
     route = next(
         [view, views[x + 20, y], views[x + 20, y + 30]]
         for (x, y), view in views.items()
@@ -140,12 +140,12 @@ def _write_queries() -> dict[str, str]:
         {"distance": 30, "bearing": 0, "sigma": 2},
     ]
     _write_rows("route.jsonl", [view | leg for view, leg in zip(route, legs, strict=True)])
-    one = samples[len(samples) // 2]
-    types = one["types"][1:]
+    sample = samples[len(samples) // 2]
+    types = sample["types"][1:]
     return {
         "types": types,
-        "query": f"--types {types} --bearings {_joined(one['bearings'][1:], ',')}",
-        "near": f"{one['x']},{one['y']},200",
+        "query": f"--types {types} --bearings {_joined(sample['bearings'][1:], ',')}",
+        "near": f"{sample['x']},{sample['y']},200",
         "lamp": types[0],
     }
 
@@ -163,34 +163,34 @@ def _write_lines(path: Path, lines: list[str]) -> None:
 
 
 def _run(command: str) -> tuple[str, dict[str, str]]:
-    """Run a command; return what it printed, and the digests of the files that it wrote."""
-    words, _, given = command.partition(" < ")
+    """Run a command; return its output, and the digests of the files that it wrote."""
+    words, _, file = command.partition(" < ")
     before = _files()
-    printed, remarked = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(remarked):
+    output, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
         sys.argv = ["semsig", *shlex.split(words)]
-        sys.stdin = io.TextIOWrapper(io.BytesIO(Path(given).read_bytes() if given else b""))
+        sys.stdin = io.TextIOWrapper(io.BytesIO(Path(file).read_bytes() if file else b""))
         code: object = 0
         try:
             semsig()
         except SystemExit as end:
             code = end.code or 0
-        except Exception as fault:  # noqa: BLE001 - the other commands are to be seen nevertheless
+        except Exception as fault:  # noqa: BLE001 - the other commands are run nevertheless
             code = repr(fault)
-    text = masked(f"{printed.getvalue()}{remarked.getvalue()}exit code: {code}\n")
+    text = masked(f"{output.getvalue()}{errors.getvalue()}exit code: {code}\n")
     changed = [path for path, state in _files().items() if before.get(path) != state]
-    named = {f"{command} > {path}": path for path in changed if path.name not in TIMES}
-    return text, {n: file_digest(path) for n, path in named.items()}
+    changed = [path for path in changed if path.name not in TIMES]
+    return text, {f"{command} > {path}": file_digest(path) for path in changed}
 
 
 def _files() -> dict[Path, tuple[int, int]]:
-    """Return when each file was written last, and its size."""
+    """Return the time of the last change and the size of each file."""
     paths = [Path(root, name) for root, _, names in os.walk(".") for name in names]
     return {path: (path.stat().st_mtime_ns, path.stat().st_size) for path in paths}
 
 
 def _compare(old: Path, new: Path) -> int:
-    """Print what differs, and return 1 if anything does."""
+    """Print the outputs that differ, and return 1 if there are any."""
     before, after = (json.loads((folder / "golden.json").read_text()) for folder in (old, new))
     names = sorted(before.keys() | after.keys())
     wrong = [name for name in names if before.get(name) != after.get(name)]

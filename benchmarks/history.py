@@ -1,7 +1,7 @@
-"""Keep every result of ``make bench``, and draw how they went: ``python -m benchmarks.history``.
+"""Save every result of ``make bench``, and plot all of them: ``python -m benchmarks.history``.
 
-Results are kept in ``benchmarks/history/`` in the format of airspeed velocity (asv), which can show
-them too: ``asv publish --config benchmarks/asv.conf.json``.
+Results are saved in ``benchmarks/history/`` in the format of airspeed velocity (asv), which can
+show them as well: ``asv publish --config benchmarks/asv.conf.json``.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ DOCS = Path(__file__).parents[1] / "docs"
 PICTURE = Path("images", "benchmarks.svg")
 SIDES = ("semsig_gis", "peer")
 SHOWN = 6
-"""Columns of the table: the newest runs."""
+"""Number of columns of the table, for the newest runs."""
 COLUMNS = 3
-"""Of panels."""
+"""Number of columns of plots."""
 NEAR = 0.2
-"""Of logarithms whose labels would lie on each other."""
+"""Difference of logarithms below which their labels would overlap."""
 
 _HEAD = """# Benchmarks over time
 
 This page is written by `python -m benchmarks.history`, which `make bench` ends with. All times are
-from machines that other programs share, so what is drawn is the ratio to a peer, measured in turns
-in the same process: 10 is ten times as fast, or a tenth of the size. [Figures](figures.md) says
-what the peers are.
+from machines that other programs share, so the plots show the ratio to a peer, measured in turns in
+the same process: 10 is ten times as fast, or a tenth of the size. [Figures](figures.md) lists the
+peers.
 
 ![How many times better than its peer each benchmark with a bar was, run by run]({picture})
 
-The dashed lines are the bars: what was asked for. The table has ours, and the ratio in brackets, of
-the newest {shown} runs; what is blank was not measured then. All runs are in
+The dashed lines are the bars, which are the targets. The table has our values, and the ratios in
+brackets, of the newest {shown} runs; blank cells were not measured. All runs are in
 `benchmarks/history/`, in the format of [airspeed velocity](https://asv.readthedocs.io).
 
 """
@@ -62,12 +62,12 @@ the newest {shown} runs; what is blank was not measured then. All runs are in
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What one run measured.
+    """The results of one run.
 
     Parameters
     ----------
     date : datetime
-        When the commit that was measured was made, in UTC.
+        Time of the measured commit, in UTC.
     measured : mapping
         Ours and the peer's, by the name of the benchmark.
     """
@@ -77,20 +77,20 @@ class Run:
 
 
 def main() -> None:
-    """Keep the results of this commit, and write the page."""
+    """Save the results of this commit, and write the page."""
     argparse.ArgumentParser(prog="python -m benchmarks.history", description=__doc__).parse_args()
     rows = json.loads(RESULTS.read_text(encoding="utf-8"))
     commit, seconds = _git("log", "-1", "--format=%H %ct").split()
     record(rows, commit=commit, seconds=int(seconds), folder=FOLDER)
-    kept = runs(FOLDER)
-    write_whole(DOCS / "benchmarks.md", page(rows, kept))
-    write_whole(DOCS / PICTURE, draw(rows, kept))
-    print(f"wrote {DOCS / 'benchmarks.md'} of {len(kept)} runs")
+    saved = runs(FOLDER)
+    write_whole(DOCS / "benchmarks.md", page(rows, saved))
+    write_whole(DOCS / PICTURE, draw(rows, saved))
+    print(f"wrote {DOCS / 'benchmarks.md'} of {len(saved)} runs")
 
 
 def _git(*words: str) -> str:
     try:
-        return subprocess.run(  # noqa: S603 - git, of which the shell knows where it is
+        return subprocess.run(  # noqa: S603 - git, found by the shell
             ["git", *words],  # noqa: S607
             cwd=FOLDER.parent,
             check=True,
@@ -98,22 +98,22 @@ def _git(*words: str) -> str:
             text=True,
         ).stdout
     except (OSError, subprocess.CalledProcessError):
-        sys.exit("Results are kept by commit; run this in a checkout of git.")
+        sys.exit("Results are saved by commit; run this in a checkout of git.")
 
 
 def record(rows: Iterable[Mapping[str, Any]], *, commit: str, seconds: int, folder: Path) -> Path:
-    """Write the results of a commit, and what they are, as asv does.
+    """Write the results of a commit, and the list of benchmarks, in the format of asv.
 
     Parameters
     ----------
     rows : iterable of mapping
         Rows of ``results.json``.
     commit : str
-        Full hash of what was measured.
+        Full hash of the commit.
     seconds : int
-        When it was made, since 1970.
+        Time of the commit, since 1970.
     folder : Path
-        Where results are kept, a folder a machine.
+        Folder with a folder of results for each machine.
 
     Returns
     -------
@@ -124,14 +124,14 @@ def record(rows: Iterable[Mapping[str, Any]], *, commit: str, seconds: int, fold
     system, processor, count = platform.system(), platform.machine(), os.cpu_count()
     machine = f"{system}-{processor}-{count}".lower()
     about = {"machine": machine, "os": system, "arch": processor, "num_cpu": str(count)}
-    known_file = folder / "benchmarks.json"
-    known = json.loads(known_file.read_text(encoding="utf-8")) if known_file.exists() else {}
+    list_file = folder / "benchmarks.json"
+    benchmarks = json.loads(list_file.read_text(encoding="utf-8")) if list_file.exists() else {}
     results = {}
     for row in rows:
         name = re.sub(r"\W+", "_", row["name"])
         params = [[repr(side) for side in SIDES]]
         results[name] = [[row["ours"], row["peer"]], params, "1"]
-        known[name] = {
+        benchmarks[name] = {
             "code": f"{row['name']}; peer: {row['peer_name']}",
             "name": name,
             "param_names": ["by"],
@@ -141,7 +141,7 @@ def record(rows: Iterable[Mapping[str, Any]], *, commit: str, seconds: int, fold
             "unit": row["unit"],
             "version": "1",
         }
-    told = {
+    content = {
         "commit_hash": commit,
         "date": 1000 * seconds,
         "durations": {},
@@ -156,50 +156,32 @@ def record(rows: Iterable[Mapping[str, Any]], *, commit: str, seconds: int, fold
     }
     file = folder / machine / f"{commit[:8]}-py{python}.json"
     file.parent.mkdir(parents=True, exist_ok=True)
-    for path, content in (
-        (known_file, known | {"version": 2}),
+    for path, value in (
+        (list_file, benchmarks | {"version": 2}),
         (file.with_name("machine.json"), about | {"version": 1}),
-        (file, told),
+        (file, content),
     ):
-        write_whole(path, json.dumps(content, indent=1, sort_keys=True) + "\n")
+        write_whole(path, json.dumps(value, indent=1, sort_keys=True) + "\n")
     return file
 
 
 def runs(folder: Path) -> list[Run]:
-    """Return the runs of all machines, the oldest first.
-
-    Parameters
-    ----------
-    folder : Path
-        Where results are kept.
-
-    Returns
-    -------
-    list of Run
-        A run for each file of results.
-    """
-    known = json.loads((folder / "benchmarks.json").read_text(encoding="utf-8"))
-    found = []
+    """Return the saved runs of all machines, the oldest first."""
+    benchmarks = json.loads((folder / "benchmarks.json").read_text(encoding="utf-8"))
+    saved = []
     for file in folder.glob("*/*-py*.json"):
-        told = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(file.read_text(encoding="utf-8"))
         measured = {
-            known[name]["pretty_name"]: tuple(result[0]) for name, result in told["results"].items()
+            benchmarks[name]["pretty_name"]: tuple(result[0])
+            for name, result in content["results"].items()
         }
-        found.append(Run(dt.datetime.fromtimestamp(told["date"] / 1000, dt.UTC), measured))
-    return sorted(found, key=lambda run: run.date)
+        saved.append(Run(dt.datetime.fromtimestamp(content["date"] / 1000, dt.UTC), measured))
+    return sorted(saved, key=lambda run: run.date)
 
 
-def page(rows: Sequence[Mapping[str, Any]], kept: Sequence[Run]) -> str:
-    """Return the page, as Markdown.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Rows of ``results.json``, which say what is shown and in which order.
-    kept : sequence of Run
-        What was measured, the oldest first.
-    """
-    newest = kept[-SHOWN:]
+def page(rows: Sequence[Mapping[str, Any]], saved: Sequence[Run]) -> str:
+    """Return the page as Markdown, with a line for each row of ``results.json``."""
+    newest = saved[-SHOWN:]
     lines = [
         " | ".join(["| benchmark", "unit", *(f"{run.date:%Y-%m-%d %H:%M}" for run in newest)]),
         " | ".join(["| ---", "---", *["---:"] * len(newest)]),
@@ -214,16 +196,8 @@ def page(rows: Sequence[Mapping[str, Any]], kept: Sequence[Run]) -> str:
     return _HEAD.format(picture=PICTURE.as_posix(), shown=len(newest)) + table
 
 
-def draw(rows: Sequence[Mapping[str, Any]], kept: Sequence[Run]) -> str:
-    """Return a picture of the ratios of benchmarks that have a bar, as SVG.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Rows of ``results.json``.
-    kept : sequence of Run
-        What was measured, the oldest first.
-    """
+def draw(rows: Sequence[Mapping[str, Any]], saved: Sequence[Run]) -> str:
+    """Plot the ratios of the rows of ``results.json`` that have a bar, as SVG."""
     barred = [row for row in rows if row["bar"] is not None]
     height = math.ceil(len(barred) / COLUMNS)
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "semsig", "font.size": 8}):
@@ -233,9 +207,9 @@ def draw(rows: Sequence[Mapping[str, Any]], kept: Sequence[Run]) -> str:
             if row is None:
                 panel.set_axis_off()
                 continue
-            held = [run for run in kept if row["name"] in run.measured]
-            ratios = [peer / ours for ours, peer in (run.measured[row["name"]] for run in held)]
-            numbers = [kept.index(run) + 1 for run in held]
+            measured = [run for run in saved if row["name"] in run.measured]
+            ratios = [peer / ours for ours, peer in (run.measured[row["name"]] for run in measured)]
+            numbers = [saved.index(run) + 1 for run in measured]
             panel.plot(numbers, ratios, marker="o", markersize=3, color="#0072b2")
             panel.axhline(row["bar"], color="#d55e00", linestyle="--", linewidth=1)
             panel.set_yscale("log")
@@ -245,7 +219,7 @@ def draw(rows: Sequence[Mapping[str, Any]], kept: Sequence[Run]) -> str:
             panel.set_yticks(ticks, [f"{tick:.2g}" for tick in ticks])
             panel.minorticks_off()
             panel.set_title(textwrap.fill(row["name"], 48), fontsize=8, loc="left")
-            panel.set_xticks(range(1, len(kept) + 1), [f"{run.date:%m-%d}" for run in kept])
+            panel.set_xticks(range(1, len(saved) + 1), [f"{run.date:%m-%d}" for run in saved])
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
     return re.sub(r"[ \t]+$", "", stream.getvalue(), flags=re.MULTILINE)

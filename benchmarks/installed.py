@@ -1,10 +1,9 @@
-"""What the plain installation takes: ``python -m benchmarks.installed``, with nothing but Python.
+"""Size and time of the plain installation: ``python -m benchmarks.installed``, only with Python.
 
-The checkout is installed into a fresh environment with the versions of ``constraints.txt``, and so
-are what it is built on: the libraries that were chosen for it at the start, and these with two
-more that it cannot do without. Packages are listed by the room that they take with their compiled
-modules, and as a table in ``docs/install.md``. Archives that pip has fetched before come from its
-cache.
+The checkout is installed into a new environment with the versions of ``constraints.txt``. For
+comparison, so are the seven libraries that were chosen for it at the start, and these with numba
+and pyarrow. The sizes of packages include their compiled modules; they are printed and written as a
+table to ``docs/install.md``. pip takes archives from its cache if they are there.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ INSTALLED = {
 SIZES = """
 import importlib.metadata, json
 sizes = {}
-for one in importlib.metadata.distributions():
-    files = [one.locate_file(file) for file in one.files or ()]
-    sizes[one.name] = sum(file.stat().st_size for file in files if file.is_file())
+for package in importlib.metadata.distributions():
+    files = [package.locate_file(file) for file in package.files or ()]
+    sizes[package.name] = sum(file.stat().st_size for file in files if file.is_file())
 print(json.dumps(sizes))
 """
 OF_PIP = {"pip", "setuptools"}
@@ -46,13 +45,13 @@ def main() -> None:
         sizes[name], seconds[name] = install(packages)
         print(f"{sum(sizes[name].values()):8.0f} MB  in {seconds[name]:.0f} s  {name}")
     ours = sizes["semsig_gis"]
-    large = sorted((one for one in ours if ours[one] >= LEAST_SHOWN_MB), key=lambda one: -ours[one])
-    rows = [[one, *(f"{sizes[name].get(one, 0):.0f}" for name in INSTALLED)] for one in large]
-    others = [sum(s for one, s in part.items() if one not in large) for part in sizes.values()]
+    large = sorted((name for name in ours if ours[name] >= LEAST_SHOWN_MB), key=lambda n: -ours[n])
+    rows = [[name, *(f"{part.get(name, 0):.0f}" for part in sizes.values())] for name in large]
+    others = [sum(mb for name, mb in part.items() if name not in large) for part in sizes.values()]
     rows += [
         ["all others", *(f"{size:.0f}" for size in others)],
         ["MB in all", *(f"{sum(part.values()):.0f}" for part in sizes.values())],
-        ["seconds", *(f"{taken:.0f}" for taken in seconds.values())],
+        ["seconds", *(f"{value:.0f}" for value in seconds.values())],
     ]
     head = [["package", *INSTALLED], ["---", *("---:" for _ in INSTALLED)]]
     table = "".join(
@@ -65,7 +64,7 @@ def main() -> None:
 
 
 def install(packages: tuple[str, ...]) -> tuple[dict[str, float], float]:
-    """Install packages into a fresh environment; return the MB of each, and the seconds."""
+    """Install packages into a new environment; return the MB of each, and the seconds."""
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         venv.create(folder, with_pip=True)

@@ -1,4 +1,4 @@
-"""The likelihood method: its queries over random cells."""
+"""Time of queries by the likelihood method in random cells."""
 
 from __future__ import annotations
 
@@ -26,39 +26,25 @@ def likelihood_rows(
     database: SignatureDatabase,
     queries: Sequence[Signature],
     *,
-    one: _Peer,
-    many: _Peer,
+    single: _Peer,
+    batch: _Peer,
     repeats: int,
 ) -> Iterator[Comparison]:
-    """Measure queries of a database.
+    """Measure single queries, `repeats` of them, and all queries together.
 
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells.
-    queries : sequence of Signature
-        At least as many as `repeats`.
-    one, many : callable
-        The peer's work for one query, the number of which it is given, and for all of them.
-    repeats : int
-        How often single queries are timed.
-
-    Yields
-    ------
-    Comparison
-        One result after the other.
+    `single` and `batch` are the work of the peer, for one query by its number and for all.
     """
     cells = f"{len(database):,} cells"
     index = build_index(database, _NOISE)
 
-    def batch(_: int) -> None:
+    def score_all(_: int) -> None:
         for query in queries:
             index.scores(query)
 
     yield compare(
         f"{len(queries):,} likelihood queries, {cells}",
+        score_all,
         batch,
-        many,
         peer_name="rapidfuzz.process.cdist(queries, cells), edit distance of types",
         repeats=1,
     )
@@ -78,31 +64,16 @@ def likelihood_rows(
         (" with re-ranking, chances and answer", answered),
     ):
         name = f"one likelihood query{what}, {cells}"
-        yield compare(name, ours, one, peer_name=_PEER, repeats=repeats)
+        yield compare(name, ours, single, peer_name=_PEER, repeats=repeats)
 
 
-def growth_of_likelihood(database: SignatureDatabase, one: _Peer, *, repeats: int) -> Comparison:
-    """Measure a query against a database of another size.
-
-    Parameters
-    ----------
-    database : SignatureDatabase
-        The cells; queries are the first ones.
-    one : callable
-        The peer's work for one query, the number of which it is given.
-    repeats : int
-        How often it is timed.
-
-    Returns
-    -------
-    Comparison
-        The result.
-    """
+def growth_of_likelihood(database: SignatureDatabase, single: _Peer, *, repeats: int) -> Comparison:
+    """Measure queries from the first cells of a database of another size."""
     index = build_index(database, _NOISE)
     return compare(
         f"growth: a likelihood query, {len(database):,} cells",
         lambda repeat: index.scores(database.signature(repeat)),
-        one,
+        single,
         peer_name=_PEER,
         repeats=repeats,
     )

@@ -1,4 +1,4 @@
-"""Maps of a city the size of Paris in Chromium: how large, how soon there, how smooth."""
+"""Maps of a city of the size of Paris in Chromium: size, time to open, length of frames."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ZOOMS = {"full": (1, 1, 1, -1, -1, -1), "small": (1,)}
 _MOST_MB, _MOST_SECONDS, _MOST_MS = 8.0, 5.0, 100.0
 _REPEATS = {"full": 3, "small": 1}
 _SEED = 20
-_GONE = 0.02  # share of the objects that a year takes away
+_REMOVED = 0.02  # share of the objects that are removed in a year
 
 # Seconds from the start of loading until all layers are drawn.
 DRAWN = """
@@ -43,7 +43,7 @@ Promise.all(images.map((image) => image.decode())).then(() =>
   requestAnimationFrame(() => requestAnimationFrame(() => done(performance.now() / 1000))));
 """
 
-# Milliseconds between frames while the map is moved and zoomed by a person.
+# Milliseconds between frames while the map is moved and zoomed.
 FRAMES = """
 const [zooms, done] = arguments;
 const map = Object.values(window).find((value) => value instanceof L.Map);
@@ -96,19 +96,9 @@ for (const box of document.querySelectorAll(".leaflet-control-layers-overlays in
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Draw the maps of one city and open each.
+    """Measure the size and time of every map, and frames of the map with most points.
 
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        Megabytes and seconds of every map, and the frames of the one with most points, moved and
-        filtered; nothing without Chromium, its driver, or the map files that the package is built
-        with.
+    Nothing is measured without Chromium, its driver, or the map files of the package.
     """
     chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if chromium is None or driver is None or not available():
@@ -117,9 +107,9 @@ def comparisons(size: str) -> Iterator[Comparison]:
     with tempfile.TemporaryDirectory() as folder:
         browser = started(chromium, driver, folder)
         try:
-            for what, drawn in _maps(_CITIES[size], _QUERIES[size]):
+            for what, city_map in _maps(_CITIES[size], _QUERIES[size]):
                 page = Path(folder, "map.html")
-                save_map(drawn, page, self_contained=True)
+                save_map(city_map, page, self_contained=True)
                 yield from _measured(browser, page, what, _REPEATS[size])
             yield _filtering(browser, what)
             yield _smoothness(browser, what, _ZOOMS[size])
@@ -128,25 +118,25 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 
 def _maps(city: CitySpec, queries: int) -> Iterator[tuple[str, folium.Map]]:
-    """Yield what a map shows, and the map; the one with most points last."""
+    """Yield descriptions and maps; the map with most points is the last."""
     objects = made_up(city)
     streets = synthetic_surroundings(city)[1].table
-    kept = np.random.default_rng(_SEED).random(len(objects)) >= _GONE
-    later = StreetObjects(objects.table[kept], objects.taxonomy, objects.licenses)
+    remaining = np.random.default_rng(_SEED).random(len(objects)) >= _REMOVED
+    later = StreetObjects(objects.table[remaining], objects.taxonomy, objects.licenses)
     database, newer = (
-        build_database(one, viewpoints=ViewpointSpec(mode="streets"), streets=streets)
-        for one in (objects, later)
+        build_database(table, viewpoints=ViewpointSpec(mode="streets"), streets=streets)
+        for table in (objects, later)
     )
     cells = f"{len(database):,} cells"
     yield f"which of {cells} look the same", ambiguity_map(database)
-    drawn = drift_map(database, newer, objects_before=objects, objects_after=later)
-    yield f"which of {cells} have changed, with {int((~kept).sum()):,} objects", drawn
+    drift = drift_map(database, newer, objects_before=objects, objects_after=later)
+    yield f"which of {cells} have changed, with {int((~remaining).sum()):,} objects", drift
     evaluation = evaluate(database, queries=queries, method=Method.parse("types:edit"))
     yield f"{queries:,} queries among {cells}", evaluation_map(evaluation, database)
 
 
 def _measured(browser: Chrome, page: Path, what: str, repeats: int) -> Iterator[Comparison]:
-    """Open a map some times."""
+    """Measure the size of a map, and the time to open it."""
     seconds = []
     for _ in range(repeats):
         browser.get("about:blank")
@@ -171,7 +161,7 @@ def _measured(browser: Chrome, page: Path, what: str, repeats: int) -> Iterator[
 
 
 def _filtering(browser: Chrome, what: str) -> Comparison:
-    """Choose among the queries of the map that is open."""
+    """Measure the frames while the filters of the open map are moved."""
     times = statistics.quantiles(browser.execute_async_script(_FILTERED), n=20)
     return Comparison(
         name=f"the longest of twenty frames while the filters of {what} are moved",
@@ -184,7 +174,7 @@ def _filtering(browser: Chrome, what: str) -> Comparison:
 
 
 def _smoothness(browser: Chrome, what: str, zooms: Sequence[int]) -> Comparison:
-    """Move the map that is open, with its layers and without."""
+    """Measure the frames while the open map is moved, with and without its layers."""
     with_layers = statistics.quantiles(browser.execute_async_script(FRAMES, zooms), n=20)[-1]
     browser.execute_script(_BARE)
     bare = statistics.quantiles(browser.execute_async_script(FRAMES, zooms), n=20)[-1]
@@ -199,8 +189,8 @@ def _smoothness(browser: Chrome, what: str, zooms: Sequence[int]) -> Comparison:
 
 
 def started(chromium: str, driver: str, folder: str | Path) -> Chrome:
-    """Start a browser that reaches no network."""
-    from selenium import webdriver  # noqa: PLC0415 - where there is no browser it may be absent
+    """Start a browser without access to a network."""
+    from selenium import webdriver  # noqa: PLC0415 - optional
 
     options = webdriver.ChromeOptions()
     options.binary_location = chromium

@@ -1,4 +1,4 @@
-"""Matching over a city the size of Paris, beside RapidFuzz over all cells."""
+"""Time of queries by distance in a city of the size of Paris, compared with RapidFuzz."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _SEED = 20
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """How much is measured."""
+    """Numbers of cells, queries and repeats."""
 
     cells: int
     batch: int
@@ -56,19 +56,9 @@ _SIZES = {
 
 
 def random_database(cells: int, *, seed: int = _SEED) -> SignatureDatabase:
-    """Make a database of random signatures as long, skewed and repeated as those of Paris.
+    """Make a database of random signatures, as long, skewed and repeated as in Paris.
 
-    Parameters
-    ----------
-    cells : int
-        How many cells.
-    seed : int
-        Seed of the random numbers.
-
-    Returns
-    -------
-    SignatureDatabase
-        Cells in one column of the grid.
+    The cells are in one column of the grid.
     """
     rng = np.random.default_rng(seed)
     lengths = 1 + rng.poisson(rng.gamma(_SPREAD, (_MEAN_LENGTH - 1) / _SPREAD, cells))
@@ -78,14 +68,14 @@ def random_database(cells: int, *, seed: int = _SEED) -> SignatureDatabase:
     units = rng.integers(0, BEARING_UNITS, lengths.sum()).astype(np.uint16)
     owner = np.repeat(np.arange(cells), lengths)
     order = np.lexsort((units, owner))
-    # A copy shows what its original, an earlier cell, was drawn to show.
+    # A copied cell has the signature of an earlier cell.
     copied = rng.random(cells) < _COPIED
     copied[0] = False
     source = np.where(copied, rng.integers(0, np.maximum(np.arange(cells), 1)), np.arange(cells))
-    shown = lengths[source]
-    offsets = np.concatenate([[0], np.cumsum(shown)])
-    inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], shown)
-    entries = order[np.repeat(starts[source], shown) + inside]
+    lengths = lengths[source]
+    offsets = np.concatenate([[0], np.cumsum(lengths)])
+    inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
+    entries = order[np.repeat(starts[source], lengths) + inside]
     return SignatureDatabase(
         columns=np.zeros(cells, np.int32),
         rows=np.arange(cells, dtype=np.int32),
@@ -101,18 +91,7 @@ def random_database(cells: int, *, seed: int = _SEED) -> SignatureDatabase:
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure single queries, a batch, and how the time of a query grows with the cells.
-
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        One result after the other.
-    """
+    """Measure single queries, a batch, and how the time of a query grows with the cells."""
     scale = _SIZES[size]
     database = random_database(scale.cells)
     picked = np.random.default_rng(_SEED).integers(0, scale.cells, scale.batch).tolist()
@@ -126,13 +105,13 @@ def comparisons(size: str) -> Iterator[Comparison]:
         _check_equal(database, queries[0], part, of_queries[part][0], texts)
 
     def score(count: int, method: str, repeat: int) -> None:
-        some = queries[repeat : repeat + count]
-        deque(score_cells(database, some, Method.parse(method)), maxlen=0)
+        batch = queries[repeat : repeat + count]
+        deque(score_cells(database, batch, Method.parse(method)), maxlen=0)
 
     def peer(count: int, parts: tuple[str, ...], repeat: int) -> None:
         for part in parts:
-            some = of_queries[part][repeat : repeat + count]
-            cdist(some, of_cells[part], scorer=Levenshtein.distance, dtype=np.uint8)
+            batch = of_queries[part][repeat : repeat + count]
+            cdist(batch, of_cells[part], scorer=Levenshtein.distance, dtype=np.uint8)
 
     cells = f"{scale.cells:,} cells"
     for part, measure, bar in [
@@ -174,8 +153,8 @@ def comparisons(size: str) -> Iterator[Comparison]:
     yield from likelihood_rows(
         database,
         queries,
-        one=partial(peer, 1, ("types",)),
-        many=partial(peer, scale.batch, ("types",)),
+        single=partial(peer, 1, ("types",)),
+        batch=partial(peer, scale.batch, ("types",)),
         repeats=scale.repeats,
     )
     for count in scale.others:
@@ -183,7 +162,7 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 
 def _growth(cells: int, repeats: int) -> Iterator[Comparison]:
-    """Measure one query by types and one by likelihood over so many cells."""
+    """Measure one query by types and one by likelihood over a number of cells."""
     database = random_database(cells)
     texts = _texts(database.codes, database.offsets)
     method = Method.parse("types:edit")
@@ -194,7 +173,7 @@ def _growth(cells: int, repeats: int) -> Iterator[Comparison]:
     def peer(repeat: int) -> None:
         cdist([texts[repeat]], texts, scorer=Levenshtein.distance, dtype=np.uint8)
 
-    ours(0)  # a large table is turned into bit planes when it is asked again
+    ours(0)  # a large table is converted to bit planes before its second query
     yield compare(
         f"growth: an edit query by types, {cells:,} cells",
         ours,
@@ -206,7 +185,7 @@ def _growth(cells: int, repeats: int) -> Iterator[Comparison]:
 
 
 def _texts(values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> list[str]:
-    """Return the sequence of every cell as text, what RapidFuzz compares fastest."""
+    """Return the sequence of every cell as text, which RapidFuzz compares fastest."""
     text, ends = values.tobytes().decode("latin-1"), offsets.tolist()
     return [text[low:high] for low, high in pairwise(ends)]
 
@@ -214,9 +193,9 @@ def _texts(values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> list[str]:
 def _check_equal(
     database: SignatureDatabase, query: Signature, part: str, text: str, texts: list[str]
 ) -> None:
-    """Refuse to compare the times of two different results."""
+    """Raise if ours and the peer have different results."""
     theirs = cdist([text], texts, scorer=Levenshtein.distance)[0]
-    for _ in range(2):  # the kernel takes over when a table is asked again
+    for _ in range(2):  # the second query uses the kernel for large tables
         (ours,) = score_cells(database, [query], Method.parse(f"{part}:edit:raw"))
         if not np.array_equal(ours, theirs):
             raise ArithmeticError(f"the edit distances by {part} differ from those of RapidFuzz.")

@@ -1,4 +1,4 @@
-"""How much memory a process has needed."""
+"""Peak memory of a process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def own_peak() -> float:
     """Return the peak memory of this process in MB."""
     status = Path("/proc/self/status")
     if status.exists():
-        # What Linux tells by getrusage includes the process that started this one.
+        # On Linux, getrusage includes the process that started this one.
         lines = status.read_text(encoding="ascii").splitlines()
         return float(dict(line.split(":", 1) for line in lines)["VmHWM"].split()[0]) / 2**10
     unit = 2**20 if sys.platform == "darwin" else 2**10

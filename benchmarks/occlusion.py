@@ -1,4 +1,4 @@
-"""What buildings hide: all pairs of a city beside the same in shapely, and how much it is."""
+"""Time of occlusion in a city, compared with shapely, and the share of objects it hides."""
 
 from __future__ import annotations
 
@@ -25,18 +25,7 @@ _RADIUS = 30.0
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure one city.
-
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        The footprints, the pairs, and the mean length with and without buildings.
-    """
+    """Measure the footprints, the sight lines, and the mean length with and without buildings."""
     city = CitySpec(size=_SIDES[size])
     objects = made_up(city)
     houses, _ = synthetic_surroundings(city)
@@ -61,12 +50,12 @@ def comparisons(size: str) -> Iterator[Comparison]:
         peer_name="shapely.STRtree of the footprints, lines that cross any",
         repeats=1,
     )
-    seen = len(starts) / len(viewpoints)
+    mean = len(starts) / len(viewpoints)
     yield Comparison(
         name=f"mean length of {len(viewpoints):,} outdoor cells with buildings",
         unit="objects",
-        ours=seen * float(1 - blocked.mean()),
-        peer=seen,
+        ours=mean * float(1 - blocked.mean()),
+        peer=mean,
         peer_name="the same cells without buildings",
         bar=None,
     )
@@ -83,7 +72,7 @@ def _pairs(
 
 
 def _at_once(polygons: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Prepare footprints by the definition, all of them together."""
+    """Prepare all footprints together, as the definition says."""
     widened = shapely.buffer(polygons, GAP_M, join_style="mitre")
     blocks = shapely.get_parts(shapely.union_all(widened))
     deep = shapely.buffer(blocks, -GAP_M - TOLERANCE_M)
@@ -95,7 +84,7 @@ def _at_once(polygons: NDArray[np.object_]) -> NDArray[np.object_]:
 def _crossing(
     starts: NDArray[np.float64], ends: NDArray[np.float64], polygons: NDArray[np.object_]
 ) -> NDArray[np.bool_]:
-    """Tell which lines touch a footprint at all, without tolerance and without exceptions."""
+    """Whether each line touches a footprint, without tolerance and exceptions."""
     lines = np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
     crossed = np.zeros(len(lines), bool)
     crossed[shapely.STRtree(polygons).query(lines, predicate="intersects")[0]] = True

@@ -1,8 +1,7 @@
-"""Reading a large OpenStreetMap file, beside pyosmium's bare loop over the same file."""
+"""Reading a large OpenStreetMap file, compared with only pyosmium's loop over the same file."""
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -13,6 +12,7 @@ import osmium
 from osmium.osm.mutable import Node
 
 from benchmarks.comparison import Comparison, compare
+from benchmarks.memory import own_peak
 from semsig_gis.sources import load_catalog, read_layers
 
 if TYPE_CHECKING:
@@ -21,24 +21,13 @@ if TYPE_CHECKING:
 __all__ = ["comparisons"]
 
 _NODES = {"full": 2_000_000, "small": 2_000}
-_OBJECTS = 50  # every so many nodes, as in a city
-_NUMBERS = 12_000_000_000  # as far as those of real nodes go
+_OBJECTS = 50  # one node in 50 is an object, as in a city
+_NUMBERS = 12_000_000_000  # the largest id of real nodes
 _PEER = "pyosmium's bare loop"
 
 
 def comparisons(size: str) -> Iterator[Comparison]:
-    """Measure one file, in time and in memory.
-
-    Parameters
-    ----------
-    size : str
-        ``"full"`` or ``"small"``.
-
-    Yields
-    ------
-    Comparison
-        The result.
-    """
+    """Measure the time and the memory of reading one file."""
     nodes = _NODES[size]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "city.osm.pbf"
@@ -62,12 +51,12 @@ def comparisons(size: str) -> Iterator[Comparison]:
 
 
 def ours(path: Path) -> None:
-    """Read the file as the package does."""
+    """Read the file with the package."""
     read_layers(path, load_catalog("openstreetmap").layers)
 
 
 def bare(path: Path) -> None:
-    """Look at every element of the file and do nothing."""
+    """Go through the elements of the file."""
     for _ in osmium.FileProcessor(path):
         pass
 
@@ -85,7 +74,7 @@ def _write(path: Path, nodes: int) -> None:
                 )
             )
         ends = [number * (_NUMBERS // nodes) for number in (1, 2)]
-        # A way, because it needs the places of nodes.
+        # A way, because its position is computed from its nodes.
         writer.add_way(
             osmium.osm.mutable.Way(id=1, version=1, nodes=ends, tags=[("amenity", "bench")])
         )
@@ -94,21 +83,9 @@ def _write(path: Path, nodes: int) -> None:
 def _peak(which: str, path: Path) -> float:
     """Return the peak memory in MB of a process that only does this."""
     command = [sys.executable, "-m", "benchmarks.osm", which, str(path)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
-    return float(done.stdout)
-
-
-def _own_peak() -> float:
-    """Return the peak memory of this process in MB."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        # What Linux tells by getrusage includes the process that started this one.
-        lines = status.read_text(encoding="ascii").splitlines()
-        return float(dict(line.split(":", 1) for line in lines)["VmHWM"].split()[0]) / 2**10
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+    return float(subprocess.check_output(command, text=True))  # noqa: S603
 
 
 if __name__ == "__main__":
     {"ours": ours, "bare": bare}[sys.argv[1]](Path(sys.argv[2]))
-    print(_own_peak())
+    print(own_peak())

@@ -1,13 +1,11 @@
-"""Pictures of every map and of the workbench in Chromium, and what the browser found wrong."""
+"""Screenshots of every map and of the workbench in Chromium, and errors of the browser."""
 
 from __future__ import annotations
 
 import argparse
 import functools
 import itertools
-import json
 import math
-import os
 import shutil
 import statistics
 import sys
@@ -21,8 +19,9 @@ import numpy as np
 from axe_core_python.selenium import Axe
 
 from benchmarks._cities import MONTPELLIER, made_up, real
+from benchmarks._measuring import SIZES, add_geodata, write_rows
 from benchmarks.maps import DRAWN, FRAMES, started
-from benchmarks.workbench import asked, photo_in, serving
+from benchmarks.workbench import answer_times, photo_in, serving
 from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
 from semsig_gis.evaluation import evaluate, identify
 from semsig_gis.localization import Method, build_index, cell_noise, localize, locate, named_noise
@@ -54,18 +53,18 @@ if TYPE_CHECKING:
 SCREENS = {"desk": (1440, 900, 1.0), "phone": (390, 844, 2.0)}
 GROUNDS = ("light", "dark")
 SEED = 20
-GONE = 0.02  # share of the objects that a year takes away
+REMOVED = 0.02  # share of the objects that are removed in a year
 QUERIES, TRIALS = 500, 5
 WORKBENCH, MARKS = "workbench", 6
 MOST_MB, MOST_MEDIAN_MS, MOST_LATE_MS = 6.5, 20.0, 100.0
 ZOOMS = {"full": (-1, -1, 1, 1), "small": (1,)}
-# Every screen with every ground, or each of them once.
+# Every screen with every background, or each of them once.
 LOOKS = {
     "full": tuple(itertools.product(SCREENS, GROUNDS)),
     "small": tuple(zip(SCREENS, GROUNDS, strict=True)),
 }
-SETTLED_S = 1.0  # until what moves and fades is at rest
-# Clicks the middle of the map.
+SETTLED_S = 1.0  # until all animations have ended
+# Click on the middle of the map.
 ASK = """
 const map = Object.values(window).find((value) => value instanceof L.Map);
 map.fire("click", {latlng: map.getCenter()});
@@ -73,8 +72,8 @@ map.fire("click", {latlng: map.getCenter()});
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
-    """One picture of a map, and what the browser said of the page."""
+class Screenshot:
+    """One screenshot of a page, and errors and times in the browser."""
 
     map: str
     screen: str
@@ -88,30 +87,22 @@ class Picture:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is wrong with it."""
+        """Whether there are no errors, and size and times are within the limits."""
         fast = self.median_ms <= MOST_MEDIAN_MS and self.late_ms <= MOST_LATE_MS
         quiet = not (self.errors or self.requests or self.violations)
         return fast and quiet and self.mb <= MOST_MB
 
 
 def main() -> None:
-    """Read the options, draw, look and tell."""
+    """Take the screenshots, print the results, and write them to ``pictures.json``."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.pictures", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("pictures"), metavar="FOLDER")
-    parser.add_argument("--size", choices=["full", "small"], default="full")
-    parser.add_argument(
-        "--map", nargs="+", metavar="NAME", help="take pictures of these maps alone"
-    )
+    parser.add_argument("--size", choices=SIZES, default="full")
+    parser.add_argument("--map", nargs="+", metavar="NAME", help="take pictures only of these maps")
     parser.add_argument(
         "--database", type=Path, metavar="FILE", help="take pictures of its workbench, too"
     )
-    parser.add_argument(
-        "--geodata",
-        type=Path,
-        default=os.environ.get("SEMSIG_GEODATA"),
-        metavar="FOLDER",
-        help="folder of open data (default: what SEMSIG_GEODATA names; else a made-up city)",
-    )
+    add_geodata(parser, "; without it, a made-up city")
     options = parser.parse_args()
     small = options.size == "small" or options.geodata is None
     size = "small" if small else "full"
@@ -130,7 +121,7 @@ def main() -> None:
                     continue
                 page = options.out / f"{name}.html"
                 save_map(draw(), page, self_contained=True, title=None if small else MONTPELLIER)
-                for picture in _pictures(browser, page, options.out, looks, zooms):
+                for picture in _screenshots(browser, page, options.out, looks, zooms):
                     print(_line(picture), flush=True)
                     pictures.append(picture)
             cities = [] if options.database is None else [options.database]
@@ -144,16 +135,16 @@ def main() -> None:
                     pictures.append(picture)
         finally:
             browser.quit()
-    told = [{**asdict(picture), "passed": picture.passed} for picture in pictures]
-    (options.out / "pictures.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    rows = [{**asdict(picture), "passed": picture.passed} for picture in pictures]
+    write_rows(options.out / "pictures.json", rows)
     print(f"pictures: {options.out}")
     sys.exit(0 if all(picture.passed for picture in pictures) else 1)
 
 
 def _maps(objects: StreetObjects, queries: int) -> dict[str, Callable[[], folium.Map]]:
-    """Return what draws every kind of map of a city, by name."""
-    kept = np.random.default_rng(SEED).random(len(objects)) >= GONE
-    later = StreetObjects(objects.table[kept], objects.taxonomy, objects.licenses)
+    """Return the functions that draw each kind of map of a city, by name."""
+    remaining = np.random.default_rng(SEED).random(len(objects)) >= REMOVED
+    later = StreetObjects(objects.table[remaining], objects.taxonomy, objects.licenses)
     database, newer = build_database(objects), build_database(later)
     index = build_index(database, cell_noise(named_noise("generic"), database.grid.step))
     store = ObjectStore.of(objects)
@@ -191,53 +182,56 @@ def _maps(objects: StreetObjects, queries: int) -> dict[str, Callable[[], folium
     }
 
 
-def _pictures(
+def _screenshots(
     browser: Chrome, page: Path, out: Path, looks: Looks, zooms: Sequence[int]
-) -> Iterator[Picture]:
-    """Yield the pictures of one page: on each screen, on each ground."""
+) -> Iterator[Screenshot]:
+    """Yield the screenshots of one page, for each screen and background."""
     url = page.resolve().as_uri()
     for screen, ground in _screens(browser, looks):
         browser.get(url)
         browser.execute_async_script(DRAWN)
         browser.execute_script(ASK)
-        picture = _picture(browser, out, (page.stem, screen, ground), page.stat().st_size)
+        picture = _screenshot(browser, out, (page.stem, screen, ground), page.stat().st_size)
         browser.get(url)
         browser.execute_async_script(DRAWN)
-        yield _moved(browser, picture, zooms)
+        yield _with_frames(browser, picture, zooms)
 
 
 def _workbench(
     browser: Chrome, path: Path, out: Path, looks: Looks, zooms: Sequence[int], *, marks: int
-) -> Iterator[Picture]:
-    """Yield the pictures of the workbench of a city; print how soon it answers."""
+) -> Iterator[Screenshot]:
+    """Yield the screenshots of the workbench of a city; print the times of its answers."""
     city = open_city(path)
     times: dict[bool, list[float]] = {True: [], False: []}
     name = WORKBENCH if path.stem == "city" else f"{WORKBENCH}-{path.stem}"
     with tempfile.TemporaryDirectory() as folder, serving(city) as address:
         photo = photo_in(city, Path(folder))
         for screen, ground in _screens(browser, looks):
-            for known in times:  # pictures are of the one that is not known
-                times[known] += asked(browser, address, photo, marks=marks, known=known)
+            for with_heading in times:  # the pictures show the last case, without heading
+                times[with_heading] += answer_times(
+                    browser, address, photo, marks=marks, with_heading=with_heading
+                )
             browser.execute_script("scroll(0, 0); document.querySelector('#seen').scrollTop = 0")
             size = len(browser.page_source.encode())
-            picture = _picture(
+            picture = _screenshot(
                 browser, out, (name, screen, ground), size, own=address.partition("?")[0]
             )
             browser.execute_script("document.getElementById('map').scrollIntoView()")
             browser.save_screenshot(str(out / f"{name}-{screen}-{ground}-map.png"))
             browser.execute_script("window.moved = semsig.map")
-            yield _moved(browser, picture, zooms)
-    for known, own in times.items():
+            yield _with_frames(browser, picture, zooms)
+    for with_heading, own in times.items():
         median, late = statistics.median(own), statistics.quantiles(own, n=10)[-1]
+        heading = "known" if with_heading else "unknown"
         print(
-            f"{name}, {len(city.database):,} cells, heading {'known' if known else 'unknown'}: of "
+            f"{name}, {len(city.database):,} cells, heading {heading}: of "
             f"{len(own)} changes half are answered and drawn within {median:.0f} ms, and nine of "
             f"ten within {late:.0f} ms"
         )
 
 
 def _screens(browser: Chrome, looks: Looks) -> Iterator[tuple[str, str]]:
-    """Yield the names of each screen and ground, once the browser has them."""
+    """Yield the names of each screen and background, after setting them in the browser."""
     for screen, ground in looks:
         width, height, dots = SCREENS[screen]
         browser.execute_cdp_cmd(
@@ -249,38 +243,38 @@ def _screens(browser: Chrome, looks: Looks) -> Iterator[tuple[str, str]]:
         yield screen, ground
 
 
-def _picture(
+def _screenshot(
     browser: Chrome, out: Path, names: tuple[str, str, str], size: int, *, own: str | None = None
-) -> Picture:
-    """Take a picture of the page that is open, which may ask its own server alone."""
+) -> Screenshot:
+    """Take a screenshot of the open page; only requests to its own server are allowed."""
     time.sleep(SETTLED_S)
     browser.save_screenshot(str(out / f"{'-'.join(names)}.png"))
     broken = Axe().run(browser, options={"resultTypes": ["violations"]})["violations"]
     requests = browser.execute_script(
-        "return performance.getEntriesByType('resource').map((one) => one.name)"
+        "return performance.getEntriesByType('resource').map((entry) => entry.name)"
     )
     allowed = () if own is None else (own, "data:", "blob:")
     name, screen, ground = names
-    return Picture(
+    return Screenshot(
         map=name,
         screen=screen,
         ground=ground,
         mb=size / 1e6,
         errors=tuple(entry["message"] for entry in browser.get_log("browser")),
-        requests=tuple(one for one in requests if not one.startswith(allowed)),
+        requests=tuple(address for address in requests if not address.startswith(allowed)),
         violations=tuple(rule["id"] for rule in broken),
     )
 
 
-def _moved(browser: Chrome, picture: Picture, zooms: Sequence[int]) -> Picture:
-    """Return a picture with how smoothly the map that is open moves."""
+def _with_frames(browser: Chrome, picture: Screenshot, zooms: Sequence[int]) -> Screenshot:
+    """Return a screenshot with the lengths of frames while the open map is moved."""
     frames = browser.execute_async_script(FRAMES, zooms)
     late = statistics.quantiles(frames, n=20)[-1]
     return replace(picture, median_ms=statistics.median(frames), late_ms=late)
 
 
-def _line(picture: Picture) -> str:
-    """Return what a picture showed, in a line."""
+def _line(picture: Screenshot) -> str:
+    """Return the results of a screenshot as a line of text."""
     wrong = [*picture.errors, *picture.requests, *picture.violations]
     return (
         f"{picture.map}, {picture.screen}, {picture.ground}: {picture.mb:.1f} MB, frames of "

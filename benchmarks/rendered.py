@@ -1,4 +1,4 @@
-"""Scenes of upright things as a camera takes them, and the boxes that a perfect detector draws."""
+"""Scenes of upright things in front of a camera, and the boxes that a perfect detector draws."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EYE_M = 1.6
 
 @dataclass(frozen=True)
 class Scene:
-    """Things by distance, bearing from where the camera looks, height and width; arrays of (n,)."""
+    """Distances, bearings from the direction of the camera, heights and widths; shapes (n,)."""
 
     distances: NDArray[np.float64]
     bearings: NDArray[np.float64]
@@ -26,7 +26,7 @@ class Scene:
 
     @classmethod
     def random(cls, seed: int, number: int = 60) -> Scene:
-        """Return things that stand anywhere around the camera."""
+        """Return things anywhere around the camera."""
         rng = np.random.default_rng(seed)
         return cls(
             rng.uniform(4, 30, number),
@@ -41,13 +41,13 @@ class Scene:
         return Scene(*(column[rows] for column in columns))
 
     def boxes(self, camera: Camera) -> NDArray[np.float64]:
-        """Return left, top, right and bottom in pixels, NaN for what the picture cuts."""
+        """Return left, top, right and bottom in pixels, NaN for things not fully in the picture."""
         angle = np.radians(self.bearings)[:, None, None]
-        aside = self.widths[:, None, None] * np.linspace(-0.5, 0.5, 5)[None, :, None]
+        offset = self.widths[:, None, None] * np.linspace(-0.5, 0.5, 5)[None, :, None]
         rise = self.heights[:, None, None] * np.linspace(0, 1, 41)[None, None, :]
         away = self.distances[:, None, None]
-        right = away * np.sin(angle) + aside * np.cos(angle)
-        ahead = away * np.cos(angle) - aside * np.sin(angle)
+        right = away * np.sin(angle) + offset * np.cos(angle)
+        ahead = away * np.cos(angle) - offset * np.sin(angle)
         points = np.broadcast_arrays(right, EYE_M - rise, ahead)
         pixels = camera.pixels(np.stack(points, axis=-1)).reshape(len(away), 5 * 41, 2)
         boxes = np.concatenate([pixels.min(axis=1), pixels.max(axis=1)], axis=-1)

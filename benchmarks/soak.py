@@ -1,9 +1,9 @@
 """Try to break commands and readers, some thousand times: ``python -m benchmarks.soak``.
 
-Every command that writes is killed and interrupted at random moments, finds full and read-only
-disks, closed pipes and odd environments; every format that is read gets damaged files. What was
-there before must be whole, or what is new; the next run must work and clean up; a refusal must be
-one sentence. What goes wrong is printed, and the table of all trials is kept as JSON.
+Every command that writes is killed and interrupted at random moments, and run with full and
+read-only disks, closed pipes and unusual environments; every reader gets damaged files. Either the
+old or the new files must be complete; the next run must work and clean up; a refusal must be one
+sentence. Faults are printed, and the table of all trials is saved as JSON.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks import _soak_faults as trials
 from benchmarks import _soak_mutants as mutants
 from benchmarks import tables
+from benchmarks._measuring import FOLDER
 from benchmarks._soak_city import made_world
 from benchmarks._soak_runs import forked, load_all
 
@@ -43,7 +44,7 @@ _MUTANTS = "damaged files"
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
-    """Where trials take place: the city, sound files, and whether disks can be mounted."""
+    """Inputs of all trials: the city, undamaged files, and whether disks can be mounted."""
 
     world: World
     corpus: Path
@@ -51,17 +52,17 @@ class Place:
 
 
 def main() -> None:
-    """Read the options, run all trials, and print the table."""
+    """Run all trials, print the table, and save it."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=__doc__)
     parser.add_argument("--share", type=float, default=1.0, help="of all trials, such as 0.1")
     parser.add_argument("--seed", type=int, default=0, help="of the random trials")
     parser.add_argument("--part", action="append", help="only this part; others stay in --out")
     parser.add_argument("--lanes", type=int, default=os.cpu_count() or 1, help="trials at a time")
-    parser.add_argument("--out", type=Path, default=tables.FOLDER / "soak.json")
+    parser.add_argument("--out", type=Path, default=FOLDER / "soak.json")
     options = parser.parse_args()
     start = time.perf_counter()
     load_all()
-    # Not a TemporaryDirectory, which every forked process would remove at its end.
+    # Not a TemporaryDirectory, because every forked process would remove it at its end.
     folder = Path(tempfile.mkdtemp(prefix="soak-"))
     try:
         place = _prepared(folder, round(KILLS * options.share))
@@ -75,7 +76,7 @@ def main() -> None:
             _lane(place, folder / f"lane{number}", rows.keys(), options, number)
             for number in range(options.lanes)
         ]
-        for part, count, faults in _told(lanes):
+        for part, count, faults in _results(lanes):
             _add(rows[part], count, faults)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -102,7 +103,7 @@ def _prepared(folder: Path, kills: int) -> Place:
 def _lane(
     place: Place, folder: Path, parts: Collection[str], options: argparse.Namespace, lane: int
 ) -> int:
-    """Begin every n-th trial in a process of its own; return where it tells what it found."""
+    """Start a process for every n-th trial; return the descriptor that receives its results."""
     reading, writing = os.pipe()
     if os.fork():
         os.close(writing)
@@ -116,7 +117,7 @@ def _lane(
                 if number % options.lanes == lane:
                     file.write(json.dumps(_outcome(place, trial, folder / "trial")) + "\n")
         code = 0
-    except BaseException:  # noqa: BLE001 - told, and the process ends
+    except BaseException:  # noqa: BLE001 - printed, and the process ends
         sys.excepthook(*sys.exc_info())
     finally:
         os._exit(code)
@@ -135,20 +136,20 @@ def _trials(
 def _outcome(
     place: Place, trial: trials.Case | mutants.Batch, folder: Path
 ) -> tuple[str, int, list[tuple[str, list[str]]]]:
-    """Return the part of a trial, how many cases it was, and what is wrong with which."""
+    """Return the part of a trial, its number of cases, and the faults by case."""
     if isinstance(trial, mutants.Batch):
         form = mutants.FORMATS[trial.format].name
-        found = mutants.faults(trial, place.corpus, folder)
-        return _MUTANTS, trial.count, [(f"{form}, mutant {one}", [told]) for one, told in found]
+        faults = mutants.faults(trial, place.corpus, folder)
+        return _MUTANTS, trial.count, [(f"{form}, mutant {n}", [fault]) for n, fault in faults]
     folder.mkdir()
-    found = forked(lambda: trials.faults(place.world, trial, folder))
+    failed = forked(lambda: trials.faults(place.world, trial, folder))
     shutil.rmtree(folder, ignore_errors=True)
     command = place.world.command(trial.number).text
-    return trial.part, 1, [(f"trial {trial.number}, semsig {command}", found)] if found else []
+    return trial.part, 1, [(f"trial {trial.number}, semsig {command}", failed)] if failed else []
 
 
-def _told(lanes: list[int]) -> Iterator[Any]:
-    """Yield what the lanes tell, until all are done."""
+def _results(lanes: list[int]) -> Iterator[Any]:
+    """Yield the results of all lanes as they arrive."""
     with selectors.DefaultSelector() as selector:
         for lane in lanes:
             file = open(lane, encoding="utf-8")  # noqa: PTH123, SIM115 - a descriptor
@@ -164,16 +165,16 @@ def _told(lanes: list[int]) -> Iterator[Any]:
 
 
 def _add(row: dict[str, Any], count: int, faults: list[tuple[str, list[str]]]) -> None:
-    """Count trials, and print what is wrong."""
+    """Count trials, and print their faults."""
     row["cases"] += count
     row["clean"] += count - len(faults)
-    for what, found in faults:
-        kinds = Counter(told.partition(":")[0] for told in found)
+    for case, texts in faults:
+        kinds = Counter(text.partition(":")[0] for text in texts)
         for kind in kinds:
             row[kind if kind in FAULTS else "other"] += 1
-        print(f"{row['part']}, {what}", flush=True)
-        for told in found:
-            print(f"    {told.strip()}")
+        print(f"{row['part']}, {case}", flush=True)
+        for text in texts:
+            print(f"    {text.strip()}")
 
 
 if __name__ == "__main__":

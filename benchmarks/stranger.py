@@ -1,8 +1,8 @@
-"""Walk the road of a stranger, by the commands of the README, and time each: ``make stranger``.
+"""Run and time the commands of the README as a new user would: ``make stranger``.
 
-The machine is as bare as it can be made: a fresh clone, an empty home folder without caches, no
-environment. Commands are those of the README's code blocks, from its top to the first map of a
-real city; the extract of OpenStreetMap that it tells to download is one of `SEMSIG_GEODATA`.
+The machine is as bare as possible: a new clone, an empty home folder without caches, no
+environment. The commands are in the code blocks of the README, from its top to the first map of a
+real city; the extract of OpenStreetMap to download is taken from `SEMSIG_GEODATA`.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ BLOCK = re.compile(r"^```\w*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"^(?:\$ )?((?:\.|make|pip|semsig) .*)", re.MULTILINE)
 LAST = "semsig map "
 BARE = ("HOME", "NPM_CONFIG_CACHE", "PIP_CACHE_DIR", "PYTHON", "SEMSIG_", "VIRTUAL_ENV", "XDG_")
-"""What names of the environment begin with that a bare machine does not have."""
+"""Prefixes of environment variables that are removed."""
 
 
 def main() -> None:
-    """Read the options, walk, print and write."""
+    """Run the commands, and print and write their times."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.stranger", description=__doc__)
     parser.add_argument("--repository", default=str(ROOT), help="what is cloned; this checkout")
     parser.add_argument(
@@ -48,29 +48,29 @@ def main() -> None:
 
 
 def commands(readme: str) -> list[str]:
-    """Return the commands of a README up to the first map; tests are for later."""
-    found: list[str] = []
+    """Return the commands of a README up to the first map, without ``make test``."""
+    lines: list[str] = []
     for block in BLOCK.findall(readme):
         for command in COMMAND.findall(block):
             plain = shlex.join(shlex.split(command, comments=True))
             if plain != "make test":
-                found.append(plain)
+                lines.append(plain)
             if plain.startswith(LAST):
-                return found
+                return lines
     sys.exit(f"The README has no command that starts with {LAST!r}.")
 
 
 def walk(folder: Path, repository: str, extract: Path) -> list[tuple[str, float]]:
-    """Run the commands in a fresh clone and return each with its seconds.
+    """Run the commands in a new clone and return each with its seconds.
 
-    The commands are of one shell, as a stranger's are, and have to make the map.
+    The commands run in one shell, as a user's do, and must write the map.
     """
     home, temporary, clone = (folder / name for name in ("home", "tmp", "semsig_gis"))
     home.mkdir()
     temporary.mkdir()
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(BARE)}
-    environment = {**kept, "HOME": str(home), "TMPDIR": str(temporary)}
-    # Not named in the results: where a checkout lies is nobody's concern.
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith(BARE)}
+    environment = {**inherited, "HOME": str(home), "TMPDIR": str(temporary)}
+    # The path of the checkout must not appear in the results.
     environment["REPOSITORY"] = repository
     steps = run([f'git clone --quiet "$REPOSITORY" {clone.name}'], folder, environment)
     rest = commands((clone / "README.md").read_text(encoding="utf-8"))
@@ -79,21 +79,22 @@ def walk(folder: Path, repository: str, extract: Path) -> list[tuple[str, float]
         shutil.copyfile(extract, clone / name)
     steps += run(rest, clone, environment)
     last = shlex.split(rest[-1])
-    made = clone / last[last.index("--out") + 1]
-    print(f"{made.name}: {made.stat().st_size:,} bytes")
+    page = clone / last[last.index("--out") + 1]
+    print(f"{page.name}: {page.stat().st_size:,} bytes")
     return steps
 
 
 def run(lines: list[str], folder: Path, environment: dict[str, str]) -> list[tuple[str, float]]:
-    """Run commands in one shell, which tells the time after each, and stop at a failure."""
-    tell = 'echo "$EPOCHREALTIME" >&3'
-    script = "\n".join(["set -e", "exec 3>times", tell, *(f"{line}\n{tell}" for line in lines)])
-    subprocess.run(["bash", "-c", script], cwd=folder, env=environment, check=True)  # noqa: S603, S607 - what the README says
+    """Run commands in one shell, which writes the time after each, and stop at a failure."""
+    clock = 'echo "$EPOCHREALTIME" >&3'
+    script = "\n".join(["set -e", "exec 3>times", clock, *(f"{line}\n{clock}" for line in lines)])
+    subprocess.run(["bash", "-c", script], cwd=folder, env=environment, check=True)  # noqa: S603, S607 - commands of the README
     times = [float(line) for line in (folder / "times").read_text(encoding="utf-8").split()]
     seconds = [end - start for start, end in itertools.pairwise(times)]
-    for line, taken in zip(lines, seconds, strict=True):
-        print(f"{taken:8.1f} s  {line}", flush=True)
-    return list(zip(lines, seconds, strict=True))
+    steps = list(zip(lines, seconds, strict=True))
+    for line, duration in steps:
+        print(f"{duration:8.1f} s  {line}", flush=True)
+    return steps
 
 
 if __name__ == "__main__":

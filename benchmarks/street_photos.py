@@ -1,7 +1,8 @@
-"""Photos of a street as they might be taken in a small city: drawn, with boxes that are known."""
+"""Drawn photos of a street, with the boxes of their objects."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ TRUNK, METAL = "#6b4a2b", "#4a4f55"
 
 @dataclass(frozen=True)
 class StreetPhoto:
-    """A photo in a file: the symbol and box of each object that is whole in it, rarest first."""
+    """A photo in a file: symbol and box of each object fully in it, the rarest first."""
 
     file: Path
     heading: float
@@ -32,14 +33,14 @@ class StreetPhoto:
     things: list[tuple[str, tuple[float, float, float, float]]]
 
     def corner(self, number: int) -> tuple[float, float]:
-        """Return where in the picture an object begins, as shares of its width and height."""
-        left, top, _, _ = self.things[number][1]
-        return left / WIDTH, top / HEIGHT
+        """Return the upper left corner of an object, as shares of the size of the picture."""
+        x, y, _, _ = self.things[number][1]
+        return x / WIDTH, y / HEIGHT
 
     def size(self, number: int) -> tuple[float, float]:
-        """Return how large an object is, as shares of the width and height of the picture."""
-        left, top, right, bottom = self.things[number][1]
-        return (right - left) / WIDTH, (bottom - top) / HEIGHT
+        """Return the width and height of an object, as shares of the size of the picture."""
+        x_min, y_min, x_max, y_max = self.things[number][1]
+        return (x_max - x_min) / WIDTH, (y_max - y_min) / HEIGHT
 
 
 WIDTH, HEIGHT = 960, 720
@@ -49,7 +50,7 @@ NEAREST_M = 3.0
 def street_photo(
     sight: Sight, taxonomy: Taxonomy, *, heading: float, file: Path, fov: float = 90
 ) -> StreetPhoto:
-    """Draw what is seen from a place, and write it as a picture without any EXIF."""
+    """Draw the objects seen from a place, and write the picture, without EXIF."""
     camera = Camera(width=WIDTH, height=HEIGHT, fov=fov)
     bearings = (sight.bearings - heading + 180) % 360 - 180
     ahead = np.flatnonzero((sight.distances > NEAREST_M) & (np.abs(bearings) < fov / 2))
@@ -60,7 +61,7 @@ def street_photo(
     trees = np.array([kind.symbol == "B" for kind in kinds])
     widths = np.where(trees, 4.0, np.minimum(heights / 3, 0.6))
     scene = Scene(sight.distances[near], bearings[near], heights, widths)
-    boxes = scene.boxes(camera)  # of what is whole in the picture
+    boxes = scene.boxes(camera)  # NaN for objects not fully in the picture
     picture = Image.new("RGB", (WIDTH, HEIGHT), SKY)
     draw = ImageDraw.Draw(picture)
     draw.rectangle((0, HEIGHT * 0.3, WIDTH, HEIGHT / 2), fill=WALLS)
@@ -69,15 +70,15 @@ def street_photo(
     for kind, box in zip(kinds, boxes.tolist(), strict=True):
         if np.isnan(box).any():
             continue
-        left, top, right, bottom = box
-        middle, pole = (left + right) / 2, max((right - left) / 12, 1.0)
+        x_min, y_min, x_max, y_max = box
+        middle, pole = (x_min + x_max) / 2, max((x_max - x_min) / 12, 1.0)
         if kind.symbol == "B":
-            draw.rectangle((middle - pole, top, middle + pole, bottom), fill=TRUNK)
-            draw.ellipse((left, top, right, top + 0.6 * (bottom - top)), fill="#3f7d43")
+            draw.rectangle((middle - pole, y_min, middle + pole, y_max), fill=TRUNK)
+            draw.ellipse((x_min, y_min, x_max, y_min + 0.6 * (y_max - y_min)), fill="#3f7d43")
         else:
-            draw.rectangle((middle - pole, top, middle + pole, bottom), fill=METAL)
-            draw.rectangle((left, top, right, top + (bottom - top) / 4), fill=kind.colour)
-        things.append((kind.symbol, (left, top, right, bottom)))
+            draw.rectangle((middle - pole, y_min, middle + pole, y_max), fill=METAL)
+            draw.rectangle((x_min, y_min, x_max, y_min + (y_max - y_min) / 4), fill=kind.colour)
+        things.append((kind.symbol, (x_min, y_min, x_max, y_max)))
     picture.save(file, quality=90)
-    symbols = [symbol for symbol, _ in things]
-    return StreetPhoto(file, heading, fov, sorted(things, key=lambda one: symbols.count(one[0])))
+    count = Counter(symbol for symbol, _ in things)
+    return StreetPhoto(file, heading, fov, sorted(things, key=lambda thing: count[thing[0]]))

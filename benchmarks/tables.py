@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.views import NOT_TOLD, RANGES, SECTORS
+from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
+from benchmarks.views import FULL_TURN, RANGES, SECTORS
 from benchmarks.views import bars as bars_of_views
 
 if TYPE_CHECKING:
@@ -14,9 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["main", "page"]
 
-FOLDER = Path(__file__).parent
 TODAY = "of the day"
-"""The map in the rows of ``chances.json`` that are of no old one."""
+"""Value of ``map`` in the rows of ``chances.json`` with a current map."""
 PAGE = FOLDER.parent / "docs" / "figures.md"
 TRUST = FOLDER.parent / "docs" / "reliability.md"
 _SOAK = ("<!-- make soak -->\n", "<!-- end -->")
@@ -25,99 +24,119 @@ _HEAD = """# Figures
 
 This page is written by `python -m benchmarks.tables`, which `make bench`, `make accuracy`,
 `make views`, `make bayes`, `make chances` and `make reproduce` end with. All figures are from one
-machine with two cores that other programs share, so ratios say more than times.
+machine with two cores that other programs share, so ratios are more reliable than times.
 """
 _ACCURACY = """## Accuracy
 
-`make accuracy` draws {queries:,} cells of a city, spoils their signatures, and asks every method
-for all of them. `light`, `medium` and `strong` are 1, 7 and 13 errors (missed, false, or of a false
-class) and bearing noise of 5 degrees. `edit+edit:5%` is the best method that the paper reports.
-The errors are those of the one best place; the interval of 95 % is Wilson's. "On the grid", a
+`make accuracy` draws {queries:,} cells of a city, distorts their signatures, and localizes all of
+them with every method. `light`, `medium` and `strong` are 1, 7 and 13 errors (missed, false, or of
+a false class) and bearing noise of 5 degrees. `edit+edit:5%` is the best method that the paper
+reports. The error is that of the best place; the interval of 95 % is Wilson's. "On the grid", a
 query is seen from the centre of a cell, as in the paper; off the grid, from anywhere in it.
 """
 _CHANCES = """## Chances
 
-The likelihood method says how sure it is. "Stated" is its mean chance to be within 50 m, "came
-true" how often it was. A region of 90 % is made of whole cells and so holds somewhat more: "holds"
-is how often the true cell is in it, "stated" what the method says of that, and "just 90 %" how
-often it is in a region whose least likely cells count only with the part that is needed.
+The likelihood method states a chance with each answer. "Stated" is its mean chance to be within
+50 m, "came true" how often it was. A region of 90 % consists of whole cells, so its chance is
+somewhat higher: "stated" is this chance, "holds" how often the true cell is in the region, and
+"just 90 %" how often it is if the least likely cells of the region count only in part, so that the
+chance is exactly 90 %.
 """
 _SURE = """## Answers
 
-The likelihood method gives an answer or says that it cannot tell. The threshold is chosen on half
-of the `medium` queries so that 98 % of the answers are right; these are the other halves.
+The likelihood method gives an answer, or "cannot tell". The threshold is chosen on half of the
+`medium` queries so that 98 % of the answers are right; the table shows the other halves.
 """
-_BARS = """## What was asked for
+_BARS = """## Targets
 
-The figures that accuracy was to reach, and what came out.
+The target of each figure of accuracy, and the value that was measured.
 """
 _VIEWS = """## Views
 
-`make views` asks up to {queries} queries a line of a camera that sees 70, 120 or 360 degrees. The
-detector finds 80 % of the objects, misnames 10 % of these, is 4 degrees out and makes up one object
-in a full turn; the likelihood method has this noise model. The queries of a line are the same for
-all columns: taken for a full turn, with the sector told, or with rough distances, 25 % off, told,
-too. These are the shares within 50 m of the one best place, with Wilson's intervals of 95 %. Photos
-are {photos} in a row, 20 m apart, each in a direction of its own, the legs known; the last place is
-asked for. From cells, queries are seen from the centres of cells; else from anywhere in them, and
-places are not refined.
+`make views` localizes up to {queries} queries for each line, of a camera that sees 70, 120 or 360
+degrees. The detector finds 80 % of the objects, misnames 10 % of these, is 4 degrees out and makes
+up one object in a full turn; the likelihood method has this noise model. The columns have the same
+queries: as if they were full turns, with their sectors, or with sectors and distances that are 25 %
+off. The figures are the shares with a best place within 50 m, with Wilson's intervals of 95 %.
+Lines with {photos} photos are routes: the photos are 20 m apart, in random directions, with known
+legs, and the last place is localized; "last only" is the same with only the last photo. "Cells"
+means that queries are seen from the centres of cells, "anywhere" from random places in them. Places
+are not refined.
 """
 _VIEW_CHANCES = """The same lines: how often the true cell is in the region of just 90 %, and how
 far off, at most, the stated chance is in a tenth of the chance with 100 queries or more.
 """
-_BAYES = """### What no method can pass
+_BAYES = """### Upper bound for all methods
 
-`make bayes` asks {queries} queries a line in a made-up city of {cells} cells, small enough for
-exact sums over all one-to-one associations of what is seen with what is there. With the noise and
-camera of the views, the chances that Bayes' rule gives are then known. "At most" is the mean chance
-of the best place within 50 m: no method is right more often in the long run; "by Bayes" is how
-often that place was right, beside the likelihood method, for the same queries of one to fourteen
-detections, with the chance that it states.
+`make bayes` localizes {queries} queries for each line in a made-up city of {cells} cells, small
+enough for exact sums over all one-to-one associations of detections and objects. With the noise
+model and the cameras of the views, this gives the exact chances by Bayes' rule. "At most" is the
+mean chance of the best place within 50 m: no method is right more often in the long run. "By Bayes"
+is how often that place was right. The next columns are the same share for the likelihood method,
+for the same queries of one to fourteen detections, and the chance that it states.
 """
-_VIEW_BARS = """The figures that views were to reach, and what came out.
+_VIEW_BARS = """The target of each figure of views, and the value that was measured.
 """
 _REAL = """## Chances in real cities
 
-`make chances` asks for what is seen from anywhere in a city, {queries} queries at each of `light`,
-`medium` and `strong`, and answers as `semsig localize` does: generic noise,
-refined places. "Stated" is the mean chance, of the queries in a tenth, to be within 50 m; "came
-true" how often it was. Queries of which nothing remains are not among them.
+`make chances` localizes queries from anywhere in a city, {queries} at each of `light`, `medium` and
+`strong`, with the settings of `semsig localize`: generic noise, refined places. "Stated" is the
+mean chance to be within 50 m, of the queries in a tenth; "came true" is how often it was. Queries
+without any object left are not counted.
 """
 _OLD = """## Old maps
 
-`make chances` also asks with a map that is older than the queries ({queries} at each of `light` and
-`medium`). Of Monaco there are two real dates, and its own changes are those that are shipped. The
-other cities are changed for three years, by rules that the noise model does not have: objects go,
-come and move, one by one, and in whole streets lamps are replaced and trees felled and planted
-again, and new rows appear. "Told" is what the answer was told of that: nothing, the age
-(`--map-age`) with the changes of Monaco, or with a drift report of a first year of the city, made
-with other random numbers (`--drift-report`). "Answered" are the queries with a chance of 0.9 or
-more.
+`make chances` also uses maps that are older than the queries ({queries} at each of `light` and
+`medium`). For Monaco there is real data of two dates, and the built-in drift report is of its
+changes. The other cities are changed for three years, by rules that the noise model does not have:
+single objects are removed, added and moved; in whole streets lamps are replaced, and trees felled
+and planted again; and new rows appear. "Settings" is what the method gets: nothing, the age of the
+map (`--map-age`) with the changes of Monaco, or with a drift report of another simulated first year
+of the city (`--drift-report`). "Answered" are the queries with a chance of 0.9 or more.
 """
 _PAPER = """## The paper's experiments
 
-`make reproduce` runs them on a made-up city as large and as furnished as the paper's Paris, with
-10,000 queries of each, and writes a report with all plots into `reproduction/`; these are its
-numbers of which the paper prints one too. Intervals are those of 95 %. What the paper only reads
-off its plots is marked in the report.
+`make reproduce` runs them on a made-up city with as many cells and objects as the paper's Paris,
+with 10,000 queries each, and writes a report with all plots into `reproduction/`. The table has the
+numbers that the paper prints as well, with intervals of 95 %. Numbers that were read off plots of
+the paper are marked in the report.
 """
 _SPEED = """## Speed
 
-`make bench` times ours and a peer in turns, in one process, and keeps the medians. The paper's
-times are those that it prints, for 312,134 cells on a machine of its own.
+`make bench` times ours and a peer in turns, in one process, and takes the medians. The paper's
+times are for 312,134 cells, on its own machine.
 """
+
+# Titles of the columns of tables.
+_ACCURACY_HEAD = (
+    "noise | method | setting | <= 25 m | <= 50 m | interval | ten objects or more | "
+    "recall@10 % | ms"
+)
+_CHANCE_HEAD = (
+    "city | noise | method | setting | stated | came true | region: stated | holds | just 90 %"
+)
+_ANSWER_HEAD = "city | noise | queries | answered | right, of these"
+_BAYES_HEAD = (
+    "degrees | ranges | detections | at most | by Bayes | the likelihood method | interval | stated"
+)
+_REAL_HEAD = "city | chance | queries | stated | came true | interval"
+_OLD_HEAD = (
+    "city | map | settings | within 50 m | stated | answered | right, of these | "
+    "interval | right, of those below 0.99"
+)
+_BAR_HEAD = "city | figure | target | measured | reached"
+_PAPER_HEAD = "experiment | case | figure | ours | interval | the paper"
+_SPEED_HEAD = "figure | ours | peer | times better | target | the paper"
 
 
 def main() -> None:
     """Write the page of figures, and the table of the soak."""
-    names = (
-        *("accuracy.json", "results.json", "reproduction.json", "chances.json"),
-        "views.json",
-    )
-    results = map(_results, names)
-    PAGE.write_text(page(*results, bayes=_results("bayes.json")), encoding="utf-8")
+    names = ("accuracy", "results", "reproduction", "chances", "views")
+    results = [read_rows(FOLDER / f"{name}.json") for name in names]
+    PAGE.write_text(page(*results, bayes=read_rows(FOLDER / "bayes.json")), encoding="utf-8")
     TRUST.write_text(
-        trust_page(TRUST.read_text(encoding="utf-8"), _results("soak.json")), encoding="utf-8"
+        trust_page(TRUST.read_text(encoding="utf-8"), read_rows(FOLDER / "soak.json")),
+        encoding="utf-8",
     )
     for path in (PAGE, TRUST):
         print(f"wrote {path.relative_to(FOLDER.parent)}")
@@ -132,62 +151,52 @@ def page(
     *,
     bayes: Sequence[dict[str, Any]],
 ) -> str:
-    """Return the page.
+    """Return the page of figures as Markdown, from the rows of the files of results.
 
-    Parameters
-    ----------
-    accuracy, speed, paper, chances, views, bayes : sequence of dict
-        Rows of ``accuracy.json``, ``results.json``, ``reproduction.json``, ``chances.json``,
-        ``views.json`` and ``bayes.json``.
-
-    Returns
-    -------
-    str
-        Markdown.
+    `speed` are the rows of ``results.json``, `paper` of ``reproduction.json``, the others of the
+    file of their name.
     """
     parts = [_HEAD]
     plain = [row for row in accuracy if row["coverage"] is None]
     if plain:
         parts.append(_ACCURACY.format(queries=plain[0]["queries"]))
     for city in dict.fromkeys(row["city"] for row in plain):
-        rows = [row for row in plain if row["city"] == city]
-        parts += [f"### {city}, {rows[0]['cells']:,} cells\n", _accuracy_table(rows)]
-    told = [row for row in plain if row["in_region"] is not None]
+        in_city = [row for row in plain if row["city"] == city]
+        parts += [
+            f"### {city}, {in_city[0]['cells']:,} cells\n",
+            _table(_ACCURACY_HEAD, _accuracy_cells, in_city),
+        ]
+    with_regions = [row for row in plain if row["in_region"] is not None]
     sure = [row for row in accuracy if row["coverage"] is not None]
     real = [row for row in chances if row["map"] == TODAY]
     old = [row for row in chances if row["map"] != TODAY]
     bars = [{**bar, "city": row["city"]} for row in accuracy for bar in row["bars"]]
     view_bars = [{**bar.to_dict(), "city": city} for city, bar in bars_of_views(views)]
-    for text, rows, table in (
-        (_CHANCES, told, _chance_table),
-        (_SURE, sure, _answer_table),
-        (_views_text(views), list(views), _view_table),
-        (_VIEW_CHANCES, list(views), _view_chance_table),
-        (_VIEW_BARS, view_bars, _bar_table),
-        (_bayes_text(bayes), list(bayes), _bayes_table),
+    sections = (
+        (_CHANCES, with_regions, partial(_table, _CHANCE_HEAD, _chance_cells)),
+        (_SURE, sure, partial(_table, _ANSWER_HEAD, _answer_cells)),
+        (_views_text(views), views, partial(_view_table, _view_cell)),
+        (_VIEW_CHANCES, views, partial(_view_table, _view_chance_cell)),
+        (_VIEW_BARS, view_bars, partial(_table, _BAR_HEAD, _bar_cells)),
+        (_bayes_text(bayes), bayes, partial(_table, _BAYES_HEAD, _bayes_cells)),
         (_each_level(_REAL, real), real, _real_table),
-        (_each_level(_OLD, old), old, _old_table),
-        (_BARS, bars, _bar_table),
-        (_PAPER, list(paper), _paper_table),
-        (_SPEED, list(speed), _speed_table),
-    ):
+        (_each_level(_OLD, old), old, partial(_table, _OLD_HEAD, _old_cells)),
+        (_BARS, bars, partial(_table, _BAR_HEAD, _bar_cells)),
+        (_PAPER, paper, partial(_table, _PAPER_HEAD, _paper_cells)),
+        (_SPEED, speed, partial(_table, _SPEED_HEAD, _speed_cells)),
+    )
+    for text, rows, table in sections:
         if rows:
             parts += [text, table(rows)]
     return "\n".join(parts)
 
 
-def _paper_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "experiment | what | figure | ours | interval | the paper",
-        (
-            (
-                *(row["section"], row["row"], row["column"]),
-                _number(row["ours"], row["unit"]),
-                "" if row["low"] is None else f"{row['low']:.4f}-{row['high']:.4f}",
-                _number(row["paper"], row["unit"]),
-            )
-            for row in rows
-        ),
+def _paper_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["section"], row["row"], row["column"]),
+        _number(row["ours"], row["unit"]),
+        "" if row["low"] is None else f"{row['low']:.4f}-{row['high']:.4f}",
+        _number(row["paper"], row["unit"]),
     )
 
 
@@ -196,155 +205,107 @@ def _number(value: float, unit: str) -> str:
     return f"{value:,.0f}{unit and ' '}{unit}" if large else f"{value:.4g}{unit and ' '}{unit}"
 
 
-def _accuracy_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "noise | method | what is known | <= 25 m | <= 50 m | interval | ten objects or more | "
-        "recall@10 % | ms",
-        (
-            (
-                *(row["distortion"], f"`{row['method']}`", row["setting"]),
-                *(_share(row["p25"]), _share(row["p50"])),
-                f"{_share(row['p50_low'])}-{_share(row['p50_high'])}",
-                *(_share(row["p50_ten"]), _share(row["recall10pct"])),
-                f"{row['ms_per_query']:.3g}",
-            )
-            for row in rows
-        ),
+def _accuracy_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["distortion"], f"`{row['method']}`", row["setting"]),
+        *(_share(row["p25"]), _share(row["p50"])),
+        f"{_share(row['p50_low'])}-{_share(row['p50_high'])}",
+        *(_share(row["p50_ten"]), _share(row["recall10pct"])),
+        f"{row['ms_per_query']:.3g}",
     )
 
 
-def _chance_table(rows: Iterable[dict[str, Any]]) -> str:
+def _chance_cells(row: Mapping[str, Any]) -> Sequence[str]:
     names = ("chance", "p50", "region_mass", "in_region", "in_exact_region")
-    return _table(
-        "city | noise | method | what is known | stated | came true | region: stated | holds | "
-        "just 90 %",
-        (
-            (
-                *(row["city"], row["distortion"], f"`{row['method']}`", row["setting"]),
-                *(_share(row[name]) for name in names),
-            )
-            for row in rows
-        ),
+    return (
+        *(row["city"], row["distortion"], f"`{row['method']}`", row["setting"]),
+        *(_share(row[name]) for name in names),
     )
 
 
-def _answer_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | noise | queries | answered | right, of these",
-        (
-            (
-                *(row["city"], row["distortion"], f"{row['queries']:,}"),
-                *(_share(row["coverage"]), _share(row["precision"])),
-            )
-            for row in rows
-        ),
+def _answer_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["city"], row["distortion"], f"{row['queries']:,}"),
+        *(_share(row["coverage"]), _share(row["precision"])),
     )
 
 
 def _each_level(text: str, rows: Sequence[dict[str, Any]]) -> str:
-    """Fill in how many queries there are at each level."""
+    """Fill in the number of queries at each level."""
     return text.format(queries=rows[0]["queries"] // len(rows[0]["levels"])) if rows else text
 
 
 def _views_text(rows: Sequence[dict[str, Any]]) -> str:
-    """Fill in how many queries a line has, and how many photos a route."""
+    """Fill in the numbers of queries of a line and of photos of a route."""
     if not rows:
         return ""
     queries, photos = (max(row[name] for row in rows) for name in ("queries", "photos"))
     return _VIEWS.format(queries=f"{queries:,}", photos=photos)
 
 
-def _view_table(rows: Iterable[dict[str, Any]]) -> str:
-    def cell(row: Mapping[str, Any]) -> str:
-        shares = _share(row["p50"]), _share(row["p50_low"]), _share(row["p50_high"])
-        alone = f"; alone {_share(row['alone'])}" if "alone" in row else ""
-        return "{} ({}-{}){}".format(*shares, alone)
-
-    return _of_views(rows, cell)
+def _view_cell(row: Mapping[str, Any]) -> str:
+    last = f"; last only {_share(row[LAST_ONLY])}" if LAST_ONLY in row else ""
+    return f"{_share(row['p50'])} ({_share(row['p50_low'])}-{_share(row['p50_high'])}){last}"
 
 
-def _view_chance_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _of_views(
-        rows,
-        lambda row: (
-            _share(row["in_region"]) + (f", off {_share(row['off'])}" if row["off"] else "")
-        ),
-    )
+def _view_chance_cell(row: Mapping[str, Any]) -> str:
+    return _share(row["in_region"]) + (f", off {_share(row['off'])}" if row["off"] else "")
 
 
 def _bayes_text(rows: Sequence[dict[str, Any]]) -> str:
-    """Fill in how many queries a line has, and how many cells the city."""
+    """Fill in the numbers of queries of a line and of cells of the city."""
     if not rows:
         return ""
     return _BAYES.format(**{name: f"{rows[0][name]:,}" for name in ("queries", "cells")})
 
 
-def _bayes_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "degrees | ranges | detections | at most | by Bayes | the likelihood method | interval | "
-        "stated",
-        (
-            (
-                *(str(row["degrees"]), "yes" if row["ranges"] else "no"),
-                f"{row['detections']:.1f}",
-                f"{_share(row['limit'])} ± {_share(row['limit_error'])}",
-                *(_share(row["bayes"]), _share(row["ours"]), _interval(row)),
-                _share(row["stated"]),
-            )
-            for row in rows
-        ),
+def _bayes_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(str(row["degrees"]), "yes" if row["ranges"] else "no"),
+        f"{row['detections']:.1f}",
+        f"{_share(row['limit'])} ± {_share(row['limit_error'])}",
+        *(_share(row["bayes"]), _share(row["ours"]), _interval(row)),
+        _share(row["stated"]),
     )
 
 
-def _of_views(rows: Iterable[dict[str, Any]], cell: Callable[[Mapping[str, Any]], str]) -> str:
-    """Return a table with a line for each view, and a column for each thing that is told."""
-    columns = (NOT_TOLD, SECTORS, RANGES)
+def _view_table(cell: Callable[[Mapping[str, Any]], str], rows: Iterable[dict[str, Any]]) -> str:
+    """Return a table with a line for each kind of view, and a column for the inputs."""
+    columns = (FULL_TURN, SECTORS, RANGES)
     names = ("city", "seen_from", "photos", "degrees", "queries", "least", "heading")
     lines: dict[tuple[Any, ...], dict[str, str]] = {}
     for row in rows:
-        lines.setdefault(tuple(row[name] for name in names), {})[row["told"]] = cell(row)
-    return _table(
-        " | ".join(
-            ["city", "from", "photos", "degrees", "queries", "detections", "heading", *columns]
-        ),
-        (
-            [*map(str, key[:4]), f"{key[4]:,}", f"{key[5]} or more", key[6]]
-            + [values.get(column, "") for column in columns]
-            for key, values in lines.items()
-        ),
+        lines.setdefault(tuple(row[name] for name in names), {})[row[INPUTS]] = cell(row)
+    titles = ("city", "from", "photos", "degrees", "queries", "detections", "heading", *columns)
+    cells = (
+        [*map(str, key[:4]), f"{key[4]:,}", f"{key[5]} or more", key[6]]
+        + [values.get(column, "") for column in columns]
+        for key, values in lines.items()
     )
+    return _table(" | ".join(titles), list, cells)
 
 
 def _real_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | chance | queries | stated | came true | interval",
-        (
-            (
-                *(row["city"], f"{tenth['from']:g} to {tenth['to']:g}", f"{tenth['n']:,}"),
-                *(_share(tenth["stated"]), _share(tenth["true"])),
-                _interval(tenth),
-            )
-            for row in rows
-            for tenth in row["bins"]
-        ),
+    tenths = ({"city": row["city"], **tenth} for row in rows for tenth in row["bins"])
+    return _table(_REAL_HEAD, _real_cells, tenths)
+
+
+def _real_cells(tenth: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(tenth["city"], f"{tenth['from']:g} to {tenth['to']:g}", f"{tenth['n']:,}"),
+        *(_share(tenth["stated"]), _share(tenth["true"])),
+        _interval(tenth),
     )
 
 
-def _old_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | map | told | within 50 m | stated | answered | right, of these | interval | "
-        "right, of those below 0.99",
-        (
-            (
-                *(row["city"], row["map"], f"`{row['told']}`" if row["told"] else "nothing"),
-                *(_share(row["p50"]), _share(row["stated"])),
-                f"{row['answered']} of {row['queries']}",
-                f"{row['right'] / row['answered']:.3f}",
-                _interval(row),
-                f"{row['nearly_right']} of {row['nearly']}",
-            )
-            for row in rows
-        ),
+def _old_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["city"], row["map"], f"`{row[INPUTS]}`" if row[INPUTS] else "nothing"),
+        *(_share(row["p50"]), _share(row["stated"])),
+        f"{row['answered']} of {row['queries']}",
+        f"{row['right'] / row['answered']:.3f}",
+        _interval(row),
+        f"{row['nearly_right']} of {row['nearly']}",
     )
 
 
@@ -353,94 +314,54 @@ def _interval(values: Mapping[str, Any]) -> str:
     return "" if low is None else f"{_share(low)}-{_share(high)}"
 
 
-def _bar_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "city | what | wanted | came out | reached",
-        (
-            (
-                *(row["city"], row["what"]),
-                " to ".join(f"{end:g}" for end in (row["low"], row["high"]) if end is not None),
-                "infinite" if row["value"] is None else f"{row['value']:.3f}",
-                "yes" if row["met"] else "no",
-            )
-            for row in rows
-        ),
+def _bar_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        *(row["city"], row["what"]),
+        " to ".join(f"{end:g}" for end in (row["low"], row["high"]) if end is not None),
+        "infinite" if row["value"] is None else f"{row['value']:.3f}",
+        "yes" if row["met"] else "no",
     )
 
 
-def _speed_table(rows: Iterable[dict[str, Any]]) -> str:
-    return _table(
-        "what | ours | peer | times better | wanted | the paper",
-        (
-            (
-                row["name"],
-                f"{row['ours']:,.4g} {row['unit']}",
-                f"{row['peer']:,.4g} {row['unit']} ({row['peer_name']})",
-                f"{row['ratio']:.3g}",
-                "" if row["bar"] is None else f"{row['bar']:.3g}{'' if row['met'] else ', missed'}",
-                "" if row["paper"] is None else f"{row['paper']:,.4g} {row['unit']}",
-            )
-            for row in rows
-        ),
+def _speed_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    return (
+        row["name"],
+        f"{row['ours']:,.4g} {row['unit']}",
+        f"{row['peer']:,.4g} {row['unit']} ({row['peer_name']})",
+        f"{row['ratio']:.3g}",
+        "" if row["bar"] is None else f"{row['bar']:.3g}{'' if row['met'] else ', missed'}",
+        "" if row["paper"] is None else f"{row['paper']:,.4g} {row['unit']}",
     )
 
 
 def trust_page(text: str, rows: Iterable[dict[str, Any]]) -> str:
-    """Return the page of what can be relied on, with another table.
-
-    Parameters
-    ----------
-    text : str
-        The page as it is.
-    rows : iterable of dict
-        Rows of ``soak.json``.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return the page ``reliability.md`` with its table replaced, from rows of ``soak.json``."""
     before, _, rest = text.partition(_SOAK[0])
     after = rest.partition(_SOAK[1])[2]
     return f"{before}{_SOAK[0]}\n{soak_table(rows)}\n{_SOAK[1]}{after}"
 
 
 def soak_table(rows: Iterable[dict[str, Any]]) -> str:
-    """Return the table of a soak's trials.
-
-    Parameters
-    ----------
-    rows : iterable of dict
-        Rows of ``soak.json``.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return the table of the trials of a soak as Markdown, from rows of ``soak.json``."""
     rows = list(rows)
     counts = list(rows[0])[1:]
     total = {"part": "all"} | {name: sum(row[name] for row in rows) for name in counts}
     return _table(
         " | ".join(["trial", *counts]),
-        ([row["part"], *(f"{row[name]:,}" for name in counts)] for row in [*rows, total]),
+        lambda row: [row["part"], *(f"{row[name]:,}" for name in counts)],
+        [*rows, total],
     )
 
 
-def _table(head: str, rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; the columns of the head are parted by bars."""
+def _table(head: str, cells: Callable[[Any], Sequence[str]], rows: Iterable[Any]) -> str:
+    """Return a table with the cells of each row; the titles of `head` are separated by bars."""
     titles = head.split(" | ")
-    lines = [titles, ["---"] * len(titles), *rows]
+    lines = [titles, ["---"] * len(titles), *map(cells, rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
 def _share(value: float | None) -> str:
     return "" if value is None else f"{value:.3f}"
-
-
-def _results(name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads((FOLDER / name).read_text(encoding="utf-8"))
-    return rows
 
 
 if __name__ == "__main__":

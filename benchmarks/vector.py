@@ -1,6 +1,6 @@
-"""Published shapefiles read whole, beside fiona row by row: ``python -m benchmarks.vector FOLDER``.
+"""Time of reading shapefiles, compared with fiona: ``python -m benchmarks.vector FOLDER``.
 
-The folder holds zipped shapefiles, such as those of a city. Both read every field and geometry.
+The folder contains zipped shapefiles, for example of a city. Both read every field and geometry.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ REPEATS = 3
 
 
 def main() -> None:
-    """Measure the files of a folder, together and for the largest alone."""
+    """Measure all files of a folder, and the largest one."""
     files = [member for path in sorted(Path(sys.argv[1]).glob("*.zip")) for member in members(path)]
     layers = [(member, describe(member)) for member in files]
     largest = max(layers, key=lambda item: item[1].rows)
-    for name, some in (
+    for name, group in (
         (f"reading {len(layers)} published shapefiles", layers),
         (f"reading the largest, {largest[1].rows:,} rows", [largest]),
     ):
         print(
             compare(
                 name,
-                partial(_read_all, some, _whole),
-                partial(_read_all, some, read_each),
+                partial(_read_all, group, _whole),
+                partial(_read_all, group, read_each),
                 peer_name="fiona",
                 repeats=REPEATS,
             )
@@ -51,7 +51,7 @@ def _read_all(
 
 
 def _whole(member: Member, fields: Sequence[str], count: int) -> object:
-    """Read as `read_layer` does, again row by row where something could be damaged."""
+    """Read as the package does: whole, or row by row if a row may be damaged."""
     rows = read_whole(member, fields, count)
     return read_each(member, fields, count) if rows is None else rows
 

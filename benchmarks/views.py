@@ -1,26 +1,22 @@
-"""Measure how well views localize, not only full turns: ``python -m benchmarks.views``.
+"""Measure how well narrow views can be localized: ``python -m benchmarks.views``.
 
 A detector finds 80 % of the objects, misnames 10 % of these, is 4 degrees out and makes up one
-object in a full turn; a camera sees 70, 120 or 360 degrees. The likelihood method knows this noise.
-It takes what is seen for a full turn, or is told the sector, or rough distances, too, of the same
-queries. Results go to ``benchmarks/views.json``, line by line; lines that are there already stay,
-so that a run goes on where it was interrupted.
+object in a full turn; a camera sees 70, 120 or 360 degrees. The likelihood method has this noise
+model. It gets the same queries as if they were full turns, with their sectors, or with sectors and
+rough distances. Results are written to ``benchmarks/views.json``, line by line. Lines that are
+there are not measured again, so that an interrupted run continues.
 """
 
 from __future__ import annotations
 
-import argparse
 import functools
 import itertools
-import json
 import math
-import os
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +25,16 @@ import pandas as pd
 from benchmarks._accuracy_queries import straight_walk
 from benchmarks._accuracy_rows import Bar
 from benchmarks._cities import MONTPELLIER, PARIS_LIKE, made_up, made_up_streets, real
+from benchmarks._measuring import (
+    INPUTS,
+    LAST_ONLY,
+    add_geodata,
+    available_cities,
+    option_parser,
+    read_rows,
+    short,
+    write_rows,
+)
 from semsig_gis.core import wilson_interval
 from semsig_gis.database import ObjectStore, build_database, open_database, save_database
 from semsig_gis.evaluation import (
@@ -54,13 +60,14 @@ from semsig_gis.sources import CitySpec
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import QueryDistortion, SeenFrom
     from semsig_gis.localization import Location
 
-__all__ = ["NOT_TOLD", "RANGES", "SECTORS", "bars", "lines", "main"]
+__all__ = ["FULL_TURN", "RANGES", "SECTORS", "bars", "lines", "main"]
 
 NOISE = NoiseSpec(detection=0.8, misnamed=0.1, clutter=1.0, bearing_sigma=4.0, name="views")
 CITIES = (PARIS_LIKE, MONTPELLIER, "Helsinki")
@@ -69,38 +76,48 @@ MANY_SEEN = 5
 LEAST = (1, MANY_SEEN)
 KNOWN, OFF, UNKNOWN = "known", "10 degrees off", "unknown"
 NORTHS = {KNOWN: ("", 0.0), OFF: (", compass:10", 10.0), UNKNOWN: (", compass:360", math.inf)}
-NOT_TOLD, SECTORS, RANGES = "as a full turn", "sectors", "sectors and ranges"
+FULL_TURN, SECTORS, RANGES = "as a full turn", "sectors", "sectors and ranges"
 PHOTOS = 5
 NEAR_M = 50.0
 MANY, DECILE_OFF = 100, 0.05  # queries in a tenth of the chance, and how far off it may be
-LEAST_LUCK, LUCK_DRAWS = 0.05, 20_000  # below which it is more than luck; how often it is tried
-PARTS = 16  # of the queries of a line, that processes take
-SPARE = 40  # times the queries of a line are drawn at most, to find enough with five detections
+LEAST_LUCK, LUCK_DRAWS = 0.05, 20_000  # smallest chance that still is luck; number of draws
+PARTS = 16  # of the queries of a line, for the processes
+SPARE = 40  # at most 40 times as many queries are drawn, to get enough with five detections
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """What is asked: photos of so many degrees, the last of them with so many detections."""
+    """Queries of a line of the results.
+
+    `degrees` is the field of view of the photos, `least` the least number of detections in the last
+    photo, and `inputs` what the method gets: `FULL_TURN`, `SECTORS` or `RANGES`.
+    """
 
     seen_from: SeenFrom
     photos: int
     degrees: int
     least: int
     heading: str
-    told: str
+    inputs: str
 
     @property
     def chain(self) -> tuple[QueryDistortion, ...]:
-        """What happens to the queries; those of lines that differ in what is told are the same."""
-        told = ":told=false" if self.told == NOT_TOLD else ""
-        ranges = ", ranges:25" if self.told == RANGES else ""
-        text = f"detector:{NOISE.name}{ranges}, view:{self.degrees}{told}{NORTHS[self.heading][0]}"
-        return parse_chain(text, noises={NOISE.name: NOISE})
+        """Distortions of the queries; they are the same for all `inputs`."""
+        sector = ":told=false" if self.inputs == FULL_TURN else ""
+        ranges = ", ranges:25" if self.inputs == RANGES else ""
+        view = f"view:{self.degrees}{sector}{NORTHS[self.heading][0]}"
+        return parse_chain(f"detector:{NOISE.name}{ranges}, {view}", noises={NOISE.name: NOISE})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the line as values of a row of ``views.json``."""
+        values = asdict(self)
+        values[INPUTS] = values.pop("inputs")
+        return values
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class _Question:
-    """Views with the legs between them, and where the last one was seen."""
+    """Views with the legs between them, and the true place of the last one."""
 
     views: tuple[Signature, ...]
     legs: tuple[Leg, ...] = ()
@@ -109,38 +126,26 @@ class _Question:
 
 
 def main() -> None:
-    """Read the options, measure, print and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.views", description=__doc__)
-    parser.add_argument("--size", choices=["full", "small"], default="full")
+    """Measure, print and write."""
+    parser = option_parser("views", __doc__)
+    add_geodata(parser)
     parser.add_argument("--queries", type=int, metavar="N", help="of each line (default: by line)")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_name("views.json"))
-    parser.add_argument(
-        "--geodata",
-        type=Path,
-        default=os.environ.get("SEMSIG_GEODATA"),
-        metavar="FOLDER",
-        help="folder of open data (default: what SEMSIG_GEODATA names)",
-    )
     parser.add_argument("--city", choices=CITIES, action="append", help="default: all of them")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
     small = options.size == "small"
-    names = options.city or CITIES
-    if options.geodata is None:
-        names = [name for name in names if name == PARIS_LIKE]
-        print("Real cities are left out: SEMSIG_GEODATA does not name the folder of open data.")
-    rows = json.loads(options.out.read_text("utf-8")) if options.out.exists() else []
-    for name in names:
+    rows = read_rows(options.out)
+    for name in available_cities(options.city or CITIES, options.geodata, made_up=PARIS_LIKE):
         missing = {}
         for line in lines():
-            wanted = options.queries or (10 if small else _number(name, line))
-            case = {"city": name, **asdict(line), "wanted": wanted}
+            count = options.queries or (10 if small else _number(name, line))
+            case = {"city": name, **line.to_dict(), "wanted": count}
             if not any(case.items() <= row.items() for row in rows):
-                missing[line] = wanted
+                missing[line] = count
         for row in _rows(name, options.geodata, missing, options.processes, small=small):
             print(_text(row), flush=True)
             rows.append(row)
-            options.out.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+            write_rows(options.out, rows)
     for name, bar in bars(rows):
         print(f"{name}: {bar}")
 
@@ -149,31 +154,31 @@ def lines() -> Iterator[Line]:
     """Yield all lines of a city, those with the heading known first."""
     cells: SeenFrom = "cells"
     anywhere: SeenFrom = "anywhere"
-    for heading, seen_from in (*((one, cells) for one in NORTHS), (KNOWN, anywhere)):
+    for heading, seen_from in (*((north, cells) for north in NORTHS), (KNOWN, anywhere)):
         for degrees, least in itertools.product(DEGREES, LEAST):
-            for told in (NOT_TOLD, SECTORS, RANGES):
-                if not (degrees == DEGREES[-1] and told == SECTORS):  # which is the full turn
+            for inputs in (FULL_TURN, SECTORS, RANGES):
+                if not (degrees == DEGREES[-1] and inputs == SECTORS):  # the same as FULL_TURN
                     yield Line(
                         seen_from=seen_from,
                         photos=1,
                         degrees=degrees,
                         least=least,
                         heading=heading,
-                        told=told,
+                        inputs=inputs,
                     )
-    for told in (SECTORS, RANGES):
+    for inputs in (SECTORS, RANGES):
         yield Line(
             seen_from=cells,
             photos=PHOTOS,
             degrees=DEGREES[0],
             least=LEAST[0],
             heading=OFF,
-            told=told,
+            inputs=inputs,
         )
 
 
 def _number(city: str, line: Line) -> int:
-    """Return how many queries a line has, fewer where each takes longer or says less."""
+    """Return the number of queries of a line, fewer if each takes longer or contributes less."""
     if line.photos > 1:
         return 100
     if line.seen_from == "anywhere":
@@ -189,7 +194,7 @@ def _rows(
     *,
     small: bool,
 ) -> Iterator[dict[str, Any]]:
-    """Yield what came of lines with so many queries, one after the other."""
+    """Yield the row of each line, with its number of queries."""
     if not lines:
         return
     if name == PARIS_LIKE or geodata is None:
@@ -206,15 +211,15 @@ def _rows(
     ):
         file = f"{folder}/city.parquet"
         save_database(database, file)
-        for line, wanted in lines.items():
-            questions = _questions(database, store, line, wanted)
+        for line, count in lines.items():
+            questions = _questions(database, store, line, count)
             parts = [questions[start::PARTS] for start in range(min(PARTS, len(questions)))]
             answer = functools.partial(_answers, file, line.seen_from, line.heading)
             answers = pd.concat(pool.map(answer, parts))
             yield {
                 "city": name,
-                **asdict(line),
-                "wanted": wanted,
+                **line.to_dict(),
+                "wanted": count,
                 "cells": len(database),
                 **_figures(answers),
             }
@@ -223,9 +228,10 @@ def _rows(
 def _questions(
     database: SignatureDatabase, store: ObjectStore, line: Line, count: int
 ) -> list[_Question]:
-    """Return so many questions, or as many as there are in a city."""
-    drawn = _walks(database, line) if line.photos > 1 else _single(database, store, line, count)
-    enough = (one for one in drawn if len(one.views[-1]) >= line.least)
+    """Return at most `count` questions with enough detections."""
+    single = line.photos == 1
+    questions = _single(database, store, line, count) if single else _walks(database, line)
+    enough = (question for question in questions if len(question.views[-1]) >= line.least)
     return list(itertools.islice(enough, count))
 
 
@@ -241,19 +247,19 @@ def _single(
 
 
 def _walks(database: SignatureDatabase, line: Line) -> Iterator[_Question]:
-    """Yield straight ways along cells, each photo with a direction and a compass of its own."""
+    """Yield straight routes along cells, with another direction and compass for each photo."""
     rng = np.random.default_rng(0)
-    spoil = prepare_chain(line.chain, CitySights.of(database))
+    distort = prepare_chain(line.chain, CitySights.of(database))
     for start in rng.permutation(len(database)).tolist():
         cells = straight_walk(database, start, line.photos, np.random.default_rng([start, 1]))
         if cells:
             numbers = itertools.count(start * line.photos)
             sights = (Sight.of_cell(database, cell) for cell in cells)
-            seen = (spoil(one, 0, next(numbers)).signature for one in sights)
+            signatures = (distort(sight, 0, next(numbers)).signature for sight in sights)
             places = database.xy[cells]
             x, y = places[-1].tolist()
             yield _Question(
-                views=tuple(seen),
+                views=tuple(signatures),
                 legs=tuple(Leg(dx=dx, dy=dy) for dx, dy in np.diff(places, axis=0).tolist()),
                 cell=cells[-1],
                 xy=(x, y),
@@ -272,32 +278,36 @@ def _locator(file: str, seen_from: SeenFrom, heading: str) -> LikelihoodLocator:
 def _answers(
     file: str, seen_from: SeenFrom, heading: str, questions: Sequence[_Question]
 ) -> pd.DataFrame:
-    """Return what came of questions, one row each."""
+    """Return the outcomes of questions, one row each."""
     locator = _locator(file, seen_from, heading)
-    locator.locate(questions[0].views[-1])  # what is worked out once is not timed
+    locator.locate(questions[0].views[-1])  # one-time work is not timed
     rows = []
     for question in questions:
         start = time.process_time()
         if question.legs:
-            found = locator.locate_route(question.views, question.legs)[-1]
+            location = locator.locate_route(question.views, question.legs)[-1]
         else:
-            found = locator.locate(question.views[-1])
-        row = {"ms": 1e3 * (time.process_time() - start), "chance": found.answer.mass}
-        row |= {"right": _right(found, question), "in_region": _in_region(found, question.cell)}
+            location = locator.locate(question.views[-1])
+        row = {
+            "ms": 1e3 * (time.process_time() - start),
+            "chance": location.answer.mass,
+            "right": _right(location, question),
+            "in_region": _in_region(location, question.cell),
+        }
         if question.legs:
-            row["alone"] = _right(locator.locate(question.views[-1]), question)
+            row[LAST_ONLY] = _right(locator.locate(question.views[-1]), question)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _right(found: Location, question: _Question) -> float:
-    error = math.dist((found.answer.x, found.answer.y), question.xy)
+def _right(location: Location, question: _Question) -> float:
+    error = math.dist((location.answer.x, location.answer.y), question.xy)
     return float(round(error, 6) <= NEAR_M)
 
 
-def _in_region(found: Location, cell: int) -> float:
-    """Return the chance that a cell is in a region of just 90 %: its last cells are so in part."""
-    chances, region = found.chances, found.region
+def _in_region(location: Location, cell: int) -> float:
+    """Return the chance that a cell is in a region of exactly 90 %; its last cells are in part."""
+    chances, region = location.chances, location.region
     least, own = chances[region[-1]], chances[cell]
     if own != least:
         return float(own > least)
@@ -305,73 +315,61 @@ def _in_region(found: Location, cell: int) -> float:
 
 
 def _figures(answers: pd.DataFrame) -> dict[str, Any]:
-    """Return the figures of a line; ``off`` is how far the tenths with many queries are off."""
+    """Return the figures of a line; ``off`` is the largest error of tenths with many queries."""
     tenths = calibration_bins(answers)
     off = (tenths["stated"] - tenths["true"])[tenths["n"] >= MANY].abs()
     values: dict[str, Any] = {
         "queries": len(answers),
         **_interval("p50", answers["right"]),
-        "stated": _short(answers["chance"].mean()),
+        "stated": short(answers["chance"].mean()),
         **_interval("in_region", answers["in_region"]),
-        "off": None if off.empty else _short(off.max()),
-        "ms": _short(answers["ms"].mean()),
+        "off": None if off.empty else short(off.max()),
+        "ms": short(answers["ms"].mean()),
         "bins": [
-            {key: _short(value) for key, value in one.items()} for one in plain_records(tenths)
+            {key: short(value) for key, value in tenth.items()} for tenth in plain_records(tenths)
         ],
     }
-    if "alone" in answers:
-        values |= _interval("alone", answers["alone"])
+    if LAST_ONLY in answers:
+        values |= _interval(LAST_ONLY, answers[LAST_ONLY])
     return values
 
 
 def _interval(name: str, hits: pd.Series[float]) -> dict[str, float | None]:
     share = float(hits.mean())
     low, high = wilson_interval(share, len(hits))
-    return {name: _short(share), f"{name}_low": _short(low), f"{name}_high": _short(high)}
-
-
-def _short(value: float | None) -> float | None:
-    """Return a number to four digits."""
-    return value if value is None or isinstance(value, int) else float(f"{value:.4g}")
+    return {name: short(share), f"{name}_low": short(low), f"{name}_high": short(high)}
 
 
 def _text(row: dict[str, Any]) -> str:
-    """Return a line for people."""
+    """Return a row as text."""
     off = "" if row["off"] is None else f", tenths at most {row['off']:.3f} off"
-    alone = f" (the last photo alone {row['alone']:.3f})" if "alone" in row else ""
+    last = f" (only the last photo {row[LAST_ONLY]:.3f})" if LAST_ONLY in row else ""
     return (
         f"{row['city']}, from {row['seen_from']}, {row['photos']} x {row['degrees']} degrees, "
-        f"{row['least']} or more, heading {row['heading']}, {row['told']} (n={row['queries']}): "
-        f"within 50 m {row['p50']:.3f} [{row['p50_low']:.3f}, {row['p50_high']:.3f}]{alone}, "
+        f"{row['least']} or more, heading {row['heading']}, {row[INPUTS]} (n={row['queries']}): "
+        f"within 50 m {row['p50']:.3f} [{row['p50_low']:.3f}, {row['p50_high']:.3f}]{last}, "
         f"stated {row['stated']:.3f}{off}, in the region of 90 % {row['in_region']:.3f}, "
         f"{row['ms']:.3g} ms"
     )
 
 
 def bars(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Bar]]:
-    """Yield what was asked for of views, and what came out.
+    """Yield the bars of rows of ``views.json``, each with its city.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        Rows of ``views.json``.
-
-    Yields
-    ------
-    tuple of (str, Bar)
-        The city, and the bar: of shares in the Paris-like city, from cells; then, for every city,
-        whether the chances come true.
+    Shares have bars in the Paris-like city, from cells; chances have bars in every city.
     """
-    told = [row for row in rows if row["told"] != NOT_TOLD]
+    with_sectors = [row for row in rows if row[INPUTS] != FULL_TURN]
     like_paris = [row for row in rows if row["city"] == PARIS_LIKE and row["seen_from"] == "cells"]
     yield from ((PARIS_LIKE, bar) for bar in _share_bars(like_paris))
     for row in like_paris:
-        if "alone" in row:
-            ratio = row["p50"] / row["alone"] if row["alone"] else math.inf
-            what = f"route of {row['photos']} photos, {row['told']}, to the last one alone"
+        if LAST_ONLY in row:
+            ratio = row["p50"] / row[LAST_ONLY] if row[LAST_ONLY] else math.inf
+            what = f"route of {row['photos']} photos, {row[INPUTS]}, to only the last one"
             yield PARIS_LIKE, Bar(what=what, value=ratio, low=3.0)
-    for city, seen_from in dict.fromkeys((row["city"], row["seen_from"]) for row in told):
-        lines = [row for row in told if (row["city"], row["seen_from"]) == (city, seen_from)]
+    for city, seen_from in dict.fromkeys((row["city"], row["seen_from"]) for row in with_sectors):
+        lines = [
+            row for row in with_sectors if (row["city"], row["seen_from"]) == (city, seen_from)
+        ]
         offs = [row["off"] for row in lines if row["off"] is not None]
         if offs:
             what = f"from {seen_from}: tenths of the chance off, at most, in all lines"
@@ -381,38 +379,41 @@ def bars(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[str, Bar]]:
 
 
 def _luck(rows: Sequence[dict[str, Any]], off: float) -> float:
-    """Return how often exact chances would be off by `off` or more in a tenth of so many queries.
+    """Return how often exact chances would be off by `off` or more in any tenth of the rows.
 
     A tenth of 100 queries with a chance of a half is .05 off as often as not.
     """
-    tenths = [one for row in rows for one in row["bins"] if one["n"] >= MANY]
-    sizes, stated = (np.array([one[name] for one in tenths]) for name in ("n", "stated"))
+    tenths = [tenth for row in rows for tenth in row["bins"] if tenth["n"] >= MANY]
+    sizes, stated = (np.array([tenth[name] for tenth in tenths]) for name in ("n", "stated"))
     hits = np.random.default_rng(0).binomial(sizes, stated, (LUCK_DRAWS, len(sizes)))
     return float((np.abs(hits / sizes - stated).max(axis=1) >= off).mean())
 
 
 def _share_bars(rows: Iterable[dict[str, Any]]) -> Iterator[Bar]:
-    known = [row for row in rows if row["heading"] == KNOWN]
-    shares = {(row["degrees"], row["least"], row["told"]): row["p50"] for row in known}
+    shares = {
+        (row["degrees"], row["least"], row[INPUTS]): row["p50"]
+        for row in rows
+        if row["heading"] == KNOWN
+    }
     narrow, middle, full = DEGREES
-    for told, low, lowest in ((SECTORS, 4.0, 0.08), (RANGES, 9.0, 0.20)):
-        if {(middle, MANY_SEEN, told), (middle, MANY_SEEN, NOT_TOLD)} <= shares.keys():
-            before = shares[middle, MANY_SEEN, NOT_TOLD]
-            ratio = shares[middle, MANY_SEEN, told] / before if before else math.inf
-            what = f"{_what(middle, MANY_SEEN, told)}, to {NOT_TOLD}"
+    for inputs, low, lowest in ((SECTORS, 4.0, 0.08), (RANGES, 9.0, 0.20)):
+        if {(middle, MANY_SEEN, inputs), (middle, MANY_SEEN, FULL_TURN)} <= shares.keys():
+            before = shares[middle, MANY_SEEN, FULL_TURN]
+            ratio = shares[middle, MANY_SEEN, inputs] / before if before else math.inf
+            what = f"{_what(middle, MANY_SEEN, inputs)}, to {FULL_TURN}"
             yield Bar(what=what, value=ratio, low=low)
         for least in LEAST:
-            if (narrow, least, told) in shares:
-                value = shares[narrow, least, told]
-                yield Bar(what=_what(narrow, least, told), value=value, low=lowest)
+            if (narrow, least, inputs) in shares:
+                value = shares[narrow, least, inputs]
+                yield Bar(what=_what(narrow, least, inputs), value=value, low=lowest)
     for least in LEAST:
-        if {(full, least, RANGES), (full, least, NOT_TOLD)} <= shares.keys():
-            gain = shares[full, least, RANGES] - shares[full, least, NOT_TOLD]
+        if {(full, least, RANGES), (full, least, FULL_TURN)} <= shares.keys():
+            gain = shares[full, least, RANGES] - shares[full, least, FULL_TURN]
             yield Bar(what=f"{_what(full, least, RANGES)}, more than without", value=gain, low=0.1)
 
 
-def _what(degrees: int, least: int, told: str) -> str:
-    return f"{degrees} degrees, {least} or more, {told}"
+def _what(degrees: int, least: int, inputs: str) -> str:
+    return f"{degrees} degrees, {least} or more, {inputs}"
 
 
 if __name__ == "__main__":

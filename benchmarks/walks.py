@@ -5,14 +5,15 @@ objects), and from a query to its answer, by distance and by likelihood with its
 
 Each walk is the first of a fresh process, from the call of the command to its end. Counted are
 
-- functions: different functions and generators of semsig_gis that ran, those that ran because a
-  module was imported on the way included; lambdas, comprehensions, bodies of classes and modules
-  are not functions;
-- modules: the files that these functions are in;
-- changes: calls and returns of such functions, in their order, whose module is another than that
-  of the call or return before; a return counts for the function that ends.
+- functions: different functions and generators of semsig_gis that ran, including functions that ran
+  because a module was imported; lambdas, comprehensions, bodies of classes and modules are not
+  functions;
+- modules: the files of these functions;
+- changes: calls and returns of such functions, in their order, in another module than the call or
+  return before; a return counts for the function that ends.
 
-Also counted are the modules of semsig_gis that a plain `localize` loads, packages included.
+Also counted are the modules of semsig_gis that a plain `localize` loads, including packages. The
+fronts of packages load names by functions of lazy_loader, which are not counted.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ WALKS = {
 
 
 class _Walk:
-    """Where the calls and returns go; a profile function of Python."""
+    """Count calls and returns; a profile function of Python."""
 
     def __init__(self) -> None:
         self.functions: set[CodeType] = set()
@@ -81,9 +82,9 @@ class _Walk:
         self._module = ""
 
     def __call__(self, frame: FrameType, event: str, _: object) -> None:
-        """Take in a call or a return."""
+        """Count a call or a return."""
         code = frame.f_code
-        own = code.co_filename.startswith(SOURCE)  # not what dataclasses write
+        own = code.co_filename.startswith(SOURCE)  # not the methods that dataclasses generate
         function = code.co_flags & inspect.CO_OPTIMIZED and not code.co_name.startswith("<")
         if own and function and event in {"call", "return"}:
             self.functions.add(code)
@@ -97,13 +98,13 @@ class _Walk:
 
 
 def main() -> None:
-    """Read the options, count and print."""
+    """Count the walks, or with ``--commands`` one walk, and print."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--commands", nargs="+", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.commands:
-        print(json.dumps(_followed(options.commands)))
+        print(json.dumps(_count(options.commands)))
         return
     figures = _figures()
     if options.json:
@@ -118,7 +119,7 @@ def main() -> None:
 
 
 def _figures() -> dict[str, Any]:
-    """Count every walk in a process and a folder of its own."""
+    """Count every walk in a new process."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         (folder / "trees.csv").write_text(TREES, encoding="utf-8")
@@ -126,36 +127,33 @@ def _figures() -> dict[str, Any]:
         walks = {}
         for name, commands in WALKS.items():
             if commands == (LIKELIHOOD,):
-                _apart(folder, commands)  # builds the index
-            walks[name] = _apart(folder, commands)
+                _count_apart(folder, commands)  # builds the index
+            walks[name] = _count_apart(folder, commands)
     return {"walks": walks, "loaded": walks["query, by distance"]["loaded"]}
 
 
-def _apart(folder: Path, commands: tuple[str, ...]) -> dict[str, Any]:
-    """Run commands in a fresh process and return what they passed through."""
+def _count_apart(folder: Path, commands: tuple[str, ...]) -> dict[str, Any]:
+    """Return the counts of commands that run in a new process."""
     command = [sys.executable, "-P", str(Path(__file__).resolve()), "--commands", *commands]
-    done = subprocess.run(  # noqa: S603
-        command, cwd=folder, check=True, stdout=subprocess.PIPE, text=True
-    )
-    counts: dict[str, Any] = json.loads(done.stdout)
+    counts: dict[str, Any] = json.loads(subprocess.check_output(command, cwd=folder))  # noqa: S603
     return counts
 
 
-def _followed(commands: list[str]) -> dict[str, Any]:
-    """Run commands in this process and count what they pass through."""
+def _count(commands: list[str]) -> dict[str, Any]:
+    """Return the counts of commands that run in this process."""
     walk = _Walk()
     by_command = {}
     for command in commands:
         before = walk.changes
         sys.argv = ["semsig", *command.split()]
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             sys.setprofile(walk)
             try:
                 semsig()
             except SystemExit as end:
                 if end.code:
-                    raise RuntimeError(printed.getvalue()) from end
+                    raise RuntimeError(output.getvalue()) from end
             finally:
                 sys.setprofile(None)
         by_command[command.split()[0]] = walk.changes - before

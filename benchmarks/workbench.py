@@ -1,4 +1,4 @@
-"""The workbench in a browser: a photo is dropped, objects are marked, each change is answered."""
+"""Use the workbench in a browser: open a photo, mark objects, and time the answers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from benchmarks.street_photos import StreetPhoto
     from semsig_gis.database import City
 
-__all__ = ["asked", "photo_in", "serving"]
+__all__ = ["answer_times", "photo_in", "serving"]
 
 _TURNS = range(0, 360, 45)
 _PATIENCE_S = 60.0
@@ -50,12 +50,12 @@ const slider = document.getElementById(arguments[0]);
 slider.value = arguments[1];
 slider.dispatchEvent(new Event("input"));
 """
-_TIMES = "return performance.getEntriesByName('semsig-answer').map((one) => one.duration)"
+_TIMES = "return performance.getEntriesByName('semsig-answer').map((entry) => entry.duration)"
 
 
 @contextlib.contextmanager
 def serving(city: City) -> Iterator[str]:
-    """Serve the workbench of a city for as long as the block runs; return its address."""
+    """Serve the workbench of a city while the block runs; yield its address."""
     bench = Workbench(city=city, store=object_store(city, None, needed=False))
     bench.prepare()
     token = secrets.token_urlsafe(32)
@@ -71,7 +71,7 @@ def serving(city: City) -> Iterator[str]:
 
 
 def photo_in(city: City, folder: Path) -> StreetPhoto:
-    """Draw a photo from the cell that sees most classes, of the side where most can be marked."""
+    """Draw a photo from the cell with most classes, in the direction with most of them."""
     database = city.database
     types = database.type_sequences
     cell = int((types.histogram > 0).sum(axis=1)[types.inverse].argmax())
@@ -84,32 +84,32 @@ def photo_in(city: City, folder: Path) -> StreetPhoto:
     return street_photo(sight, database.taxonomy, heading=best, file=file)
 
 
-def asked(
-    browser: Chrome, address: str, photo: StreetPhoto, *, marks: int, known: bool
+def answer_times(
+    browser: Chrome, address: str, photo: StreetPhoto, *, marks: int, with_heading: bool
 ) -> list[float]:
-    """Open the page, drop a photo, mark some objects; return milliseconds from change to answer.
+    """Open a photo and mark some objects; return the milliseconds from each change to its answer.
 
-    Its heading is `known`, give or take ten degrees, or is not.
+    The heading of the photo is given, with an error of ten degrees, or is unknown.
     """
     browser.get(address)
     _settle(browser)
     browser.execute_script(_DROP, list(photo.file.read_bytes()), photo.file.name)
-    _settle(browser, seen=True)
+    _settle(browser, with_photo=True)
     browser.execute_script(_SLIDE, "fov", photo.fov)
-    if known:
+    if with_heading:
         Select(browser.find_element(By.ID, "heading-known")).select_by_value("known")
         browser.execute_script(_SLIDE, "heading", photo.heading)
     _settle(browser)
-    for symbol, (left, top, right, bottom) in photo.things[:marks]:
+    for symbol, (x_min, y_min, x_max, y_max) in photo.things[:marks]:
         stage = browser.find_element(By.CSS_SELECTOR, _STAGE)
         browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", stage)
         size = stage.size
         scale = size["width"] / WIDTH
         x, y = (
             round(corner * scale - size[side] / 2)
-            for corner, side in ((left, "width"), (top, "height"))
+            for corner, side in ((x_min, "width"), (y_min, "height"))
         )
-        wide, high = (max(round(edge * scale), 9) for edge in (right - left, bottom - top))
+        wide, high = (max(round(edge * scale), 9) for edge in (x_max - x_min, y_max - y_min))
         chain = ActionChains(browser, duration=0)
         chain.move_to_element_with_offset(stage, x, y).click_and_hold()
         chain.move_by_offset(wide, high).release().perform()
@@ -118,11 +118,11 @@ def asked(
     return list(browser.execute_script(_TIMES))
 
 
-def _settle(browser: Chrome, *, seen: bool = False) -> None:
-    """Wait until what changed is answered and, if `seen`, a photo is there."""
+def _settle(browser: Chrome, *, with_photo: bool = False) -> None:
+    """Wait until the last change is answered and, if `with_photo`, a photo is there."""
     end = time.monotonic() + _PATIENCE_S
-    while not browser.execute_script(_ANSWERED, seen):
+    while not browser.execute_script(_ANSWERED, with_photo):
         if time.monotonic() > end:
-            said = browser.find_element(By.ID, "notice").text
-            raise TimeoutError(f"the workbench did not answer within {_PATIENCE_S:g} s: {said}")
+            notice = browser.find_element(By.ID, "notice").text
+            raise TimeoutError(f"the workbench did not answer within {_PATIENCE_S:g} s: {notice}")
         time.sleep(0.02)

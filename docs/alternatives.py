@@ -1,4 +1,4 @@
-"""What pictures and commands of the pages get when they are read: alternatives, and a prompt."""
+"""Add text alternatives to the pictures of the pages, and a prompt to their shell commands."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ SHELL = "%%bash\n"
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Have every page transformed."""
+    """Register the transformations of every page."""
     app.connect("doctree-read", lambda _, page: _prompt(page))
     app.add_post_transform(Alternatives)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _prompt(page: nodes.document) -> None:
-    """Show cells of shell commands as a reader types them."""
+    """Show cells of shell commands with a prompt, as in a terminal."""
     for block in page.findall(nodes.literal_block):
         text = block.astext()
         if text.startswith(SHELL):
@@ -37,15 +37,15 @@ def _prompt(page: nodes.document) -> None:
 
 
 class Alternatives(SphinxPostTransform):
-    """Give each picture without an alternative the description that its drawing carries.
+    """Give each picture without an alternative the description in its SVG file.
 
-    Pictures of notebooks without one are called by the section that they are in.
+    The alternative of other pictures is the title of their section.
     """
 
     default_priority = 300  # after the outputs of notebooks have been chosen
 
     def run(self, **_: Any) -> None:  # noqa: ANN401
-        """Go through the pictures of a page."""
+        """Set the missing alternatives of the pictures of a page."""
         for image in self.document.findall(nodes.image):
             if not image.get("alt"):
                 image["alt"] = self._described(image)
@@ -53,9 +53,9 @@ class Alternatives(SphinxPostTransform):
     def _described(self, image: nodes.image) -> str:
         path = Path(self.app.srcdir, image["uri"])
         if path.suffix == ".svg" and path.is_file():
-            found = DESCRIPTION.search(path.read_text(encoding="utf-8"))
-            if found:
-                return unescape(found[1])
+            match = DESCRIPTION.search(path.read_text(encoding="utf-8"))
+            if match:
+                return unescape(match[1])
         parent = image.parent
         while not isinstance(parent, nodes.section):
             parent = parent.parent

@@ -1,8 +1,8 @@
 """Draw the packages and their imports: ``python docs/architecture.py``, into docs/images.
 
-Floors come from the import contract in pyproject.toml, roles from the packages' docstrings, arrows
-from the imports themselves. An arrow that longer ways imply is left out. With ``--check`` nothing
-is written, and the exit code is 1 if the picture is not of today's imports.
+Floors come from the import contract in pyproject.toml, roles from the docstrings of the packages,
+arrows from the imports. An arrow is left out if it follows from other arrows. With ``--check``
+nothing is written, and the exit code is 1 if the picture is out of date.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import grimp
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs/images/architecture.svg"
 WIDTH, FLOOR, ROOM, GAP = 960, 84, 50, 24
+LETTER = 7  # mean width of a letter in pixels
 STYLE = """
   text { font: 13px system-ui, sans-serif; fill: #222; text-anchor: middle; }
   .name { font-weight: 600; font-size: 15px; }
@@ -40,14 +41,15 @@ def floors() -> list[list[str]]:
     return [[name.strip() for name in layer.split("|")] for layer in layers]
 
 
-def role(package: str) -> str:
-    """Return the first line of a package's docstring."""
+def role(package: str, width: float) -> str:
+    """Return the first line of a package's docstring, up to its colon if it is too wide."""
     text = (ROOT / "semsig_gis" / package / "__init__.py").read_text(encoding="utf-8")
-    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0].rstrip(".")
+    line = (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0].rstrip(".")
+    return line if len(line) * LETTER <= width else line.partition(":")[0]
 
 
 def arrows(packages: list[str]) -> list[tuple[str, str]]:
-    """Return which package imports which, without what longer ways imply."""
+    """Return pairs of packages, the first importing the second, without implied pairs."""
     graph = grimp.build_graph("semsig_gis", cache_dir=None)
     imports = {name: set[str]() for name in packages}
     for module in graph.modules:
@@ -57,13 +59,13 @@ def arrows(packages: list[str]) -> list[tuple[str, str]]:
             if home and target and home != target:
                 imports[home[0]].add(target[0])
     reach: dict[str, set[str]] = {}
-    for name in reversed(packages):  # a package imports only what stands below it
+    for name in reversed(packages):  # a package imports only lower packages
         reach[name] = imports[name].union(*(reach[other] for other in imports[name]))
     return [
         (name, other)
         for name in packages
         for other in packages
-        if other in imports[name] and all(other not in reach[one] for one in imports[name])
+        if other in imports[name] and all(other not in reach[lower] for lower in imports[name])
     ]
 
 
@@ -80,7 +82,7 @@ def draw() -> str:
             rooms.append(
                 f'<rect x="{x:.0f}" y="{y}" width="{width:.0f}" height="{ROOM}"/>\n'
                 f'<text class="name" x="{x + width / 2:.0f}" y="{y + 20}">{name}</text>\n'
-                f'<text x="{x + width / 2:.0f}" y="{y + 39}">{escape(role(name))}</text>'
+                f'<text x="{x + width / 2:.0f}" y="{y + 39}">{escape(role(name, width))}</text>'
             )
     lines = []
     for name, other in arrows([name for names in rows for name in names]):
@@ -90,7 +92,7 @@ def draw() -> str:
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" role="img">',
-            "<title>The packages of semsig_gis, each above those that it imports</title>",
+            "<title>The packages of semsig_gis, each above the packages that it imports</title>",
             f"<style>{STYLE}</style>",
             HEAD,
             *lines,

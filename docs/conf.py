@@ -28,7 +28,7 @@ extensions = [
 exclude_patterns = ["_build"]
 default_role = "py:obj"
 nitpicky = True
-smartquotes = False  # would make a dash of the two hyphens of an option
+smartquotes = False  # would turn the two hyphens of an option into a dash
 nitpick_ignore_regex = [("py:obj", ".*")]  # in docstrings, names of parameters, too
 
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist"]
@@ -41,7 +41,7 @@ nb_merge_streams = True
 
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
-autodoc_typehints = "none"  # the docstrings say the types, with shapes and units
+autodoc_typehints = "none"  # the docstrings give the types, with shapes and units
 numpydoc_show_class_members = False  # autodoc lists them
 
 html_extra_path = ["../data_sources/catalog.schema.json"]  # editors ask for it

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 RESULTS = Path(__file__).resolve().parents[1] / "benchmarks"
 FOUND, RECALL = "P(error ≤ 50 m)", "recall@10 %"
 SHORT = {"types": "types", "angles": "angles", "types and angles, 5 %": "both"}
-FEWEST = 25  # queries, of which a share says something
+INPUTS = "told"  # key of the inputs of the method
+FEWEST = 25  # queries for which a share is drawn
 LEVELS = ("light", "medium", "strong")
 RIVALS = {
     "the paper's best method": "edit+edit:5%, order kept",
@@ -28,7 +29,7 @@ RIVALS = {
 
 
 def drawings() -> Iterable[sg.Plot]:
-    """Yield what is drawn; its files are called by its name."""
+    """Yield the plots; their names are the names of their files."""
     rows = _results("reproduction.json")
     ranges = {f"R = {metres} m": metres for metres in (20, 30, 40)}
     scales = {f"Q = {levels}": levels for levels in (8, 16, 24, 32)}
@@ -36,7 +37,7 @@ def drawings() -> Iterable[sg.Plot]:
         ("ranges", "ranges", ranges, "Visibility range", "visibility range (m)"),
         ("scales", "scales", scales, "Angle levels", "angle levels"),
     ):
-        yield _beside(rows, name, section=section, places=places, title=title, x_label=x_label)
+        yield _paper_plot(rows, name, section=section, places=places, title=title, x_label=x_label)
     for city in ("Paris-like", "Montpellier"):
         yield _rivals(_results("accuracy.json"), city)
     yield _chances(_results("chances.json"))
@@ -47,7 +48,7 @@ def _results(name: str) -> list[dict[str, Any]]:
     return rows
 
 
-def _beside(
+def _paper_plot(
     rows: Sequence[dict[str, Any]],
     name: str,
     *,
@@ -56,18 +57,18 @@ def _beside(
     title: str,
     x_label: str,
 ) -> sg.Plot:
-    """Return how often the paper's best method is right, ours beside the paper's figures."""
-    found = {
+    """Plot the share of queries placed by the paper's best method, in our run and in the paper."""
+    row_of = {
         row["row"]: row for row in rows if row["section"] == section and row["column"] == FOUND
     }
-    chosen = [(places[key], found[key]) for key in places]
+    points = [(places[key], row_of[key]) for key in places]
     return sg.Plot(
         name=name,
         title=f"{title}: queries placed within 50 m",
         x_label=x_label,
         y_label="share within 50 m",
-        curves=(_curve("ours", chosen, "ours", "low", "high"),),
-        paper=tuple((x, row["paper"], f"{row['paper']:.4f}") for x, row in chosen),
+        curves=(_curve("ours", points, "ours", "low", "high"),),
+        paper=tuple((x, row["paper"], f"{row['paper']:.4f}") for x, row in points),
         y_range=(0.0, 0.6),
     )
 
@@ -80,9 +81,9 @@ def times() -> Picture:
     title = "Time of one query among about 312,000 cells"
     with blank_figure(6.6, 4.4) as figure:
         axes = figure.add_axes((0.4, 0.17, 0.55, 0.74))
-        for whose, shift, colour in (("paper", 0.2, COLOURS[1]), ("ours", -0.2, COLOURS[0])):
-            widths = [row[whose] for row in rows]
-            axes.barh(places + shift, widths, height=0.38, color=colour, label=whose)
+        for column, shift, colour in (("paper", 0.2, COLOURS[1]), ("ours", -0.2, COLOURS[0])):
+            widths = [row[column] for row in rows]
+            axes.barh(places + shift, widths, height=0.38, color=colour, label=column)
             for place, width in zip(places, widths, strict=True):
                 axes.text(1.1 * width, place + shift, f"{width:,.1f}", va="center", size=7.5)
         axes.set(xscale="log", xlim=(0.5, 6000), xlabel="milliseconds", yticks=places)
@@ -92,14 +93,14 @@ def times() -> Picture:
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, frameon=False)
         figure.text(0.02, 0.95, title, weight="bold", size=10.5)
         pairs = zip(names, rows, strict=True)
-        told = (f"{name}: {row['ours']:.1f}, the paper {row['paper']:g}" for name, row in pairs)
-        return saved(figure, title=title, description=f"{title}, in ms. {'; '.join(told)}.")
+        values = (f"{name}: {row['ours']:.1f}, the paper {row['paper']:g}" for name, row in pairs)
+        return saved(figure, title=title, description=f"{title}, in ms. {'; '.join(values)}.")
 
 
 def _rivals(rows: Sequence[dict[str, Any]], city: str) -> sg.Plot:
-    """Return how often two methods place the same queries, by how badly these are spoiled."""
+    """Plot the share of queries that two methods place, by the number of errors in a query."""
     setting = "north known; on the grid"
-    found = {
+    row_of = {
         (row["method"], row["distortion"]): row
         for row in rows
         if row["city"] == city and row["setting"] == setting and row["coverage"] is None
@@ -107,7 +108,7 @@ def _rivals(rows: Sequence[dict[str, Any]], city: str) -> sg.Plot:
     curves = tuple(
         _curve(
             label,
-            [(place, found[method, level]) for place, level in enumerate(LEVELS, 1)],
+            [(place, row_of[method, level]) for place, level in enumerate(LEVELS, 1)],
             *("p50", "p50_low", "p50_high"),
         )
         for label, method in RIVALS.items()
@@ -124,7 +125,7 @@ def _rivals(rows: Sequence[dict[str, Any]], city: str) -> sg.Plot:
 
 
 def _chances(rows: Sequence[dict[str, Any]]) -> sg.Plot:
-    """Return how often stated chances come true, on maps of the day."""
+    """Plot how often stated chances come true, for maps that are not old."""
     curves = tuple(
         _curve(
             row["city"],
@@ -145,14 +146,14 @@ def _chances(rows: Sequence[dict[str, Any]]) -> sg.Plot:
 
 
 def ages() -> Picture:
-    """Draw how many of the sure answers are right on old maps, by what is known of their age."""
+    """Draw the share of sure answers that are right on old maps, with and without their age."""
     rows = [
         row
         for row in _results("chances.json")
         if row["map"] != "of the day" and row["city"] != "made up"
     ]
-    rows.sort(key=lambda row: (row["city"], row["told"]))
-    names = [f"{row['city']}: {row['told'] or row['map'] + ', age not given'}" for row in rows]
+    rows.sort(key=lambda row: (row["city"], row[INPUTS]))
+    names = [f"{row['city']}: {row[INPUTS] or row['map'] + ', age not given'}" for row in rows]
     places = np.arange(len(rows))[::-1]
     shares = np.array([row["right"] / row["answered"] for row in rows])
     ends = np.array([[row["low"], row["high"]] for row in rows]).T
@@ -175,14 +176,14 @@ def ages() -> Picture:
 def _curve(
     label: str, rows: Iterable[tuple[float, dict[str, Any]]], y: str, low: str, high: str
 ) -> sg.Curve:
-    xs, found = zip(*rows, strict=True)
-    values = ([row[key] for row in found] for key in (y, low, high))
+    xs, points = zip(*rows, strict=True)
+    values = ([row[key] for row in points] for key in (y, low, high))
     ys, lows, highs = (tuple(column) for column in values)
     return sg.Curve(label=label, x=tuple(xs), y=ys, low=lows, high=highs)
 
 
 def write_drawings(folder: Path) -> None:
-    """Draw all into a folder; a file that is the same is left."""
+    """Draw all figures into a folder; files with the same contents are not written again."""
     folder.mkdir(exist_ok=True)
     pictures = {plot.name: sg.draw_plot(plot) for plot in drawings()} | {
         "times": times(),

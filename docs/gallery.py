@@ -1,7 +1,7 @@
-"""Run what `gallery.md` says: its commands and its Python, in order, in an empty folder.
+"""Run the commands and the Python code of `gallery.md`, in order, in an empty folder.
 
-The pages that they write are put beside the built page; they are made anew when the text or the
-package has changed.
+The pages that they write are copied to a folder next to the built page. They are written again only
+if the text or the package has changed.
 """
 
 from __future__ import annotations
@@ -24,41 +24,35 @@ SHOWN = {".html", ".svg"}
 
 
 def package_hash() -> str:
-    """Return what tells one state of the package from another."""
+    """Hash of the files of the package, the same only if they are the same."""
     files = [*ROOT.glob("semsig_gis/**/*"), *ROOT.glob("data_sources/**/*")]
-    told = hashlib.sha256()
+    digest = hashlib.sha256()
     for path in sorted(files):
         if path.is_file() and "__pycache__" not in path.parts:
-            told.update(path.read_bytes())
-    return told.hexdigest()[:16]
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def write_gallery(folder: Path) -> None:
-    """Write the pages into a folder, unless they are there of the same text and package."""
+    """Write the pages into a folder, unless the text and the package have not changed."""
     text = PAGE.read_text(encoding="utf-8")
     mark = folder / ".made"
-    made = hashlib.sha256(f"{package_hash()}{text}".encode()).hexdigest()
-    if mark.is_file() and mark.read_text(encoding="utf-8") == made:
+    state = hashlib.sha256(f"{package_hash()}{text}".encode()).hexdigest()
+    if mark.is_file() and mark.read_text(encoding="utf-8") == state:
         return
     with tempfile.TemporaryDirectory() as place:
         for kind, code in BLOCK.findall(text):
-            run = _commands if kind == "console" else _python
-            run(code, Path(place))
+            if kind == "python":
+                _run([sys.executable, "-c", code], Path(place))
+                continue
+            for line in code.splitlines():
+                _run(shlex.split(line.removeprefix("$ ")), Path(place))
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         for path in Path(place).iterdir():
             if path.suffix in SHOWN:
                 shutil.copy(path, folder)
-    mark.write_text(made, encoding="utf-8")
-
-
-def _commands(code: str, place: Path) -> None:
-    for line in code.splitlines():
-        _run(shlex.split(line.removeprefix("$ ")), place)
-
-
-def _python(code: str, place: Path) -> None:
-    _run([sys.executable, "-c", code], place)
+    mark.write_text(state, encoding="utf-8")
 
 
 def _run(command: list[str], place: Path) -> None:

@@ -1,4 +1,4 @@
-"""The pages that the build writes before it reads any: commands, public names, notebooks."""
+"""Write the pages that the build generates: commands, public names, notebooks."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[1]
 WRITTEN = ("api", "commands", "notebooks")
 NOTES = re.compile(r"\s*\[([^\[\]]+)\]$")
-# What the theme leaves out, and who cannot see or has no mouse needs.
-NAMED = {
+# Labels and keyboard focus that the theme lacks, for readers who use no screen or no mouse.
+LABELS = {
     '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Site">',
     '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
     'role="heading">': 'role="heading" aria-level="2">',
@@ -37,7 +37,7 @@ NAMED = {
     '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
 }
 COLOURS = 64  # enough for figures and maps
-# What pictures of matplotlib and the style of notebooks have without showing it.
+# Parts of matplotlib's pictures and of the style of notebooks that are never visible.
 UNSEEN = {
     ".svg": re.compile(
         r"""<path[ ]d="M[ ][\d.]+[ ][\d.]+[ ]\n"[^>]*/>  # a line of one point
@@ -56,8 +56,9 @@ Every step is one command. `semsig COMMAND --help` prints what these pages say.
 """
 API = """# Python names
 
-Every public name is imported from `semsig_gis`, whichever package defines it. What a module holds
-beside it may change without notice.
+The most used names are imported from `semsig_gis` and listed here, by the package that defines
+them. Each package exports more names, such as `semsig_gis.localization.search_regions`; `dir` lists
+them. Names that are only in modules may change without notice.
 
 ```python
 import semsig_gis as sg
@@ -79,20 +80,20 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def _forget(folder: Path) -> None:
-    """Remove the style of notebooks that a build before made light, which is copied again."""
+    """Remove the notebook styles that the last build made smaller; they are copied again."""
     for path in folder.glob("_static/mystnb*.css"):
         path.unlink()
 
 
 def _finish(app: Sphinx, error: Exception | None) -> None:
-    """Name the parts of the pages that were written, lighten pictures, and draw the maps."""
+    """Label the parts of the written pages, make pictures smaller, and draw the maps."""
     for path in Path(app.outdir).rglob("*.html"):
         text = path.read_text(encoding="utf-8")
-        named = text
-        for part, name in NAMED.items():
-            named = named.replace(part, name)
-        if named != text:
-            path.write_text(named, encoding="utf-8")
+        labelled = text
+        for part, name in LABELS.items():
+            labelled = labelled.replace(part, name)
+        if labelled != text:
+            path.write_text(labelled, encoding="utf-8")
     for path in [
         *Path(app.outdir).glob("_images/*.svg"),
         *Path(app.outdir).glob("_static/mystnb*.css"),
@@ -109,16 +110,16 @@ def _finish(app: Sphinx, error: Exception | None) -> None:
 
 
 def _lighten(*event: Any) -> None:  # noqa: ANN401
-    """Leave out the style of notebooks, which is large, where there is none."""
+    """Leave out the style of notebooks, which is large, on pages without a notebook cell."""
     *_, context, doctree = event
     parts = () if doctree is None else doctree.findall(nodes.Element)
     if not any("cell" in part["classes"] for part in parts):
         styles = context["css_files"]
-        context["css_files"] = [one for one in styles if "mystnb" not in str(one.filename)]
+        context["css_files"] = [style for style in styles if "mystnb" not in str(style.filename)]
 
 
 def write_pages(docs: Path) -> None:
-    """Write the folders of `WRITTEN`; a page that is the same is left, and so not read again."""
+    """Write the folders of `WRITTEN`; an unchanged page is not written, and so not read again."""
     pages = {
         **{f"commands/{name}.md": text for name, text in command_pages()},
         **{f"api/{name}.md": text for name, text in api_pages()},
@@ -138,7 +139,7 @@ def write_pages(docs: Path) -> None:
 
 
 def listed(head: str, entries: Mapping[str, tuple[str, str]]) -> str:
-    """Return a page with a row for each page beside it: what it is called, and a line of it."""
+    """Return a page with a table of the pages in its folder: name, and first line."""
     rows = [f"| [`{name}`]({page}.md) | {marked(line)} |" for page, (name, line) in entries.items()]
     table = "\n".join(["| Name | What it does |", "| --- | --- |", *rows])
     pages = "\n".join(entries)
@@ -151,7 +152,7 @@ def listed(head: str, entries: Mapping[str, tuple[str, str]]) -> str:
 def command_pages() -> Iterable[tuple[str, str]]:
     """Yield the name and the text of the page of every command, and of their list."""
     group: Any = typer.main.get_command(semsig)
-    lines = {name: one.help.partition("\n")[0] for name, one in group.commands.items()}
+    lines = {name: command.help.partition("\n")[0] for name, command in group.commands.items()}
     yield "index", listed(COMMANDS, {name: (f"semsig {name}", lines[name]) for name in lines})
     for name, command in group.commands.items():
         yield name, command_page(f"semsig {name}", command)
@@ -170,24 +171,24 @@ def command_page(name: str, command: Any) -> str:  # noqa: ANN401
         heading = headings.pop(parameter.param_type_name, None)
         if heading:
             parts.append(f"## {heading}\n")
-        written, said = parameter.get_help_record(context)
-        option = written.replace(" / ", ", ")
-        parts.append(f"````{{option}} {option}\n{described(said)}\n````\n")
+        flags, text = parameter.get_help_record(context)
+        option = flags.replace(" / ", ", ")
+        parts.append(f"````{{option}} {option}\n{described(text)}\n````\n")
     return "\n".join(parts)
 
 
-def described(said: str) -> str:
-    """Return what is said of an option, and in a line of its own what it takes by default."""
+def described(text: str) -> str:
+    """Return the help of an option, with its default and its range on lines of their own."""
     notes: list[str] = []
-    while found := NOTES.search(said):
-        said = said[: found.start()]
-        notes[:0] = [RANGE.sub(r"from \1 to \2", note) for note in found[1].split("; ")]
+    while match := NOTES.search(text):
+        text = text[: match.start()]
+        notes[:0] = [RANGE.sub(r"from \1 to \2", note) for note in match[1].split("; ")]
     lines = [note[0].upper() + note[1:] for note in notes]
-    return marked(said) + "".join(f"\n\n*{marked(line)}.*" for line in lines)
+    return marked(text) + "".join(f"\n\n*{marked(line)}.*" for line in lines)
 
 
 def marked(text: str) -> str:
-    """Return plain text as Markdown; what is between backticks stays."""
+    """Return plain text as Markdown; text between backticks is not changed."""
     parts = text.split("`")
     parts[::2] = [re.sub(r"([\\*_<>\[\]|#{}~$])", r"\\\1", part) for part in parts[::2]]
     return "`".join(parts)
@@ -197,19 +198,19 @@ def marked(text: str) -> str:
 
 
 def public_names() -> dict[str, list[str]]:
-    """Return the public names by the package that defines them, in the order of the flow."""
+    """Return the public names by package, in the order of the stub."""
     stub = ROOT / "semsig_gis/__init__.pyi"
     names: defaultdict[str, list[str]] = defaultdict(list)
     for node in ast.parse(stub.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module:
-            names[node.module.partition(".")[0]] += [one.name for one in node.names]
+            names[node.module.partition(".")[0]] += [alias.name for alias in node.names]
     return names
 
 
 def api_pages() -> Iterable[tuple[str, str]]:
     """Yield the name and the text of the page of every package, and of their list."""
     packages = public_names()
-    yield "index", listed(API, {one: (one, package_line(one)) for one in packages})
+    yield "index", listed(API, {package: (package, package_line(package)) for package in packages})
     for package, names in packages.items():
         yield package, api_page(package, names)
 
@@ -225,11 +226,11 @@ def api_page(package: str, names: list[str]) -> str:
     lines = [".. currentmodule:: semsig_gis", "", ".. autosummary::", ""]
     lines += [f"   {name}" for name in names]
     for name in names:
-        one = getattr(semsig_gis, name)
-        if inspect.isclass(one):
+        member = getattr(semsig_gis, name)
+        if inspect.isclass(member):
             lines += ["", f".. autoclass:: {name}", "   :members:"]
         else:
-            lines += ["", f".. auto{'function' if callable(one) else 'data'}:: {name}"]
+            lines += ["", f".. auto{'function' if callable(member) else 'data'}:: {name}"]
     rst = "\n".join(lines)
     return f"# `{package}`\n\n{package_line(package)}\n\n```{{eval-rst}}\n{rst}\n```\n"
 
@@ -238,7 +239,7 @@ def api_page(package: str, names: list[str]) -> str:
 
 
 def notebooks_page() -> str:
-    """Return the list of the notebooks, with those beside it as its pages."""
+    """Return the page that lists the notebooks."""
     text = (ROOT / "notebooks/README.md").read_text(encoding="utf-8")
     names = "\n".join(sorted(path.name for path in ROOT.glob("notebooks/*.ipynb")))
     return f"{text}\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"

@@ -1,7 +1,7 @@
 """Take the pictures of maps that the site shows, in Chromium: ``python docs/thumbnails.py``.
 
-Those of the gallery are of what ``make docs`` wrote. ``--hero MAP`` takes the picture of the first
-page instead, of a map that ``semsig map city.parquet --ambiguity`` drew of Montpellier.
+By default, these are the pictures of the gallery that ``make docs`` wrote. ``--hero MAP`` takes the
+picture of the first page instead: a map of Montpellier by ``semsig map city.parquet --ambiguity``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ HERO = IMAGES / "hero.webp"
 HERO_SIZE, THUMBNAIL_SIZE = (1280, 640), (900, 600)
 THUMBNAIL_WIDTH = 450
 QUALITY = 72
-SETTLED_S = 4.0  # until what moves and fades is at rest
+SETTLED_S = 4.0  # until all animations have ended
 
 
 def main() -> None:
@@ -51,10 +51,10 @@ def main() -> None:
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
         browser.get(page.resolve().as_uri())
         time.sleep(SETTLED_S)
-        taken = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
-        height = round(taken.height * width / taken.width)
+        picture = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
+        height = round(picture.height * width / picture.width)
         target.parent.mkdir(exist_ok=True)
-        taken.resize((width, height), Image.Resampling.LANCZOS).save(target, quality=QUALITY)
+        picture.resize((width, height), Image.Resampling.LANCZOS).save(target, quality=QUALITY)
         print(f"{target.relative_to(DOCS)}: {target.stat().st_size / 1000:.0f} kB")  # noqa: T201
     browser.quit()
 

@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
     from distributed import LocalCluster
     from selenium.webdriver import Chrome
+    from servers import Server
 
     Run = Callable[..., tuple[int, str, str]]
     RunOk = Callable[..., str]
 
-# QGIS runs these with its own Python.
-collect_ignore = ["qgis_draw.py", "qgis_plugin/qgis_session.py"]
+# QGIS runs it with its own Python.
+collect_ignore = ["qgis_plugin/qgis_session.py"]
 
 # Twenty examples are enough in a suite that is run many times. To try five hundred:
 # pytest -m hypothesis --hypothesis-profile semsig-soak
@@ -168,6 +169,15 @@ def run_ok(run: Run) -> RunOk:
         return out
 
     return call
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    """Return a server on this machine."""
+    from servers import Server
+
+    with Server() as running:
+        yield running
 
 
 @pytest.fixture

@@ -1,8 +1,8 @@
-"""Commands that die in the middle: killed just before the n-th thing that they do to files.
+"""Run commands that are killed just before their n-th change to files.
 
-A process of its own has loaded all modules, and forks a child for every command, so that one kill
-takes a tenth of a second. Only what Python does is counted: libraries write into files that Python
-code has made room for and renames afterwards.
+A server process has imported all modules and forks a child for each command, so that one run takes
+a tenth of a second. Only changes by Python code are counted: libraries write into temporary files
+that Python code creates before and renames afterwards.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ ROOT = Path(__file__).parents[1]
 def killed_at(
     number: int, command: str, *, cwd: Path, env: Mapping[str, str] | None = None
 ) -> Ending:
-    """Run a command that is killed just before its change to files of that number, from 1 on.
+    """Run a command that is killed just before a change to files, numbered from 1.
 
-    With 0, or if there are fewer changes, it runs to its end. `command` are the arguments of
+    With 0, or if there are fewer changes, it runs to its end. `command` contains the arguments of
     ``semsig``; `env` is added to the environment.
     """
     from benchmarks._soak_runs import Ending
@@ -65,7 +65,7 @@ def _stop(server: subprocess.Popen[str]) -> None:
 
 
 def _serve() -> None:
-    """Answer each order on the standard input with how the command ended."""
+    """Run each command from the standard input, and print how it ended."""
     from benchmarks._soak_runs import Stop, load_all, run
 
     load_all()

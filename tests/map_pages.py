@@ -70,11 +70,30 @@ ASK = Path(__file__).with_name("map_pages.js").read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)
-class MapPage:
-    """A self-contained page with a map, open in a browser."""
+class BrowserPage:
+    """A page in a browser that saves files in a folder."""
 
     browser: Chrome
     folder: Path
+
+    def ask(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
+        """Return what a script returns."""
+        return self.browser.execute_script(script, *arguments)
+
+    def one(self, selector: str) -> WebElement:
+        return self.browser.find_element(By.CSS_SELECTOR, selector)
+
+    def all(self, selector: str) -> list[WebElement]:
+        return self.browser.find_elements(By.CSS_SELECTOR, selector)
+
+    def text(self, selector: str) -> str:
+        """Return the text of the first such element, even if it is hidden."""
+        return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
+
+
+@dataclass(frozen=True)
+class MapPage(BrowserPage):
+    """A self-contained page with a map."""
 
     def open(self, map_: folium.Map) -> None:
         """Save a map as a self-contained page and open it; an alert fails the next command."""
@@ -100,8 +119,8 @@ class MapPage:
         """Return what a script passes to its last argument, a callback."""
         return self.browser.execute_async_script(ASK + script, *arguments)
 
-    def ask(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
-        return self.browser.execute_script(ASK + script, *arguments)
+    def ask(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
+        return super().ask(ASK + script, *arguments)
 
     def circles(self, kind: str) -> int:
         """Return the number of circles of a colour, or of queries with an outcome."""
@@ -111,16 +130,6 @@ class MapPage:
         """Return the number of pixels of about this colour on a canvas, by default the circles'."""
         self.rest()
         return int(self.ask("return drawn(...arguments)", colour, canvas))
-
-    def one(self, selector: str) -> WebElement:
-        return self.browser.find_element(By.CSS_SELECTOR, selector)
-
-    def all(self, selector: str) -> list[WebElement]:
-        return self.browser.find_elements(By.CSS_SELECTOR, selector)
-
-    def text(self, selector: str) -> str:
-        """Return the text of the first such element, even if it is hidden."""
-        return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
 
     def texts(self, selector: str) -> list[str]:
         """Return the visible texts of all such elements, in a single fast request."""

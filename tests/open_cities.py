@@ -7,6 +7,7 @@ import io
 import json
 from typing import TYPE_CHECKING, Any
 
+from geojson import collection, feature, point
 from servers import Answer
 from stand_ins import sent
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
+    from geojson import Feature
     from servers import Request, Server
 
     from semsig_gis.sources import LayerSpec
@@ -105,28 +107,14 @@ CITIES: dict[str, tuple[tuple[float, float], dict[str, tuple[str, list[Any], lis
 AXES = {"new_york": ("longitude", "latitude"), "barcelona": ("longitud", "latitud")}
 
 
-Feature = dict[str, Any]
-
-
 def features_of(name: str) -> dict[str, list[Feature]]:
     """Return the features of each layer of a city, good and bad, each at a place of its own."""
     (x, y), layers = CITIES[name]
-    places = ([x + n * 1e-4, y + m * 1e-4] for m in range(20) for n in range(5))
+    places = ((x + n * 1e-4, y + m * 1e-4) for m in range(20) for n in range(5))
     return {
-        layer: [
-            {
-                "type": "Feature",
-                "properties": row,
-                "geometry": {"type": "Point", "coordinates": next(places)},
-            }
-            for row in (*good, *bad)
-        ]
+        layer: [feature(point(*next(places)), row) for row in (*good, *bad)]
         for layer, (_, good, bad) in layers.items()
     }
-
-
-def collection(features: Iterable[Feature], **members: object) -> dict[str, Any]:
-    return {"type": "FeatureCollection", "features": list(features), **members}
 
 
 def as_csv(features: Iterable[Feature], axes: tuple[str, str]) -> str:
@@ -162,7 +150,7 @@ def serve(server: Server, name: str, reader: str, specs: Iterable[LayerSpec]) ->
     return SERVICES[reader](server, datasets, AXES.get(name, ("x", "y")))
 
 
-Datasets = dict[str, list[Feature]]
+Datasets = dict[str, "list[Feature]"]
 
 
 def _fields(features: Iterable[Feature]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Raw layers, as readers return them, from geometries."""
+"""Raw layers, as readers return them, from geometries, and catalogues of few layers."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import numpy as np
+import shapely
 
-from semsig_gis.sources import LayerSpec, RawLayer, RowCounts
+from semsig_gis.sources import Catalog, LayerSpec, RawLayer, RowCounts, paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,3 +49,24 @@ def raw_layer(
         errors=tuple(f"row {row}: broken" for row in range(min(unreadable, 10))),
         notes=notes,
     )
+
+
+def ids(layer: RawLayer) -> list[str]:
+    """Return the identifiers of the rows."""
+    texts: list[str] = layer.table["source_id"].tolist()
+    return texts
+
+
+def xy(layer: RawLayer) -> list[tuple[float, float]]:
+    """Return the centroids of the rows."""
+    points = shapely.get_coordinates(shapely.centroid(layer.table.geometry.array))
+    return [(x, y) for x, y in points.round(9).tolist()]
+
+
+BENCHES = LayerSpec(name="benches", class_name="bench")
+
+
+def catalog_of(**values: object) -> Catalog:
+    """Return a catalogue with one layer, or with other values."""
+    plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (BENCHES,)}
+    return Catalog(**{**plain, **values})  # type: ignore[arg-type]

@@ -7,11 +7,13 @@ import re
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
+from geojson import collection, feature, point
 from servers import Answer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from geojson import Feature
     from servers import Request, Server
 
 Row = dict[str, Any]
@@ -40,17 +42,9 @@ def properties(row: Row, fields: Sequence[str] = FIELDS) -> Row:
     return {name: row[name] for name in fields}
 
 
-def features(rows: Sequence[Row], fields: Sequence[str] = FIELDS) -> list[dict[str, Any]]:
+def features(rows: Sequence[Row], fields: Sequence[str] = FIELDS) -> list[Feature]:
     """Return rows as GeoJSON."""
-    return [
-        {
-            "type": "Feature",
-            "id": row["OBJECTID"],
-            "geometry": {"type": "Point", "coordinates": list(row["xy"])},
-            "properties": properties(row, fields),
-        }
-        for row in rows
-    ]
+    return [feature(point(*row["xy"]), properties(row, fields), id=row["OBJECTID"]) for row in rows]
 
 
 class StandIn:
@@ -65,6 +59,9 @@ class StandIn:
     wrong = ""
     # The names in the answer to a wrong `dataset`.
     others: tuple[str, ...] = ()
+    # The filter of the service that selects lamps, and the terms that it states.
+    only_lamps = "KIND = 'lamp'"
+    terms = ""
     limit = 2
     # Whether it can clip to an area.
     cuts = True
@@ -117,6 +114,8 @@ class ArcGIS(StandIn):
     dataset = "Street/FeatureServer/Lamps"
     wrong = "Street/FeatureServer/Lampposts"
     others = ("0 (Lamps)", "3 (Kerbs)")
+    only_lamps = "KIND='lamp'"
+    terms = "City of Somewhere (unknown)"
     geojson = True
     paging = True
 
@@ -160,7 +159,7 @@ class ArcGIS(StandIn):
             assert (query["inSR"], query["spatialRel"]) == ("4326", "esriSpatialRelIntersects")
             west, south, east, north = map(float, query["geometry"].split(","))
             rows = self.inside(west, south, east, north)
-        if query["where"] == "KIND='lamp'":
+        if query["where"] == self.only_lamps:
             rows = [row for row in rows if row["KIND"] == "lamp"]
         elif query["where"] != "1=1":
             details = ["'where' clause is invalid"]
@@ -178,11 +177,7 @@ class ArcGIS(StandIn):
         names = FIELDS if query["outFields"] == "*" else query["outFields"].split(",")
         if query["f"] == "geojson":
             more_rows = {"properties": {"exceededTransferLimit": True}} if more else {}
-            content = {
-                "type": "FeatureCollection",
-                "features": features(some, names),
-                **more_rows,
-            }
+            content = collection(features(some, names), **more_rows)
             return sent(content, type="application/geo+json")
         content = {
             "geometryType": "esriGeometryPoint",
@@ -216,6 +211,11 @@ class Wfs(StandIn):
     dataset = "lamps"
     wrong = "city:lampposts"
     others = ("city:lamps", "city:kerbs")
+    only_lamps = (
+        "<fes:PropertyIsEqualTo><fes:ValueReference>KIND</fes:ValueReference>"
+        "<fes:Literal>lamp</fes:Literal></fes:PropertyIsEqualTo>"
+    )
+    terms = "City of Somewhere (CC BY 4.0)"
     formats: tuple[str, ...] = ("text/xml; subtype=gml/3.2", "application/json; subtype=geojson")
     constraints: tuple[tuple[str, str], ...] = (("CountDefault", "2"),)
     turned = False
@@ -260,7 +260,7 @@ class Wfs(StandIn):
             listed = features(some, [name for name in names if name != "geom"])
             for item in listed if self.turned else ():
                 item["geometry"]["coordinates"].reverse()
-            return sent({"type": "FeatureCollection", "features": listed, "crs": crs})
+            return sent(collection(listed, crs=crs))
         return self.collection(some, total)
 
     def matching_rows(self, query: Mapping[str, str]) -> Sequence[Row] | Answer:
@@ -341,6 +341,7 @@ class OgcFeatures(StandIn):
     dataset = "lamps"
     wrong = "lampposts"
     others = ("lamps", "kerbs")
+    terms = "no attribution given (https://licence.example/by)"
     conforms: tuple[str, ...] = ("core", "geojson")
     filters = "http://www.opengis.net/spec/ogcapi-features-3/1.0/conf/features-filter"
     next_host = ""
@@ -381,7 +382,7 @@ class OgcFeatures(StandIn):
         if "bbox" in query:
             rows = self.inside(*map(float, query["bbox"].split(",")))
         if "filter" in query:
-            assert (query["filter"], query["filter-lang"]) == ("KIND = 'lamp'", "cql2-text")
+            assert (query["filter"], query["filter-lang"]) == (self.only_lamps, "cql2-text")
             rows = [row for row in rows if row["KIND"] == "lamp"]
         if (failure := self.failure()) is not None:
             return failure
@@ -394,14 +395,13 @@ class OgcFeatures(StandIn):
         if self.circles or start + len(some) < len(rows):
             next_query = urlencode({**query, "offset": start + len(some)})
             links.append({"rel": "next", "href": f"{self.next_host}?{next_query}"})
-        content = {
-            "type": "FeatureCollection",
-            "features": listed,
-            "links": links,
-            "timeStamp": f"2024-01-01T00:00:{len(self.server.requests):02}Z",
-            "numberMatched": len(rows) + self.surplus,
-            "numberReturned": len(some),
-        }
+        content = collection(
+            listed,
+            links=links,
+            timeStamp=f"2024-01-01T00:00:{len(self.server.requests):02}Z",
+            numberMatched=len(rows) + self.surplus,
+            numberReturned=len(some),
+        )
         return sent(content, type="application/geo+json")
 
 
@@ -412,6 +412,8 @@ class Ckan(StandIn):
     dataset = "lamps"
     wrong = "lampposts"
     others = ("the nearest is 'lamps'", "kerbs")
+    only_lamps = '{"KIND": "lamp"}'
+    terms = "City of Somewhere (CC0)"
     cuts = False
     half = b'{"success": true, "result": {"records": ['
 
@@ -476,6 +478,7 @@ class Socrata(StandIn):
     dataset = "abcd-1234"
     wrong = "abcd-9999"
     others = ("/browse",)
+    terms = "City of Somewhere (PDDL)"
     place = "point"
 
     def start(self) -> None:
@@ -508,8 +511,7 @@ class Socrata(StandIn):
         some = self.part(rows, query["$offset"], query["$limit"])
         if request.path.endswith(".geojson"):
             assert self.place not in {"", "location"}
-            content = {"type": "FeatureCollection", "features": features(some, names)}
-            return sent(content, type="application/vnd.geo+json")
+            return sent(collection(features(some, names)), type="application/vnd.geo+json")
         return sent([self.plain(row, names) for row in some])
 
     def plain(self, row: Row, names: Sequence[str]) -> Row:
@@ -519,7 +521,7 @@ class Socrata(StandIn):
         return values | ({"the_place": where} if self.place else {"lon": x, "lat": y})
 
     def holds(self, condition: str, row: Row) -> bool:
-        if condition == "KIND = 'lamp'":
+        if condition == self.only_lamps:
             return bool(row["KIND"] == "lamp")
         numbers = [float(text) for text in re.findall(r"-?\d+\.\d+", condition)]
         x, y = map(float, row["xy"])

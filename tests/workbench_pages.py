@@ -8,17 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from machine import PATIENCE_S
-from map_pages import requested
+from map_pages import BrowserPage, requested
 from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from selenium.webdriver import Chrome
-    from selenium.webdriver.remote.webelement import WebElement
 
     from benchmarks.street_photos import StreetPhoto
 
@@ -42,11 +38,9 @@ look();
 
 
 @dataclass(frozen=True)
-class WorkbenchPage:
-    """The page of a workbench, open in a browser that saves files in a folder."""
+class WorkbenchPage(BrowserPage):
+    """The page of a workbench."""
 
-    browser: Chrome
-    folder: Path
     url: str
 
     def open(self) -> None:
@@ -59,19 +53,6 @@ class WorkbenchPage:
         """Wait until all changes are answered; return the sentence of the answer."""
         self.until(QUIET)
         return self.text("#sentence")
-
-    def ask(self, script: str, *arguments: object) -> Any:  # noqa: ANN401
-        return self.browser.execute_script(script, *arguments)
-
-    def one(self, selector: str) -> WebElement:
-        return self.browser.find_element(By.CSS_SELECTOR, selector)
-
-    def all(self, selector: str) -> list[WebElement]:
-        return self.browser.find_elements(By.CSS_SELECTOR, selector)
-
-    def text(self, selector: str) -> str:
-        """Return the text of the first such element, even if it is hidden."""
-        return str(self.ask("return document.querySelector(arguments[0]).textContent", selector))
 
     def press(self, selector: str, text: str = "") -> str:
         """Click the first such element, or the first with a text."""

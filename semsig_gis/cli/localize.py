@@ -1,7 +1,8 @@
-"""`semsig localize`: queries, and where they were seen from."""
+"""`semsig localize`: find the places of queries."""
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -31,21 +32,29 @@ from semsig_gis.cli.options import (
     SearchOptions,
     Top,
     command,
-    seen_north,
+    query_north,
 )
 from semsig_gis.core import LIKELIHOOD, EmptyResultError, InputError, UnknownNameError, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from semsig_gis.core import Taxonomy
     from semsig_gis.database import City, PartitionedDatabase, SignatureDatabase
-    from semsig_gis.localization import Answer, Locator, Method
+    from semsig_gis.localization import (
+        Answer,
+        Explanation,
+        Localization,
+        Location,
+        Locator,
+        Method,
+    )
     from semsig_gis.observation import North, QueryLine, View
 
 
 @dataclass(frozen=True, kw_only=True)
 class RankedOptions(QueryOptions):
-    """One query or many, and what ranks the cells."""
+    """Options for one query or many, and for the method."""
 
     queries: Annotated[
         str | None,
@@ -59,16 +68,16 @@ class RankedOptions(QueryOptions):
 
     @property
     def ranking(self) -> str:
-        """The text of the method."""
+        """The name of the method."""
         return chosen_method(self.method, paper=self.paper)
 
     @property
     def source(self) -> str:
-        """What messages call the file of the queries."""
+        """The name of the file of queries in messages."""
         return "standard input" if self.queries == "-" else str(self.queries)
 
     def read_queries(self, dataset: SignatureDatabase | PartitionedDatabase) -> Iterator[QueryLine]:
-        """Return the queries of --queries, each when it is needed."""
+        """Return the queries of --queries, read one by one."""
         from semsig_gis.observation import parse_queries, read_queries
 
         city: dict[str, Any] = {"taxonomy": dataset.taxonomy, "radius": dataset.spec.radius}
@@ -107,13 +116,13 @@ class LocalizeOptions(SearchOptions, RankedOptions):
     as_json: AsJson = False
 
     def __post_init__(self) -> None:
-        """Refuse options that do not go together."""
+        """Raise InputError for options that exclude each other."""
         single = ("types", "bearings", "ranges", "fov", "look", "sectors", "map_", "out")
-        given = [f"--{name.strip('_')}" for name in single if getattr(self, name) is not None]
-        given = ([] if self.seen is None else [repr(self.seen)]) + given
-        if self.queries is not None and given:
+        others = [f"--{name.strip('_')}" for name in single if getattr(self, name) is not None]
+        others = ([] if self.seen is None else [repr(self.seen)]) + others
+        if self.queries is not None and others:
             raise InputError(
-                f"--queries was given with {' and '.join(given)}; give a file or one query."
+                f"--queries was given with {' and '.join(others)}; give a file or one query."
             )
         if self.out is None and (self.share is not None or self.within):
             raise InputError(
@@ -132,11 +141,11 @@ class LocalizeOptions(SearchOptions, RankedOptions):
 
     @property
     def writes_chances(self) -> bool:
-        """Whether the file holds the chances of all cells, and no regions."""
+        """Whether --out is a raster with the chances of all cells, without regions."""
         return self.out is not None and self.out.suffix.lower() in {".tif", ".tiff"}
 
     def _refuse_likelihood(self) -> None:
-        """Refuse options that only the likelihood has."""
+        """Raise InputError for options that work only with the likelihood method."""
         names = [field.name for field in fields(SearchOptions) if field.name != "require"]
         options = [
             f"--{name.replace('_', '-')}"
@@ -165,21 +174,20 @@ def localize(options: LocalizeOptions) -> None:
 
         method = Method.parse(options.ranking)
     city = open_city(options.database)
-
-    # Queries are read before the index, which takes much longer than to find a slip in a query.
-    north = seen_north(city, options.north, options.date)
-
+    north = query_north(city, options.north, options.date)
+    # The query is read before the index, so that an error in it is found early.
     if options.queries is None:
         query = options.query(city.dataset, others=", or --queries")
         others = options.unplaced(city.dataset)
         locator = _locator(options, city, method, north)
-        _answer(options, city, _beside(locator, query, *others, ranking=options.ranking), query)
+        locator = _with_unplaced(locator, query, *others, ranking=options.ranking)
+        _answer(options, city, locator, query)
         return
     queries = options.read_queries(city.dataset)
     _answer_lines(queries, _locator(options, city, method, north), options)
 
 
-def _beside(
+def _with_unplaced(
     locator: Locator[Any],
     query: View,
     unplaced: Sequence[int],
@@ -187,11 +195,11 @@ def _beside(
     *,
     ranking: str,
 ) -> Locator[Any]:
-    """Return what answers a query given what else was seen, and was not."""
+    """Return a locator that also uses classes seen without a direction and absent classes."""
     if not unplaced and not absent:
         return locator
     if ranking != LIKELIHOOD:
-        what = "objects without a direction beside others" if unplaced else "what is not there"
+        what = "objects with and without a direction" if unplaced else "absent objects"
         raise InputError(
             f"the query has {what}, which the method {ranking!r} cannot take; give directions to "
             "all objects or to none, or leave out the method."
@@ -205,7 +213,7 @@ def _beside(
 def _locator(
     options: LocalizeOptions, city: City, method: Method | None, north: North
 ) -> Locator[Any]:
-    """Return what answers the queries."""
+    """Return the locator of the options, for a method by distance or by likelihood."""
     taxonomy, top = city.dataset.taxonomy, options.top
     if method is None:
         usual = options.usual_noise(taxonomy)
@@ -220,32 +228,32 @@ def _locator(
 def _answer_lines(
     queries: Iterable[QueryLine], locator: Locator[Any], options: LocalizeOptions
 ) -> None:
-    """Print an answer for each line, or its error, as soon as there is one.
+    """Print an answer or an error for each query, as soon as it is there.
 
-    Lines of a file are answered side by side, those of standard input one by one as they come.
+    Queries of a file are answered in parallel, queries of standard input one by one.
     """
     from semsig_gis.core import each_in_order
 
     source, first_error, answered, failed = options.source, "", 0, 0
 
-    def answer(one: QueryLine) -> tuple[QueryLine, dict[str, Any]]:
+    def answer(line: QueryLine) -> tuple[QueryLine, dict[str, Any]]:
         try:
-            if isinstance(one.query, InputError):
-                raise one.query
-            others = one.unplaced, one.absent
-            beside = _beside(locator, one.query, *others, ranking=options.ranking)
-            return one, beside.locate(one.query).to_dict()
+            if isinstance(line.query, InputError):
+                raise line.query
+            others = line.unplaced, line.absent
+            line_locator = _with_unplaced(locator, line.query, *others, ranking=options.ranking)
+            return line, line_locator.locate(line.query).to_dict()
         except (EmptyResultError, InputError, UnknownNameError) as error:
-            return one, {"error": str(error)}
+            return line, {"error": str(error)}
 
-    side_by_side = options.queries != "-"
-    for one, result in each_in_order(answer, queries) if side_by_side else map(answer, queries):
+    in_parallel = options.queries != "-"
+    for line, result in each_in_order(answer, queries) if in_parallel else map(answer, queries):
         if error := result.get("error"):
             first_error = first_error or error
             failed += 1
         else:
             answered += 1
-        print_json({"id": one.name, "line": one.line, **result}, indent=None)
+        print_json({"id": line.name, "line": line.line, **result}, indent=None)
     if not answered:
         what = f"is answered: {first_error}" if failed else "was found; give one on each line."
         raise InputError(f"no query of {source} {what}")
@@ -254,8 +262,11 @@ def _answer_lines(
         remark(f"{of} could not be answered; the field 'error' of each says why.")
 
 
+RANKS = ("rank_low", "rank_high")
+
+
 def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: View) -> None:
-    """Answer a query, draw and write what is asked for, and print it."""
+    """Answer a query; draw, write and print the answer."""
     with progress("answering"):
         answer = locator.locate(query)
     if options.map_ is not None:
@@ -268,14 +279,17 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
                 map_ = localization_map(answer, city.database)
             draw_ground(map_, city)
             warn_if_online(save_map(map_, options.map_))
-    result = answer.to_dict()
+    searched: dict[str, Any] = {}
     if options.out is not None:
         searched = _write(options, options.out, city, answer, locator)
-        result |= {} if options.writes_chances else {"searched": searched}
     if options.as_json:
-        print_json(result)
+        regions = {"searched": searched} if searched and not options.writes_chances else {}
+        print_json(answer.to_dict() | regions)
         return
-    print_answer(result)
+    if options.ranking == LIKELIHOOD:
+        print_location(answer)
+    else:
+        print_localization(answer)
     if options.map_ is not None:
         say(f"map: {options.map_}")
     if options.writes_chances:
@@ -291,192 +305,204 @@ def _answer(options: LocalizeOptions, city: City, locator: Locator[Any], query: 
 def _write(
     options: LocalizeOptions, out: Path, city: City, answer: Answer, locator: Locator[Answer]
 ) -> dict[str, Any]:
-    """Write the regions to search, or all chances, and return what there is to say of regions."""
+    """Write the regions to search, or all chances; return the totals of the regions."""
     from semsig_gis.exports import export_answer
     from semsig_gis.localization import REGION_SHARE
 
     if answer.tied_beyond:
-        # No cell is left out of the search that is as good as the last candidate.
+        # Cells that tie with the last candidate are searched as well.
         answer = locator.locate(answer.query, top=options.top + answer.tied_beyond)
     share = REGION_SHARE if options.share is None else options.share
     regions = export_answer(answer, city.database, out, share=share, within=options.within)
     return regions.to_dict()
 
 
-VERDICTS = ("matched", "misnamed", "missed", "false")
 EXPLANATION = (
     *("verdict", "chance", "seen", "at", "object", "at", "off by", "distance", "source", "id"),
 )
 
 
-def print_answer(result: dict[str, Any]) -> None:
-    """Print an answer, as its `to_dict` gives it."""
-    by_chance = "noise" in result
-    said = f"likelihood ({result['noise']} noise)" if by_chance else result["used"]
-    score = "chance" if by_chance else "distance"
-    candidates = result["candidates"]
-    print_rows(
-        f"{len(candidates)} best of {result['cells']:,} cells, by {said}",
-        ("rank", "cell", "x", "y", "lon", "lat", score, "types"),
-        [
-            [
-                row["rank"] if by_chance else _rank_text(row["rank_low"], row["rank_high"]),
-                row["cell_id"],
-                *(f"{row[axis]:.1f}" for axis in ("x", "y")),
-                *(f"{row[axis]:.6f}" for axis in ("lon", "lat")),
-                f"{row[score]:.4f}",
-                row["types"],
-            ]
-            for row in candidates
-        ],
-    )
-    if by_chance:
-        _print_known(result["prior"] or {})
-        _print_explanations(candidates)
-        print_place(result)
-    elif result["tied_beyond"]:
-        tied = result["tied_beyond"]
-        more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
-        say(f"{more} with the last one.")
-    print_query(result)
-    north = result["north"]
-    if north["name"] != "grid":
-        day = f" of {north['date']}" if north["date"] else ""
-        say(
-            f"Bearings are measured from {north['name']} north{day}, at "
-            f"{north['turn'] % 360.0:.1f}° from grid north."
-        )
-    for note in result["notes"]:
-        say(f"Note: {note}")
-
-
-def print_query(result: dict[str, Any]) -> None:
-    """Say again what was seen, photo by photo, as it was understood."""
-    query = result["query"]
-    photos = query.get("photos", [query])
-    owners = query.get("photo", [0] * query["length"])
-    for number, photo in enumerate(photos):
-        rows = [row for row, owner in enumerate(owners) if owner == number]
-        seen = ", ".join(_object_text(query, row) for row in rows) or "nothing"
-        sectors = ", ".join(f"{start:.4g}-{end:.4g}°" for start, end in photo.get("sectors", ()))
-        looked = f"; looked at {sectors}" if sectors else ""
-        error = photo.get("heading_error")
-        north = (
-            "" if error is None else f"; north {error if error == 'unknown' else f'± {error:g}°'}"
-        )
-        of = f" of photo {number + 1}" if len(photos) > 1 else ""
-        say(f"Seen{of}: {seen}{looked}{north}.")
-    known = result.get("prior") or {}
-    for name, said in (("seen", "Seen somewhere"), ("absent", "Not there")):
-        if titles := known.get(name):
-            say(f"{said}: {', '.join(titles)}.")
-
-
-def _object_text(query: dict[str, Any], row: int) -> str:
-    """Return an object of a query: ``D 80°, 7.3 m ± 56 %``."""
-    parts = []
-    if scores := query.get("scores"):
-        parts.append(" or ".join(f"{name} {chance:.2g}" for name, chance in scores[row].items()))
-    elif query["types"] is not None:
-        parts.append(query["types"][row])
-    if query["bearings"] is not None:
-        parts.append(f"{query['bearings'][row]:.4g}°")
-    metres, error = ((query.get(name) or {row: None})[row] for name in ("ranges", "range_errors"))
-    if metres is not None:
-        parts.append(f"{metres:.3g} m" + (f" ± {percent(error, 0)}" if error is not None else ""))
-    return " ".join(parts)
-
-
-def _print_known(prior: dict[str, Any]) -> None:
-    """Say again what was known of the place, as it was understood."""
-    if near := prior.get("near"):
+def print_location(location: Location) -> None:
+    """Print an answer by likelihood."""
+    ranks = location.columns["rank"].tolist()
+    _print_candidates(location, f"likelihood ({location.noise} noise)", ranks, "chance")
+    known = location.known
+    if near := known.get("near"):
         say(
             f"Known: near {near['lat']:.6f}, {near['lon']:.6f} (lat, lon), x {near['x']:.1f}, "
             f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
         )
-    if area := prior.get("area"):
+    if area := known.get("area"):
         say(f"Known: in the area {area['file']}, which has {area['cells']:,} cells.")
-    if popularity := prior.get("popularity"):
+    if popularity := known.get("popularity"):
         say(f"Known: places are weighted by {popularity['file']}.")
-    if require := prior.get("require"):
+    if require := known.get("require"):
         say(f"Known: {require['text']} is in sight, as in {require['cells']:,} cells.")
+    for rank, explanation in enumerate(location.explanations, 1):
+        _print_explanation(rank, explanation, location.north)
+    print_place(location)
+    print_query(location)
+    _print_north(location.north)
+    print_notes(location)
 
 
-def print_place(result: dict[str, Any]) -> None:
-    """Print the place of an answer by likelihood, or that it cannot be told."""
-    place, region = result["place"], result["region"]
-    where = f"{place['lat']:.6f}, {place['lon']:.6f} (lat, lon)"
-    chance = f"within {place['within_m']:g} m of it with a chance of {percent(place['chance'])}"
-    if result["answered"]:
-        say(f"{where}, {chance}.")
-    else:
-        say(f"Cannot tell: the best place is {where}, {chance}.")
-    ellipse = place["ellipse_90"]
-    say(
-        f"Estimated position: x {place['x']:.1f}, y {place['y']:.1f} ± {place['sigma']:.1f} m "
-        f"(90 %: {ellipse['longer']:.1f} m along {ellipse['bearing']:.0f}°, "
-        f"{ellipse['shorter']:.1f} m across)."
+def print_localization(localization: Localization) -> None:
+    """Print an answer by distance."""
+    ends = zip(*(localization.columns[name].tolist() for name in RANKS), strict=True)
+    ranks = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
+    _print_candidates(localization, localization.used, ranks, "distance")
+    if tied := localization.tied_beyond:
+        more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
+        say(f"{more} with the last one.")
+    print_query(localization)
+    _print_north(localization.north)
+    print_notes(localization)
+
+
+def _print_candidates(answer: Answer, method: str, ranks: list[Any], score: str) -> None:
+    """Print the table of candidates."""
+    from semsig_gis.core import to_degrees
+
+    columns = answer.columns
+    x, y = columns["x"], columns["y"]
+    lon, lat = (axis.round(7) for axis in to_degrees(answer.crs).transform(x, y))  # as in JSON
+    values = (columns["cell_id"], x, y, lon, lat, columns[score], columns["types"])
+    formats = ("", ".1f", ".1f", ".6f", ".6f", ".4f", "")
+    # Identifiers stay numbers, so that they are printed as such.
+    texts = [
+        [format(value, spec) if spec else value for value in column.tolist()]
+        for column, spec in zip(values, formats, strict=True)
+    ]
+    print_rows(
+        f"{len(ranks)} best of {answer.cells:,} cells, by {method}",
+        ("rank", "cell", "x", "y", "lon", "lat", score, "types"),
+        zip(ranks, *texts, strict=True),
     )
-    if place["heading"] is not None:
+
+
+def print_query(answer: Answer) -> None:
+    """Print the query, photo by photo, as it was understood."""
+    view: Any = answer.query  # a view, since the options make one
+    for number, photo in enumerate(view.photos):
+        rows = [row for row, owner in enumerate(view.photo_rows.tolist()) if owner == number]
+        objects = ", ".join(_object_text(view, row, answer.taxonomy) for row in rows) or "nothing"
+        sectors = ", ".join(f"{start:.4g}-{end % 360.0:.4g}°" for start, end in photo.sectors)
+        looked = f"; looked at {sectors}" if sectors else ""
+        north = "" if photo.north_sigma is None else f"; north ± {photo.north_sigma:g}°"
+        if photo.north_sigma == math.inf:
+            north = "; north unknown"
+        of = f" of photo {number + 1}" if len(view.photos) > 1 else ""
+        say(f"Seen{of}: {objects}{looked}{north}.")
+    known: Mapping[str, Any] = getattr(answer, "known", {})
+    for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
+        if titles := known.get(name):
+            say(f"{label}: {', '.join(titles)}.")
+
+
+def _object_text(view: View, row: int, taxonomy: Taxonomy) -> str:
+    """Return an object of a query: ``D 80°, 7.3 m ± 56 %``."""
+    from semsig_gis.core import WILDCARD
+
+    parts = []
+    if view.scores is not None:
+        names = {item.code: item.name for item in taxonomy.classes} | {WILDCARD: "unknown"}
+        scores = enumerate(view.scores[row].tolist())
+        parts.append(" or ".join(f"{names[code]} {score:.2g}" for code, score in scores if score))
+    elif view.codes is not None:
+        parts.append(taxonomy.decode(view.codes[row : row + 1]))
+    if view.bearings is not None:
+        parts.append(f"{view.bearings[row]:.4g}°")
+    if view.ranges is not None and not math.isnan(view.ranges[row]):
+        error = math.nan if view.range_errors is None else view.range_errors[row]
+        spread = "" if math.isnan(error) else f" ± {percent(error, 0)}"
+        parts.append(f"{view.ranges[row]:.3g} m{spread}")
+    return " ".join(parts)
+
+
+def _print_north(north: North) -> None:
+    if north.name != "grid":
+        say(f"Bearings are measured from {north}, at {north.turn % 360.0:.1f}° from grid north.")
+
+
+def print_notes(answer: Answer) -> None:
+    """Print the notes on a query."""
+    for note in answer.notes:
+        say(f"Note: {note}")
+
+
+def degrees_of(location: Location) -> tuple[float, float]:
+    """Return longitude and latitude of a place, rounded as in JSON."""
+    from semsig_gis.core import to_degrees
+
+    estimate = location.estimate
+    lon, lat = to_degrees(location.crs).transform(estimate.x, estimate.y)
+    return round(lon, 7), round(lat, 7)
+
+
+def print_place(location: Location) -> None:
+    """Print the place of an answer by likelihood, and whether it is certain enough."""
+    from semsig_gis.localization import REGION_SHARE
+
+    estimate = location.estimate
+    lon, lat = degrees_of(location)
+    radius, mass = location.rule.radius, percent(location.answer.mass)
+    verdict = "" if location.answer.given else "Cannot tell: the best place is "
+    where = f"{verdict}{lat:.6f}, {lon:.6f} (lat, lon)"
+    say(f"{where}, within {radius:g} m of it with a chance of {mass}.")
+    longer, shorter, bearing = estimate.ellipse()
+    say(
+        f"Estimated position: x {estimate.x:.1f}, y {estimate.y:.1f} ± {estimate.sigma:.1f} m "
+        f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
+    )
+    if estimate.heading is not None:
         say(
-            f"North of the query: {place['heading'] % 360.0:.1f}° ± {place['heading_sigma']:.1f}° "
-            f"from {result['north']['name']} north."
+            f"North of the query: {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
+            f"from {location.north.name} north."
         )
+    cells, km2 = len(location.region), location.region_km2
+    size = f"{km2:.3f} km²" if km2 >= 0.1 else f"{km2 * 1e6:,.0f} m²"  # noqa: PLR2004 - 10 ha
     say(
-        f"{percent(region['share'], 0)} of the chance is in {region['cells']:,} "
-        f"cell{'' if region['cells'] == 1 else 's'} "
-        f"({_area_text(region['km2'])})."
+        f"{percent(REGION_SHARE, 0)} of the chance is in {cells:,} cell{'' if cells == 1 else 's'} "
+        f"({size})."
     )
 
 
-def _area_text(km2: float) -> str:
-    return f"{km2:.3f} km²" if km2 >= 0.1 else f"{km2 * 1e6:,.0f} m²"  # noqa: PLR2004 - 10 ha
+def _print_explanation(rank: int, explanation: Explanation, north: North) -> None:
+    """Print the counts of a candidate and, for the best one, its objects."""
+    rows, counts = explanation.rows, explanation.counts
+    outside = len(rows) - sum(counts.values())
+    texts = [f"{count} {verdict}" for verdict, count in counts.items()]
+    summary = ", ".join(texts) + (f"; {outside} outside the photos" if outside else "")
+    x, y = explanation.xy
+    title = f"Rank {rank}, at x {x:.1f}, y {y:.1f}: {summary}"
+    if rank > 1:
+        say(title)
+        return
 
+    def bearing_text(bearing: float | None) -> str:
+        return "" if bearing is None else f"{north.from_grid(bearing):.1f}°"
 
-def _print_explanations(candidates: list[dict[str, Any]]) -> None:
-    """Print the objects of the best candidate, and the counts of the others."""
-    for row in candidates:
-        if "explanation" not in row:
-            break
-        why = row["explanation"]
-        outside = sum(one["verdict"] not in VERDICTS for one in why["rows"])
-        counts = ", ".join(f"{why['counts'][verdict]} {verdict}" for verdict in VERDICTS)
-        counts += f"; {outside} outside the photos" if outside else ""
-        title = f"Rank {row['rank']}, at x {why['x']:.1f}, y {why['y']:.1f}: {counts}"
-        if row["rank"] > 1:
-            say(title)
-            continue
-        print_rows(
-            title,
-            EXPLANATION,
+    def measure(value: float | None, spec: str, unit: str, before: str = "") -> str:
+        return "" if value is None else f"{before}{value:{spec}}{unit}"
+
+    print_rows(
+        title,
+        EXPLANATION,
+        [
             [
-                [
-                    one["verdict"],
-                    f"{one['chance']:.2f}",
-                    one["query_class"] or "",
-                    _seen_at(one["query_bearing"], one["query_range"]),
-                    one["object_class"] or "",
-                    _measure(one["object_bearing"], "°"),
-                    _measure(one["bearing_error"], "°", sign="+"),
-                    _measure(one["distance"], " m"),
-                    one["source"] or "",
-                    one["source_id"] or "",
-                ]
-                for verdict in VERDICTS
-                for one in why["rows"]
-                if one["verdict"] == verdict
-            ],
-        )
-
-
-def _seen_at(bearing: float | None, metres: float | None) -> str:
-    told = "" if metres is None else f", {metres:.1f} m"
-    return _measure(bearing, "°") + told
-
-
-def _measure(value: float | None, unit: str, *, sign: str = "") -> str:
-    return "" if value is None else f"{value:{sign}.1f}{unit}"
-
-
-def _rank_text(low: int, high: int) -> str:
-    return str(low) if low == high else f"{low}-{high}"
+                row["verdict"],
+                f"{row['chance']:.2f}",
+                row["query_class"] or "",
+                bearing_text(row["query_bearing"]) + measure(row["query_range"], ".1f", " m", ", "),
+                row["object_class"] or "",
+                bearing_text(row["object_bearing"]),
+                measure(row["bearing_error"], "+.1f", "°"),
+                measure(row["distance"], ".1f", " m"),
+                row["source"] or "",
+                row["source_id"] or "",
+            ]
+            for verdict in counts
+            for row in rows
+            if row["verdict"] == verdict
+        ],
+    )

@@ -1,4 +1,4 @@
-"""Options that several commands share: what was seen, with what, and what is known of it."""
+"""Options that several commands share: the query, the noise and the prior knowledge."""
 
 from __future__ import annotations
 
@@ -117,13 +117,13 @@ Objects = Annotated[
     typer.Option(
         "--objects",
         help="Street objects: a file written by `semsig load`, or an object store.  [default: "
-        "the store beside the database]",
+        "the store of the database]",
     ),
 ]
 
 
 def command(options: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..., None]]:
-    """Make a command of a function that takes a dataclass, whose fields are the options."""
+    """Return a decorator that makes a command of a function of a dataclass with the options."""
     hints = get_type_hints(options, include_extras=True)
     parameters = [
         parameter.replace(annotation=hints[name])
@@ -140,8 +140,8 @@ def command(options: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..
     return register
 
 
-def seen_north(city: City, north: NorthText, date: str | None) -> North:
-    """Return what the bearings of a query count from."""
+def query_north(city: City, north: NorthText, date: str | None) -> North:
+    """Return the north from which the bearings of a query are measured."""
     import datetime as dt
 
     from semsig_gis.observation import GRID_NORTH, North
@@ -163,7 +163,7 @@ def seen_north(city: City, north: NorthText, date: str | None) -> North:
 
 @dataclass(frozen=True, kw_only=True)
 class QueryOptions:
-    """What was seen, and which database is asked."""
+    """Options for the database and one query."""
 
     database: Database
     seen: Annotated[
@@ -204,11 +204,11 @@ class QueryOptions:
     date: Day = None
 
     def query(self, dataset: SignatureDatabase | PartitionedDatabase, *, others: str = "") -> View:
-        """Return the query of the options; `others` says what else may be given."""
+        """Return the query of the options; `others` is for the message if there is none."""
         from semsig_gis.observation import parse_view, text_row
 
         taxonomy = dataset.taxonomy
-        told: dict[str, Any] = {
+        row: dict[str, Any] = {
             "types": self.types,
             "bearings": None if self.bearings is None else numbers(self.bearings, "--bearings"),
             "ranges": self.ranges,
@@ -221,42 +221,42 @@ class QueryOptions:
                 "nothing was asked; say what was seen, such as 'bench at 40, lamp at 80', or give "
                 f"--types, --bearings or both{others}."
             )
-        if sentence := self._parts[0]:
+        if sentence := self._sentence:
             if self.types is not None:
                 raise InputError(
                     f"{self.seen!r} was given with --types; describe what was seen in one "
                     "of these ways."
                 )
-            told |= text_row(sentence, taxonomy)
-        return parse_view(told, taxonomy=taxonomy, radius=dataset.spec.radius)
+            row |= text_row(sentence, taxonomy)
+        return parse_view(row, taxonomy=taxonomy, radius=dataset.spec.radius)
 
     def usual_noise(self, taxonomy: Taxonomy) -> str:
-        """Return the noise of what was seen: a person who says it in words leaves much out."""
+        """Return the default noise: "by-hand" for a view in words, since people leave out much."""
         from semsig_gis.observation import text_row
 
-        sentence = self._parts[0]
+        sentence = self._sentence
         return "by-hand" if sentence and "see" in text_row(sentence, taxonomy) else "generic"
 
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the class codes of what was seen in no known direction, and was not seen."""
+        """Return the class codes of objects seen without a direction, and of absent objects."""
         from semsig_gis.observation import unplaced_codes
 
-        _, seen, absent = unplaced_codes(self.seen or "", dataset.taxonomy)
-        return seen, absent
+        _, unplaced, absent = unplaced_codes(self.seen or "", dataset.taxonomy)
+        return unplaced, absent
 
     @property
-    def _parts(self) -> tuple[str, list[str], list[str]]:
-        """The sentence of what was seen, what else was seen, and what was not."""
+    def _sentence(self) -> str:
+        """The part of the view in words about objects with directions."""
         from semsig_gis.observation import unplaced_parts
 
-        return unplaced_parts(self.seen or "")
+        return unplaced_parts(self.seen or "")[0]
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """How cells are searched: `require` by any method, the others by likelihood."""
+    """Options for the search: `require` for any method, the others for the likelihood."""
 
     require: Annotated[
         str | None,
@@ -314,9 +314,9 @@ class SearchOptions:
         top: int = 1,
         explain: bool = False,
     ) -> LikelihoodLocator:
-        """Return what answers queries by likelihood, whose bearings count from a north.
+        """Return the locator by likelihood for queries with bearings from `north`.
 
-        The noise is the `usual_noise` unless another one was asked for.
+        The noise is `usual_noise` without --noise.
         """
         from semsig_gis.localization import DEFAULT_RULE, LikelihoodMethod, make_locator, open_rule
         from semsig_gis.observation import GRID_NORTH
@@ -345,7 +345,7 @@ class SearchOptions:
         method = LikelihoodMethod(
             noise=noise, refined=bool(refined), on_grid=self.on_grid, north_sigma=sigma
         )
-        log_prior, known = self._prior(city.database)
+        log_prior, knowledge = self._prior(city.database)
         needed = bool(self.refine)
         store = object_store(city, self.objects, needed=needed) if needs_objects else None
         return make_locator(
@@ -357,39 +357,39 @@ class SearchOptions:
             store=store,
             refined=refined,
             explained=EXPLAINED if explain else 0,
-            known=known,
+            known=knowledge,
             north=north or GRID_NORTH,
         )
 
     def _prior(self, database: SignatureDatabase) -> tuple[NDArray[Any] | None, dict[str, Any]]:
-        """Return what is known of the place, by cell and in plain values; None if nothing is."""
-        parts, known = [], {}
+        """Return the log prior of each cell, or None without a prior, and its plain values."""
+        parts, knowledge = [], {}
         if self.near is not None:
             from semsig_gis.localization import KnownPosition, position_prior
 
             place = KnownPosition.parse(self.near, database)
             parts.append(position_prior(database, (place.x, place.y), sigma=place.sigma))
-            known["near"] = place.to_dict()
+            knowledge["near"] = place.to_dict()
         if self.area is not None:
             from semsig_gis.localization import area_prior
             from semsig_gis.objects import read_area
 
             parts.append(area_prior(database, read_area(self.area, crs=database.crs)))
             inside = int((parts[-1] > -math.inf).sum())
-            known["area"] = {"file": str(self.area), "cells": inside}
+            knowledge["area"] = {"file": str(self.area), "cells": inside}
         if self.popularity is not None:
             from semsig_gis.localization import raster_prior
 
             parts.append(raster_prior(database, self.popularity))
-            known["popularity"] = {"file": str(self.popularity)}
+            knowledge["popularity"] = {"file": str(self.popularity)}
         if self.require is not None:
             from semsig_gis.localization import Requirement, weight_prior
 
             requirement = Requirement.parse(self.require, database.taxonomy)
-            met = requirement.met(database.type_sequences)
-            parts.append(weight_prior(database, met.astype(float)))
-            known["require"] = {"text": self.require, "cells": int(met.sum())}
-        return (sum(parts[1:], parts[0]) if parts else None), known
+            allowed = requirement.met(database.type_sequences)
+            parts.append(weight_prior(database, allowed.astype(float)))
+            knowledge["require"] = {"text": self.require, "cells": int(allowed.sum())}
+        return (sum(parts[1:], parts[0]) if parts else None), knowledge
 
 
 def read_noise(
@@ -399,20 +399,20 @@ def read_noise(
     map_age: float = 0.0,
     drift_report: Path | None = None,
 ) -> Noise:
-    """Return a noise model by its name or file, for a map of some age."""
+    """Return the noise model of a name or file, for a map of some age."""
     from semsig_gis.localization import NOISES, named_noise, open_noise
 
     by_file = noise not in NOISES and Path(noise).suffix
     model = open_noise(noise) if by_file else named_noise(noise)
     if map_age == 0 and drift_report is None:
         return model
-    from semsig_gis.localization import aged_noise  # what loads slowly
+    from semsig_gis.localization import aged_noise  # slow to import
 
     return aged_noise(model, map_age, database=database, drift=read_drift(drift_report, map_age))
 
 
 def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
-    """Return how fast a city changes, None for what is usual; it is for an old map alone."""
+    """Return the rates of change of --drift-report, None without it; it needs --map-age."""
     if drift_report is None:
         return None
     if map_age == 0:
@@ -425,7 +425,7 @@ def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:
 
 
 def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectStore | None:
-    """Return the street objects of a database; None where there are none, unless needed."""
+    """Return the street objects of a database; None with a remark if missing and not needed."""
     from semsig_gis.database import ObjectStore, open_store
 
     if objects is not None and not objects.is_dir():
@@ -448,7 +448,7 @@ def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectSto
 
 
 def _north_sigma(heading: str) -> float:
-    """Return the deviation of north that an option says."""
+    """Return the standard deviation of north in degrees from --heading."""
     if heading in {"known", "unknown"}:
         return 0.0 if heading == "known" else math.inf
     try:

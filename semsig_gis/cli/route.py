@@ -1,4 +1,4 @@
-"""`semsig route`: views along a way, and where they were seen from."""
+"""`semsig route`: find the places of views along a route."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from semsig_gis.cli.console import AsJson, Database, print_json, print_rows, progress
-from semsig_gis.cli.localize import print_place
+from semsig_gis.cli.localize import degrees_of, print_place
 from semsig_gis.cli.options import (
     Day,
     Explain,
@@ -18,26 +18,27 @@ from semsig_gis.cli.options import (
     SearchOptions,
     Top,
     command,
-    seen_north,
+    query_north,
 )
 from semsig_gis.core import percent
 
 if TYPE_CHECKING:
     from semsig_gis.database import City
+    from semsig_gis.localization import Location
     from semsig_gis.observation import North, Route
 
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """The views, the way between them, and which database is asked."""
+    """Options for the database, the views and the steps between them."""
 
     database: Database
     views: Annotated[
         str,
         typer.Argument(
             help="Views in their order: a CSV or JSON lines file, or - for JSON lines from "
-            "standard input. Each after the first has its step from the one before, dx,dy or "
-            "distance,bearing (metres, degrees), and the sigma of that step; or use --track."
+            "standard input. Each after the first has the step from the previous view, dx,dy or "
+            "distance,bearing (metres, degrees), and its sigma; or use --track."
         ),
     ]
     track: Annotated[
@@ -51,19 +52,19 @@ class ViewOptions:
     date: Day = None
 
     def read(self, city: City, north: North) -> Route:
-        """Return the views with their names, and the legs between them."""
+        """Return the views with their names, and the steps between them."""
         from semsig_gis.observation import parse_route, read_route, read_track
 
         dataset = city.dataset
-        way: dict[str, Any] = {
+        settings: dict[str, Any] = {
             "taxonomy": dataset.taxonomy,
             "radius": dataset.spec.radius,
             "north": north,
             "track": None if self.track is None else read_track(self.track, crs=dataset.crs),
         }
         if self.views == "-":
-            return parse_route(sys.stdin.buffer, "standard input", **way)
-        return read_route(self.views, **way)
+            return parse_route(sys.stdin.buffer, "standard input", **settings)
+        return read_route(self.views, **settings)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,32 +82,31 @@ def route(options: RouteOptions) -> None:
     from semsig_gis.database import open_city
 
     city = open_city(options.database)
-    north = seen_north(city, options.north, options.date)
+    north = query_north(city, options.north, options.date)
     views, legs = options.read(city, north)
     locator = options.locator(city, north, top=options.top, explain=options.explain)
     with progress(f"answering {len(views):,} views"):
         locations = locator.locate_route([query for _, query in views], legs)
-    answers = [
-        {"id": name, **location.to_dict()}
-        for (name, _), location in zip(views, locations, strict=True)
-    ]
+    names = [name for name, _ in views]
     if options.as_json:
-        for answer in answers:
-            print_json(answer, indent=None)
+        for name, location in zip(names, locations, strict=True):
+            print_json({"id": name, **location.to_dict()}, indent=None)
         return
     print_rows(
-        f"{len(answers)} views of {city.path.name}",
+        f"{len(views)} views of {city.path.name}",
         ("view", "x", "y", "lon", "lat", "± m", "chance", "answered"),
-        [
-            [
-                answer["id"],
-                *(f"{answer['place'][axis]:.1f}" for axis in ("x", "y")),
-                *(f"{answer['place'][axis]:.6f}" for axis in ("lon", "lat")),
-                f"{answer['place']['sigma']:.1f}",
-                percent(answer["place"]["chance"]),
-                "yes" if answer["answered"] else "cannot tell",
-            ]
-            for answer in answers
-        ],
+        ([name, *_row(location)] for name, location in zip(names, locations, strict=True)),
     )
-    print_place(answers[-1])
+    print_place(locations[-1])
+
+
+def _row(location: Location) -> list[str]:
+    """Return the columns of a place in the table of views."""
+    estimate, decision = location.estimate, location.answer
+    lon, lat = degrees_of(location)
+    return [
+        *(f"{estimate.x:.1f}", f"{estimate.y:.1f}", f"{lon:.6f}", f"{lat:.6f}"),
+        f"{estimate.sigma:.1f}",
+        percent(decision.mass),
+        "yes" if decision.given else "cannot tell",
+    ]

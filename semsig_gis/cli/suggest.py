@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from semsig_gis.cli.console import AsJson, print_json, print_rows, progress, say
-from semsig_gis.cli.localize import print_place, print_query
-from semsig_gis.cli.options import QueryOptions, SearchOptions, command, seen_north
+from semsig_gis.cli.console import AsJson, print_json, print_rows, progress
+from semsig_gis.cli.localize import print_notes, print_place, print_query
+from semsig_gis.cli.options import QueryOptions, SearchOptions, command, query_north
 from semsig_gis.core import percent
 
 
@@ -24,7 +24,7 @@ def suggest(options: SuggestOptions) -> None:
     from semsig_gis.localization import next_questions, with_unplaced
 
     city = open_city(options.database)
-    north = seen_north(city, options.north, options.date)
+    north = query_north(city, options.north, options.date)
     query = options.query(city.dataset)
     unplaced, absent = options.unplaced(city.dataset)
     locator = with_unplaced(
@@ -35,24 +35,22 @@ def suggest(options: SuggestOptions) -> None:
     )
     with progress("answering"):
         location = locator.locate(query)
-    answer = location.to_dict()
-    questions = [
-        one.to_dict()
-        for one in next_questions(locator.index, location, unplaced=unplaced, absent=absent)
-    ]
+    questions = next_questions(locator.index, location, unplaced=unplaced, absent=absent)
     if options.as_json:
+        answer = location.to_dict()
         shared = ("query", "prior", "answered", "place", "region", "notes")
-        print_json({**{name: answer[name] for name in shared}, "questions": questions})
+        rows = [question.to_dict() for question in questions]
+        print_json({**{name: answer[name] for name in shared}, "questions": rows})
         return
     print_rows(
         "What to look for next",
         ("question", "symbol", "yes", "bits"),
         [
-            [one["question"], one["symbol"], percent(one["chance"]), f"{one['gain']:.3f}"]
-            for one in questions
+            # Rounded first, as in JSON.
+            [row.text, row.item.symbol, percent(round(row.chance, 4)), f"{round(row.gain, 4):.3f}"]
+            for row in questions
         ],
     )
-    print_place(answer)
-    print_query(answer)
-    for note in answer["notes"]:
-        say(f"Note: {note}")
+    print_place(location)
+    print_query(location)
+    print_notes(location)

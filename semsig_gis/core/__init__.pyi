@@ -130,6 +130,7 @@ from .temporary import remove_abandoned as remove_abandoned
 from .temporary import temporary_folder as temporary_folder
 from .text import escaped as escaped
 from .text import one_line as one_line
+from .text import one_lines as one_lines
 from .text import percent as percent
 from .text import visible as visible
 from .text import visible_lines as visible_lines

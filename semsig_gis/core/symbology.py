@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -57,11 +57,12 @@ class ClassSign:
     title: str
     shape: str
     colour: str
+    ink: str = field(init=False, repr=False)
+    """Colour of the letter: black or white, whichever contrasts more with the shape."""
 
-    @property
-    def ink(self) -> str:
-        """Colour of the letter: black or white, whichever contrasts more with the shape."""
-        return max(BLACK, WHITE, key=lambda ink: _contrast(ink, self.colour))
+    def __post_init__(self) -> None:  # noqa: D105
+        ink = max(BLACK, WHITE, key=lambda ink: _contrast(ink, self.colour))
+        object.__setattr__(self, "ink", ink)
 
     @property
     def drop(self) -> float:

@@ -49,6 +49,11 @@ def one_line(text: str) -> str:
     return " ".join("".join(map(_remove_hidden, plain)).split())
 
 
+def one_lines(texts: Iterable[str]) -> list[str]:
+    """Return texts from data, each on one line (see `one_line`)."""
+    return list(map(one_line, texts))
+
+
 def _remove_hidden(character: str) -> str:
     category = unicodedata.category(character)
     if category == "Cs" or ord(character) & 0xFFFE == 0xFFFE:  # noqa: PLR2004 - a noncharacter

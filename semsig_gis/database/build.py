@@ -114,7 +114,7 @@ def build_database(
     np.True_
     """
     if not isinstance(objects, StreetObjects):
-        from semsig_gis.objects import objects_from_frame  # noqa: PLC0415 - it takes 1 s to load
+        from semsig_gis.objects import objects_from_frame  # noqa: PLC0415 - it takes 360 ms to load
 
         objects = objects_from_frame(objects)
     footprints = select_elements(footprints, "buildings")

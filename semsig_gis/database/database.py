@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import lazy_loader
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from pyproj import CRS
 
 from semsig_gis import __version__
@@ -452,8 +453,6 @@ def _joined(
     values: NDArray[Any], offsets: NDArray[np.int64], *, texts: pa.Array, separator: str = " "
 ) -> pa.Array:
     """Return the values of each cell as one text; `texts` has the text of every possible value."""
-    import pyarrow.compute as pc  # noqa: PLC0415 - it takes 120 ms to load
-
     entries = pa.array(values[offsets[0] : offsets[-1]])
     starts = pa.array((offsets - offsets[0]).astype(np.int32))
     lists = pa.ListArray.from_arrays(starts, texts.take(entries))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from semsig_gis.core import InputError
 from semsig_gis.storage import whole_numbers
@@ -57,8 +58,6 @@ class SequenceTable:
         rows = pa.LargeBinaryArray.from_buffers(
             pa.large_binary(), len(ends) - 1, [None, pa.py_buffer(ends), pa.py_buffer(flat)]
         )
-        import pyarrow.compute as pc  # noqa: PLC0415 - it takes 120 ms to load
-
         # Arrow numbers the sequences by first appearance; here the short ones come first.
         encoded = rows.dictionary_encode()
         distinct = len(encoded.dictionary)

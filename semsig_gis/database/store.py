@@ -25,6 +25,7 @@ from semsig_gis.core import (
     DatabaseError,
     Displayed,
     InputError,
+    ObjectIndex,
     crs_label,
 )
 from semsig_gis.database.file import (
@@ -57,7 +58,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pyproj import CRS
 
-    from semsig_gis.core import ObjectIndex
     from semsig_gis.database.database import SignatureDatabase
     from semsig_gis.objects import StreetObjects
 else:
@@ -129,8 +129,6 @@ class ObjectStore(Displayed):
     @cached_property
     def index(self) -> ObjectIndex:
         """R-tree over the objects, in their order, built at the first access."""
-        from semsig_gis.core import ObjectIndex  # noqa: PLC0415 - it takes 110 ms to load
-
         return ObjectIndex(self.objects.xy)
 
     def buildings_around(
@@ -350,7 +348,7 @@ def stored_inputs(folder: Path) -> dict[str, Path]:
 
 
 def _read_inputs(folder: Path) -> ObjectStore:
-    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 1 s to load
+    from semsig_gis.objects import read_surroundings  # noqa: PLC0415 - it takes 320 ms to load
 
     files = stored_inputs(folder)
     objects = open_objects(files.pop("objects"))

@@ -146,7 +146,7 @@ def select_elements(
     """Return the buildings or streets of a table, which may have OpenStreetMap elements."""
     if table is None:
         return None
-    from semsig_gis.objects import select_role  # noqa: PLC0415 - it takes 1 s to load
+    from semsig_gis.objects import select_role  # noqa: PLC0415 - it takes 350 ms to load
 
     return select_role(table, role)
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from semsig_gis.exports.layers import Layer, Progress
 
 
-# Characters that may end a cell, and those that may begin a formula. Some spreadsheets accept the
+# Characters that may end a cell, and that may begin a formula. Some spreadsheets accept the
 # full-width signs of Chinese and Japanese keyboards.
 _END = '[;,|"\t\r\n]'
 _BEGIN = "[=+\\-@'\t\r\n\uff1d\uff0b\uff0d\uff20]"

@@ -23,7 +23,7 @@ import lazy_loader
 
 from semsig_gis import __version__
 from semsig_gis.core import GEOMETRY, class_signs, one_line
-from semsig_gis.exports.styles import SYMBOLS, shown_line
+from semsig_gis.exports.styles import SYMBOLS, shown_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -130,6 +130,8 @@ def layer_fields(layer: Layer) -> tuple[Field, ...]:
     columns = [name for name in layer.read(slice(0, 0)).column_names if name != GEOMETRY]
     titles = {item.name: item.title for item in layer.taxonomy.classes} if layer.taxonomy else {}
     fields = list(_listed_fields(layer.name, columns, titles))
+    aliases = shown_lines(field.alias for field in fields)
+    fields = [replace(field, alias=alias) for field, alias in zip(fields, aliases, strict=True)]
     names = {field.name for field in fields}
     fields += [
         Field(name=name, alias=name, about="", decimals=None, tab="More", index=number)
@@ -155,7 +157,7 @@ def _listed_fields(layer: str, columns: list[str], titles: dict[str, str]) -> It
                 word = match[1] if match.groups() else ""
                 yield Field(
                     name=match.string,
-                    alias=shown_line(alias.format(titles.get(word, word))),
+                    alias=alias.format(titles.get(word, word)),
                     about=about,
                     decimals=decimals[0] if decimals else None,
                     tab=tab,
@@ -183,7 +185,7 @@ def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
             key=layer.name,
             title=layer.title,
             about=layer.description,
-            licences=tuple(shown_line(text, CREDIT_LETTERS) for text in layer.licenses),
+            licences=tuple(shown_lines(layer.licenses, CREDIT_LETTERS)),
             source=f"./{place}|layername={layer.name}",
             geometry=layer.geometry,
             styles=layer.styles,
@@ -206,15 +208,16 @@ def shown_layers(layers: Sequence[Layer], file: str) -> list[ShownLayer]:
 def _signs(layer: Layer) -> tuple[TipSign, ...]:
     """Return the signs of the classes; titles are HTML inside a string of an expression."""
     escapes = str.maketrans({"'": "''", "[": "&#91;", "]": "&#93;"})
-    signs = {} if layer.taxonomy is None else class_signs(layer.taxonomy)
+    signs = [] if layer.taxonomy is None else [*class_signs(layer.taxonomy).values()]
+    titles = shown_lines(sign.title for sign in signs)
     return tuple(
         TipSign(
             symbol=sign.symbol,
             colour=sign.colour,
             ink=sign.ink,
-            text=escape(shown_line(sign.title), quote=False).translate(escapes),
+            text=escape(title, quote=False).translate(escapes),
         )
-        for sign in signs.values()
+        for sign, title in zip(signs, titles, strict=True)
     )
 
 
@@ -231,8 +234,8 @@ def project_archive(layers: Sequence[Layer], shown: Sequence[ShownLayer], title:
         _environment()
         .get_template("qgis/project.qgs")
         .render(
-            title=shown_line(title),
-            subtitle=shown_line(spatial[0].description, CREDIT_LETTERS),
+            title=shown_lines([title])[0],
+            subtitle=shown_lines([spatial[0].description], CREDIT_LETTERS)[0],
             crs=spatial[0].crs,
             code=spatial[0].crs.to_epsg(),
             bounds=bounds,

@@ -14,7 +14,7 @@ from semsig_gis.core import (
     RANK_RAMP,
     class_signs,
     group_labels,
-    one_line,
+    one_lines,
 )
 
 if TYPE_CHECKING:
@@ -93,12 +93,11 @@ class LegendEntry(NamedTuple):
 def by_class(taxonomy: Taxonomy, codes: Iterable[int]) -> Style:
     """Return a style of points by class code: the shape of the class with its letter."""
     present = set(codes)
+    signs = {str(code): sign for code, sign in class_signs(taxonomy).items() if code in present}
+    labels = shown_lines(f"{sign.symbol}  {sign.title}" for sign in signs.values())
     entries = {
-        str(code): LegendEntry(
-            {"value": str(code)}, shown_line(f"{sign.symbol}  {sign.title}"), _class_layers(sign)
-        )
-        for code, sign in class_signs(taxonomy).items()
-        if code in present
+        code: LegendEntry({"value": code}, label, _class_layers(sign))
+        for (code, sign), label in zip(signs.items(), labels, strict=True)
     }
     return Style("Classes", _renderer("class_code", entries, "point"))
 
@@ -167,7 +166,7 @@ def by_rank(column: str, *, geometry: str) -> Style:
         else:
             # A dark edge makes pale places visible on a pale map.
             edge, metres, smallest = RANK_RAMP[-1], 12.0 - 2.0 * number, 3.2 - 0.4 * number
-            symbols.append(_marker("circle", colour, metres, smallest=smallest, outline=edge))
+            symbols.append(_marker_layer("circle", colour, metres, smallest=smallest, outline=edge))
     entries = _ranges(RANKS, symbols)
     return Style("Rank", _renderer(column, entries, geometry, last_first=True))
 
@@ -189,14 +188,14 @@ def _by_mark(name: str, marks: Mapping[str, Mark], geometry: str) -> Style:
         symbol: tuple[SymbolLayer, ...]
         if geometry == "line":
             line = {"line_color": _rgba(mark.colour, 150), "line_width": 0.26}
-            end = _marker("cross2", mark.colour, 10.0, smallest=1.4, outline=mark.colour)
+            end = _marker_layer("cross2", mark.colour, 10.0, smallest=1.4, outline=mark.colour)
             symbol = (
                 ("SimpleLine", {**line, "line_style": "solid"}),
                 ("MarkerLine", {"placement": "lastvertex", "rotate": 0}, end),
             )
         else:
             shape = CLASS_MARKERS[mark.shape][0]
-            symbol = (_marker(shape, mark.colour, 12.0, smallest=1.8, outline="#222222"),)
+            symbol = (_marker_layer(shape, mark.colour, 12.0, smallest=1.8, outline="#222222"),)
         entries[str(number)] = LegendEntry({"value": value}, value, symbol)
     return Style(name, _renderer(name.lower(), entries, geometry))
 
@@ -211,7 +210,7 @@ def _ranges(classes: Classes, symbols: Sequence[SymbolLayer]) -> dict[str, Legen
     }
 
 
-def _marker(
+def _marker_layer(
     shape: str, colour: str, metres: float, *, smallest: float, outline: str
 ) -> SymbolLayer:
     return "SimpleMarker", {
@@ -271,10 +270,10 @@ def _renderer(
     return ET.tostring(renderer, encoding="unicode")
 
 
-def shown_line(text: str, letters: int = LABEL_LETTERS) -> str:
-    """Return text from data for QGIS: one short line, without expressions that QGIS evaluates."""
-    line = one_line(text).replace("[%", "[ %")
-    return line if len(line) <= letters else f"{line[: letters - 1].rstrip()}…"
+def shown_lines(texts: Iterable[str], letters: int = LABEL_LETTERS) -> list[str]:
+    """Return texts from data for QGIS: short single lines, without expressions to evaluate."""
+    lines = [line.replace("[%", "[ %") for line in one_lines(texts)]
+    return [line if len(line) <= letters else f"{line[: letters - 1].rstrip()}…" for line in lines]
 
 
 def _rgba(colour: str, opacity: int = 255) -> str:

@@ -92,7 +92,8 @@ class _Towns:
         radians = np.radians(places[:, 0])
         # Longitudes are relative to their mean direction, so that no town is cut at 180 degrees.
         self._middle = float(np.degrees(np.arctan2(np.sin(radians).mean(), np.cos(radians).mean())))
-        cells, cell = self._cells(places)
+        self._points = self._plane(places)
+        cells, cell = self._cells(self._points)
         # A town is a part of the union of boxes of the gap's size around all places.
         x, y = cells.T
         half = GAP_DEGREES / 2
@@ -108,16 +109,16 @@ class _Towns:
     def _plane(self, degrees: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack([signed_degrees(degrees[:, 0] - self._middle), degrees[:, 1]])
 
-    def _cells(self, degrees: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return the distinct rounded places, shape (c, 2), and the index of each place in them."""
-        ids = cell_ids(*np.rint(self._plane(degrees) / ROUNDING_DEGREES).T)
+    def _cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the distinct rounded points, shape (c, 2), and the index of each point in them."""
+        ids = cell_ids(*np.rint(points / ROUNDING_DEGREES).T)
         distinct, cell = np.unique(ids, return_inverse=True)
         cells = np.column_stack(split_ids(distinct)) * np.float64(ROUNDING_DEGREES)
         return cells, cell.astype(np.int64, copy=False)
 
     def of(self, degrees: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the index of the town that contains each position, or -1."""
-        cells, cell = self._cells(degrees)
+        cells, cell = self._cells(self._plane(degrees))
         towns = np.full(len(cells), -1)
         point, town = self._tree.query(shapely.points(cells), predicate="intersects")
         towns[point] = town
@@ -137,12 +138,12 @@ class _Towns:
 
     def centre(self) -> tuple[float, float]:
         """Return the median longitude and latitude of the largest town."""
-        x, y = np.median(self._plane(self._places[self._town == 0]), axis=0)
+        x, y = np.median(self._points[self._town == 0], axis=0)
         return float(signed_degrees(x + self._middle)), float(y)
 
     def bounds(self, town: int) -> Bounds:
         """Return west, south, east and north of a town; across 180 degrees, west exceeds east."""
-        plane = self._plane(self._places[self._town == town])
+        plane = self._points[self._town == town]
         (west, south), (east, north) = plane.min(axis=0), plane.max(axis=0)
         west, east = signed_degrees([west + self._middle, east + self._middle])
         return float(west), float(south), float(east), float(north)

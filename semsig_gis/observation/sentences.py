@@ -218,7 +218,15 @@ def _columns(items: Sequence[Row], values: Row, taxonomy: Taxonomy) -> Row:
     columns: Row = {
         f"{name}s": [item.get(name) for item in items] for name in ("range", "range_error")
     }
-    classes = [_class(item.get("class"), taxonomy) for item in items]
+    classes: list[str | Row] = []
+    for value in (item.get("class") for item in items):
+        if not isinstance(value, (dict, str)):
+            raise InputError(
+                f"the class of a detection is {value!r}; give a symbol, a word or scores by word."
+            )
+        if isinstance(value, str):
+            value = taxonomy.decode([class_code(value, taxonomy)])  # noqa: PLW2901 - its symbol
+        classes.append(value)
     if any(isinstance(value, dict) for value in classes):
         columns["scores"] = [
             value if isinstance(value, dict) else {value: 1.0} for value in classes
@@ -295,17 +303,6 @@ def _sentence_detections(text: str) -> list[Row]:
             detection["offset"] = -float(match["offset"])
         detections.append({"class": match["name"]} | detection)
     return detections
-
-
-def _class(value: object, taxonomy: Taxonomy) -> str | Row:
-    """Return the symbol of a class, or the scores of several classes without change."""
-    if isinstance(value, dict):
-        return value
-    if not isinstance(value, str):
-        raise InputError(
-            f"the class of a detection is {value!r}; give a symbol, a word or scores by word."
-        )
-    return taxonomy.decode([class_code(value, taxonomy)])
 
 
 def _scores(chances: Row, taxonomy: Taxonomy) -> NDArray[np.float64]:

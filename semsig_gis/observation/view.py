@@ -55,36 +55,6 @@ def check_north(north_sigma: float) -> None:
         )
 
 
-def _merge_sectors(sectors: Iterable[Sector]) -> tuple[Sector, ...]:
-    """Merge overlapping sectors and sort them clockwise from north; empty for the full turn."""
-    spans = []
-    for start, end in sectors:
-        for value in (start, end):
-            require_number("a sector", value, least=-FULL_TURN, most=2 * FULL_TURN, unit="degrees")
-        width = end - start
-        if width < 0 or width > FULL_TURN:
-            width %= FULL_TURN
-        if width == 0:
-            raise InputError(
-                f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
-            )
-        low = float(wrap_degrees(start))
-        spans.append((low, low + width))
-    # Merge each sector with the last one if they overlap.
-    merged: list[Sector] = []
-    for low, high in sorted(spans):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(high, merged[-1][1])
-        else:
-            merged.append((low, high))
-    # The last sector may extend over north into the first ones.
-    while len(merged) > 1 and merged[-1][1] - FULL_TURN >= merged[0][0]:
-        _, high = merged.pop(0)
-        merged[-1] = merged[-1][0], max(merged[-1][1], high + FULL_TURN)
-    whole = sum(high - low for low, high in merged) >= FULL_TURN
-    return () if whole else tuple(merged)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Photo:
     """The directions of a photograph or a panorama.
@@ -115,7 +85,34 @@ class Photo:
     north_sigma: float | None = None
 
     def __post_init__(self) -> None:  # noqa: D105
-        object.__setattr__(self, "sectors", _merge_sectors(self.sectors))
+        spans = []
+        for start, end in self.sectors:
+            for value in (start, end):
+                require_number(
+                    "a sector", value, least=-FULL_TURN, most=2 * FULL_TURN, unit="degrees"
+                )
+            width = end - start
+            if width < 0 or width > FULL_TURN:
+                width %= FULL_TURN
+            if width == 0:
+                raise InputError(
+                    f"a sector from {start:g} to {end:g} sees nothing; give two different bearings."
+                )
+            low = float(wrap_degrees(start))
+            spans.append((low, low + width))
+        # Merge each sector with the last one if they overlap.
+        merged: list[Sector] = []
+        for low, high in sorted(spans):
+            if merged and low <= merged[-1][1]:
+                merged[-1] = merged[-1][0], max(high, merged[-1][1])
+            else:
+                merged.append((low, high))
+        # The last sector may extend over north into the first ones.
+        while len(merged) > 1 and merged[-1][1] - FULL_TURN >= merged[0][0]:
+            _, high = merged.pop(0)
+            merged[-1] = merged[-1][0], max(merged[-1][1], high + FULL_TURN)
+        whole = sum(high - low for low, high in merged) >= FULL_TURN
+        object.__setattr__(self, "sectors", () if whole else tuple(merged))
         if self.north_sigma is not None:
             check_north(self.north_sigma)
 
@@ -222,7 +219,6 @@ class View(Signature):
 
     def _check(self) -> None:
         """Raise InputError if arrays do not fit each other or numbers are out of range."""
-        count = len(self)
         plain = self.photos == (FULL_VIEW,) and self.ranges is None
         if self.bearings is None and not plain:
             raise InputError(
@@ -231,9 +227,9 @@ class View(Signature):
         shapes = {"ranges": (), "range_errors": (), "photo": (), "scores": (CLASSES,)}
         for name, rest in shapes.items():
             value = getattr(self, name)
-            if value is not None and value.shape != (count, *rest):
+            if value is not None and value.shape != (len(self), *rest):
                 raise InputError(
-                    f"{len(value)} {name.replace('_', ' ')} were given for {count} objects; "
+                    f"{len(value)} {name.replace('_', ' ')} were given for {len(self)} objects; "
                     "give one for each."
                 )
         for name, most in (("ranges", MAX_RANGE_M), ("range_errors", MOST_RANGE_ERROR)):
@@ -245,7 +241,7 @@ class View(Signature):
                 raise InputError(
                     f"a {what} is {bad[0]:g}; give a number above 0 and up to {most:,.0f}."
                 )
-        if self.scores is not None and count:
+        if self.scores is not None and len(self.scores):
             sums = self.scores.sum(axis=1)
             if not ((self.scores >= 0).all() and np.allclose(sums, 1.0, atol=ROUNDING)):
                 raise InputError(
@@ -258,7 +254,7 @@ class View(Signature):
         numbers = self.photo
         if (
             numbers is not None
-            and count
+            and len(numbers)
             and not 0 <= numbers.min() <= numbers.max() < len(self.photos)
         ):
             raise InputError(

@@ -1,7 +1,7 @@
-"""Results drawn into axes of matplotlib, to be laid over one another or set side by side.
+"""Draw results into axes of matplotlib.
 
-Maps are in metres of the coordinate system of their data: a table of geopandas in the same system
-can be plotted into the same axes.
+Maps are in metres of the CRS of their data, so that a geopandas table in the same CRS can be
+plotted into the same axes.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ KILOMETRE = 1000
 LONGEST_LABEL = 40
 
 
-class Steps(NamedTuple):
-    """What numbers of cells are, and the name and colour of each range by where it begins."""
+class ColourSteps(NamedTuple):
+    """The title of a number of cells, and the colour of each range by its lower bound."""
 
     title: str
     colours: Mapping[int, str] | Mapping[float, str]
@@ -72,13 +72,15 @@ class Steps(NamedTuple):
 
 
 _SHADES = [*(f"{low} to {high - 1}" for low, high in pairwise(SHADES)), f"{max(SHADES)} or more"]
-# Columns of the cells, as files call them.
-COLUMNS: Mapping[str, Steps] = {
-    "length": Steps("objects seen", SHADES, _SHADES),
-    "type_group_size": Steps("cells with the same types", GROUP_COLOURS, group_labels()),
-    "angle_group_size": Steps("cells with the same angle levels", GROUP_COLOURS, group_labels()),
+# Columns of the cells, with their names in files.
+CELL_COLUMNS: Mapping[str, ColourSteps] = {
+    "length": ColourSteps("objects seen", SHADES, _SHADES),
+    "type_group_size": ColourSteps("cells with the same types", GROUP_COLOURS, group_labels()),
+    "angle_group_size": ColourSteps(
+        "cells with the same angle levels", GROUP_COLOURS, group_labels()
+    ),
 }
-CHANCE_STEPS = Steps(
+CHANCE_STEPS = ColourSteps(
     "chance of a cell", CELL_CHANCES, [f"{100 * chance:g} % or more" for chance in CELL_CHANCES]
 )
 COLOUR_OPTIONS = {"cmap", "norm", "vmin", "vmax"}
@@ -100,14 +102,14 @@ def plot_database(
         The cells.
     column : str or array_like, shape (n,), optional
         ``"length"`` (objects seen, the default), ``"type_group_size"`` or ``"angle_group_size"``
-        (cells that look the same), or a number for each cell, NaN for those to leave out.
+        (cells that look the same), or a number for each cell, NaN for cells to omit.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; in a new figure by default.
+        Axes to draw into; by default those of a new figure.
     legend : bool, default True
-        Whether to tell what the colours mean.
+        Whether to add a colour bar.
     **look
-        Options of `matplotlib.axes.Axes.imshow`, such as ``cmap`` or ``vmax``. Unless these ask for
-        others, a column that has a name has the colours of the maps.
+        Options of `matplotlib.axes.Axes.imshow`, such as ``cmap`` or ``vmax``. Without an option
+        for colours, a named column has the colours of the maps.
 
     Returns
     -------
@@ -129,15 +131,17 @@ def plot_database(
     """
     if column is None or isinstance(column, str):
         name = column or "length"
-        if name not in COLUMNS:
+        if name not in CELL_COLUMNS:
             raise UnknownNameError(
-                f"{name!r} is not a column of the cells; give {', '.join(COLUMNS)} or a number for "
-                f"each cell{nearest_name(name, COLUMNS)}."
+                f"{name!r} is not a column of the cells; give {', '.join(CELL_COLUMNS)} or a "
+                f"number for each cell{nearest_name(name, CELL_COLUMNS)}."
             )
-        title, values = COLUMNS[name].title, _column(database, name)
+        # The attributes of the database have the names of the columns in plural.
+        values = getattr(database, f"{name}s").astype(np.float64)
+        title = CELL_COLUMNS[name].title
         if not COLOUR_OPTIONS & look.keys():
             axes = map_axes(ax)
-            _draw_steps(axes, database, values, COLUMNS[name], legend=legend, **look)
+            _draw_steps(axes, database, values, CELL_COLUMNS[name], legend=legend, **look)
             axes.set_title(f"{len(database):,} cells, by {title}")
             _frame(axes)
             return axes
@@ -150,19 +154,9 @@ def plot_database(
     axes = map_axes(ax)
     image = _draw_cells(axes, database, values, **look)
     if legend:
-        _add_bar(axes, image, title)
+        _add_colour_bar(axes, image, title)
     _frame(axes)
     return axes
-
-
-def _column(database: SignatureDatabase, name: str) -> NDArray[np.float64]:
-    """Return a column of the cells."""
-    if name == "length":
-        values = database.lengths
-    else:
-        by_type = name == "type_group_size"
-        values = database.type_group_sizes if by_type else database.angle_group_sizes
-    return values.astype(np.float64)
 
 
 def plot_identifiability(
@@ -176,7 +170,7 @@ def plot_identifiability(
     Parameters
     ----------
     identifiability : Identifiability
-        What to draw.
+        The chances of the cells.
     ax, legend : optional
         As in `plot_database`.
 
@@ -193,10 +187,9 @@ def plot_identifiability(
     >>> ax.get_title()
     'Chance to be found within 50 m'
     """
-    look = {"cmap": LinearSegmentedColormap.from_list("found", FOUND_RAMP), "vmin": 0, "vmax": 1}
-    axes = plot_database(
-        identifiability.database, identifiability.found, ax=ax, legend=legend, **look
-    )
+    cmap = LinearSegmentedColormap.from_list("found", FOUND_RAMP)
+    database, chances = identifiability.database, identifiability.found
+    axes = plot_database(database, chances, ax=ax, legend=legend, cmap=cmap, vmin=0, vmax=1)
     axes.set_title(f"Chance to be found within {identifiability.radius:g} m")
     return axes
 
@@ -207,11 +200,11 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     Parameters
     ----------
     objects : StreetObjects
-        What to draw.
+        The objects.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; in a new figure by default.
+        Axes to draw into; by default those of a new figure.
     legend : bool, default True
-        Whether to name the classes, with their numbers: beside the map, on given axes in a corner.
+        Whether to add a legend of the classes: next to the map, or in a corner if `ax` is given.
 
     Returns
     -------
@@ -233,19 +226,21 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
         raise EmptyResultError("there is no street object to show; look at what was loaded.")
     axes = map_axes(ax)
     signs, counts = class_signs(objects.taxonomy), objects.class_counts
+    # Markers are smaller, and without edges, where there are many objects.
     smaller = min(max(CROWD / len(objects), 1 / 16), 1.0) ** 0.5
-    room = smaller == 1.0
+    with_room = smaller == 1.0
     keys = []
     for code, count in counts.items():
         marker, share = MARKERS[signs[code].shape]
         title = plain(f"{signs[code].symbol} {signs[code].title} ({count:,})")
-        look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": signs[code].colour}
-        look |= {"markeredgecolor": WHITE, "markeredgewidth": 0.5 if count < MANY and room else 0.0}
+        edge = 0.5 if count < MANY and with_room else 0.0
+        style: dict[str, Any] = {"linestyle": "", "marker": marker, "color": signs[code].colour}
+        style |= {"markeredgecolor": WHITE, "markeredgewidth": edge}
         size = smaller * share * next(size for least, size in SIZES if count >= least)
-        # The rare ones last, so that they lie on top.
-        below: dict[str, Any] = {"zorder": 3 - count / len(objects), "rasterized": count >= MANY}
-        axes.plot(*objects.xy[objects.codes == code].T, markersize=size, **look, **below)
-        keys.append(Line2D([], [], markersize=7 * share, label=title, **look))
+        # Rare classes are drawn on top of frequent classes.
+        order: dict[str, Any] = {"zorder": 3 - count / len(objects), "rasterized": count >= MANY}
+        axes.plot(*objects.xy[objects.codes == code].T, markersize=size, **style, **order)
+        keys.append(Line2D([], [], markersize=7 * share, label=title, **style))
     axes.set_title(f"{len(objects):,} street objects")
     _frame(axes)
     if legend and ax is None:
@@ -255,18 +250,18 @@ def plot_objects(objects: StreetObjects, *, ax: Axes | None = None, legend: bool
     return axes
 
 
-MANY, CROWD = 2000, 10_000  # objects of a class, and of all, from which on they are drawn smaller
-SIZES = ((MANY, 2.0), (200, 3.5), (0, 6.5))  # of markers, by how many there are of a class
+MANY, CROWD = 2000, 10_000  # numbers of objects of a class, and of all, with smaller markers
+SIZES = ((MANY, 2.0), (200, 3.5), (0, 6.5))  # of markers, by the least number of objects
 
 
 def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) -> Axes:
-    """Draw where a query may have been seen.
+    """Draw the possible places of a query.
 
     Parameters
     ----------
     answer : Location or Localization
-        The answer. That of the likelihood method shows the chance of every cell in the region of
-        90 %, the place and its ellipse of 90 %; others show the candidates by their rank.
+        The answer. For the likelihood method, the chance of every cell in the region of 90 %, the
+        place and its ellipse of 90 % are drawn; for other methods, the candidates by rank.
     ax, legend : optional
         As in `plot_database`.
 
@@ -287,8 +282,8 @@ def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) 
     axes = map_axes(ax)
     columns = answer.columns
     ranks = np.arange(1, len(columns["cell"]) + 1)
-    # The best last, so that it lies on top.
-    shown = axes.scatter(
+    # The best candidate is drawn last, on top.
+    points = axes.scatter(
         columns["x"][::-1],
         columns["y"][::-1],
         c=ranks[::-1],
@@ -297,11 +292,11 @@ def plot_answer(answer: Answer, *, ax: Axes | None = None, legend: bool = True) 
         linewidths=0.5,
         zorder=3,
     )
-    axes.plot(columns["x"][:1], columns["y"][:1], **_place_look(ANSWERS["given"]))
+    axes.plot(columns["x"][:1], columns["y"][:1], **_place_marker(ANSWERS["given"]))
     axes.set_title(f"The best {len(ranks):,} of {answer.cells:,} cells")
     _frame(axes)
     if legend:
-        _add_bar(axes, shown, "rank")
+        _add_colour_bar(axes, points, "rank")
     return axes
 
 
@@ -312,20 +307,20 @@ def plot_evaluation(
     ax: Axes | None = None,
     label: str | None = None,
 ) -> Axes:
-    """Draw how well queries were answered.
+    """Draw the results of an evaluation.
 
     Parameters
     ----------
     evaluation : Evaluation
-        What to draw.
+        The evaluation.
     kind : {"errors", "recall", "map"}
-        The share of the queries with an error of at most so many metres (the default), the share
-        of those whose true cell is among the best so many per cent of the cells, both with bands of
-        95 %, or where they were asked and which failed.
+        ``errors``: the share of the queries by largest error in metres. ``recall``: the share of
+        the queries by the best per cent of the cells that contain the true cell. Both have bands of
+        95 %. ``map``: the places of successful and failed queries.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; in a new figure by default. Curves of several evaluations may share axes.
+        Axes to draw into; by default those of a new figure. Several curves may share axes.
     label : str, optional
-        What the legend calls a curve; the method and the distortion by default.
+        Name of a curve in the legend; by default the method and the distortion.
 
     Returns
     -------
@@ -335,7 +330,7 @@ def plot_evaluation(
     Raises
     ------
     UnknownNameError
-        If there is no such kind.
+        If the kind is unknown.
 
     Examples
     --------
@@ -356,9 +351,9 @@ def plot_evaluation(
     distortions = chain_text(evaluation.asked.distortions) or "no distortion"
     name = f"{evaluation.method}, {distortions}" if label is None else label
     curve = curve_of(evaluation, name, CURVES[kind])
-    before = len(axes.get_legend_handles_labels()[0])
+    number = len(axes.get_legend_handles_labels()[0])  # of the curves that the axes already have
     draw_frame(axes, plot_of(kind, "", CURVES[kind], [curve]))
-    draw_curve(axes, curve, before, MOST_CURVES)
+    draw_curve(axes, curve, number, MOST_CURVES)
     axes.lines[-1].set_label(plain(name))
     axes.legend(frameon=False, loc="lower right")
     return axes
@@ -366,22 +361,23 @@ def plot_evaluation(
 
 CURVES = {"errors": "error", "recall": "recall"}
 CURVE_SIZE = (6.2, 4.2)  # inches
-MOST_CURVES = 7  # whose markers stand apart
+MOST_CURVES = 7  # with shifted markers
 
 
 def _draw_outcomes(evaluation: Evaluation, axes: Axes) -> Axes:
     places = evaluation.queries.geometry
-    for name, some in (("failed", ~evaluation.successful), ("successful", evaluation.successful)):
+    many = len(places) >= MANY
+    for name, rows in (("failed", ~evaluation.successful), ("successful", evaluation.successful)):
         axes.plot(
-            places.x[some],
-            places.y[some],
+            places.x[rows],
+            places.y[rows],
             linestyle="",
             marker=MARKERS[OUTCOMES[name].shape][0],
             color=OUTCOMES[name].colour,
-            markersize=2.5 if len(places) >= MANY else 6.0,
+            markersize=2.5 if many else 6.0,
             markeredgecolor=WHITE,
-            markeredgewidth=0.0 if len(places) >= MANY else 0.5,
-            label=f"{name} ({int(some.sum()):,})",
+            markeredgewidth=0.0 if many else 0.5,
+            label=f"{name} ({int(rows.sum()):,})",
         )
     within = f"{evaluation.success_metres} m"
     axes.set_title(f"{len(places):,} queries: successful are those placed within {within}")
@@ -391,28 +387,31 @@ def _draw_outcomes(evaluation: Evaluation, axes: Axes) -> Axes:
 
 
 DOT = 4.0  # square points
-AROUND_M = 150.0  # that is shown around an answer at least
+AROUND_M = 150.0  # margin around the region of an answer
+CELL_GROUND = "#ececea"  # colour of cells outside the region
 
 
 def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes:
     database, place = location.posterior.database, location.estimate
-    _draw_cells(axes := map_axes(ax), database, np.ones(len(database)), cmap=_paint(GROUND))
+    axes = map_axes(ax)
+    _draw_cells(axes, database, np.ones(len(database)), cmap=ListedColormap([CELL_GROUND]))
     chances = np.where(location.chances >= min(CELL_CHANCES), location.chances, np.nan)
     _draw_steps(axes, database, chances, CHANCE_STEPS, legend=legend)
-    # So that single cells are seen from afar; the likeliest last, so that they lie on top.
-    seen = location.region[~np.isnan(chances[location.region])][::-1]
-    levels = np.digitize(chances[seen], [*CELL_CHANCES]) - 1
+    # Dots make single cells visible at small scales; the most probable are drawn last, on top.
+    cells = location.region[~np.isnan(chances[location.region])][::-1]
+    levels = np.digitize(chances[cells], [*CELL_CHANCES]) - 1
     colours = np.array([*CELL_CHANCES.values()])[levels]
-    x, y = database.xy[seen].T
+    x, y = database.xy[cells].T
     axes.scatter(x, y, c=colours, s=DOT, linewidths=0, marker="s", zorder=2)
     mark = ANSWERS["given" if location.answer.given else "withheld"]
     longer, shorter, bearing = place.ellipse()
-    # An ellipse of matplotlib is turned against the clock from the east.
+    # matplotlib measures the angle of an ellipse counter-clockwise from the east.
     size: dict[str, Any] = {"width": 2 * shorter, "height": 2 * longer, "angle": -bearing}
     axes.add_patch(
         Ellipse((place.x, place.y), **size, fill=False, edgecolor=mark.colour, linewidth=1.5)
     )
-    axes.plot(place.x, place.y, **_place_look(mark))
+    axes.plot(place.x, place.y, **_place_marker(mark))
+    # The map shows the region and the place, with a margin.
     region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
     low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -423,43 +422,37 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     return axes
 
 
-GROUND = "#ececea"
-
-
-def _place_look(mark: Mark) -> dict[str, Any]:
+def _place_marker(mark: Mark) -> dict[str, Any]:
+    """Return options of matplotlib for the marker of the estimated place."""
     marker, share = MARKERS[mark.shape]
     edge = {"markeredgecolor": mark.colour, "markeredgewidth": 2.5, "markerfacecolor": "none"}
     return {"linestyle": "", "marker": marker, "markersize": 16 * share, "zorder": 4, **edge}
-
-
-def _paint(colour: str) -> ListedColormap:
-    return ListedColormap([colour])
 
 
 def _draw_steps(
     axes: Axes,
     database: SignatureDatabase,
     values: NDArray[np.float64],
-    steps: Steps,
+    steps: ColourSteps,
     *,
     legend: bool,
     **look: Any,  # noqa: ANN401 - whatever matplotlib takes
 ) -> None:
-    """Draw numbers in the colours of their ranges."""
+    """Draw numbers of cells in the colours of their ranges."""
     levels = np.where(np.isnan(values), np.nan, np.digitize(values, [*steps.colours]) - 1.0)
     ends = {"vmin": -0.5, "vmax": len(steps.colours) - 0.5}
     scale = {"cmap": ListedColormap([*steps.colours.values()]), **ends}
     image = _draw_cells(axes, database, levels, **scale, **look)
     if legend:
-        bar = _add_bar(axes, image, steps.title)
+        bar = _add_colour_bar(axes, image, steps.title)
         bar.set_ticks(range(len(steps.labels)), labels=steps.labels)
         bar.ax.tick_params(length=0)
 
 
-def _add_bar(axes: Axes, shown: ScalarMappable, title: str) -> Colorbar:
-    """Tell beside axes what colours mean."""
+def _add_colour_bar(axes: Axes, mappable: ScalarMappable, title: str) -> Colorbar:
+    """Add a colour bar next to axes."""
     figure = cast("Figure", axes.figure)
-    return figure.colorbar(shown, ax=axes, shrink=0.7, label=plain(title))
+    return figure.colorbar(mappable, ax=axes, shrink=0.7, label=plain(title))
 
 
 def _draw_cells(
@@ -468,7 +461,7 @@ def _draw_cells(
     values: NDArray[np.float64],
     **look: Any,  # noqa: ANN401 - whatever matplotlib takes
 ) -> AxesImage:
-    """Draw numbers of cells as an image; of cells that share a pixel in a large city, one."""
+    """Draw numbers of cells as an image; in a large city, several cells may share a pixel."""
     if not len(database):
         raise EmptyResultError(
             "the database has no cells to show; give one with at least one cell."
@@ -476,27 +469,25 @@ def _draw_cells(
     image, side = cell_pixels(database, values, most=MOST_PIXELS)
     west, south = (database.xy.min(axis=0) - database.grid.step / 2).tolist()
     box = (west, west + side * image.shape[1], south, south + side * image.shape[0])
-    # Where several cells come to a pixel of the screen, it has the mean of their colours.
+    # A pixel of the screen that shows several cells has the mean of their colours.
     options = {"origin": "lower", "extent": box, "interpolation_stage": "rgba", **look}
     return axes.imshow(image, **options)
 
 
 def map_axes(ax: Axes | None) -> Axes:
-    """Return axes for a map: those given, or those of a new figure."""
-    if ax is not None:
-        return ax
-    return new_axes(SIZE)
+    """Return `ax`, or the axes of a new figure."""
+    return new_axes(SIZE) if ax is None else ax
 
 
 def new_axes(size: tuple[float, float]) -> Axes:
-    """Return the axes of a new figure of so many inches."""
-    from matplotlib import pyplot as plt  # noqa: PLC0415 - it looks for a screen
+    """Return the axes of a new figure with a width and a height in inches."""
+    from matplotlib import pyplot as plt  # noqa: PLC0415 - it selects a backend for the screen
 
     return plt.subplots(figsize=size, layout="constrained")[1]
 
 
 def _frame(axes: Axes) -> None:
-    """Make a map of axes: as long as wide, with a scale bar in place of coordinates."""
+    """Give axes of a map equal scales and a scale bar instead of coordinates."""
     axes.set(aspect="equal", xticks=[], yticks=[])
     if any(isinstance(artist, AnchoredSizeBar) for artist in axes.artists):
         return
@@ -509,5 +500,5 @@ def _frame(axes: Axes) -> None:
 
 
 def plain(text: str) -> str:
-    """Return text from data that matplotlib shows as it is."""
+    """Return text from data as a short label, without formulas of matplotlib."""
     return label(text, LONGEST_LABEL).replace("$", r"\$")

@@ -1,4 +1,4 @@
-"""Tables of the properties of a database, with the paper's figures of Paris beside them."""
+"""Tables of the properties of a database, with the paper's figures of Paris for comparison."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.database import SignatureDatabase
 
-LONGEST_TYPES = 20  # symbols that fit into a table
+MOST_TYPES = 20  # symbols that fit into a table
 GROUP_LABELS = {"alone": "cells alone in their group", "entropy_bits": "entropy, in bits"}
 
 
@@ -24,7 +24,7 @@ def database_tables(
     file_bytes: int | None = None,
     object_counts: Mapping[int, int] | None = None,
 ) -> tuple[Table, ...]:
-    """Return the paper's Tables 1, 2a and 2b for a database, one of its classes, one of notes."""
+    """Return the paper's Tables 1, 2a and 2b for a database, and tables of classes and notes."""
     facts = database_summary(database, file_bytes=file_bytes, object_counts=object_counts)
     tables = (_occurrence_table, _property_table, _group_table, _class_table)
     return (*(table(facts) for table in tables), *note_tables(facts["notes"]))
@@ -54,15 +54,15 @@ def class_label(item: Mapping[str, Any]) -> str:
 
 
 def _property_table(facts: Mapping[str, Any]) -> Table:
-    size, dense, hidden = facts["file_mb"], facts["mb_per_km2"], facts["occlusion_m"]
+    megabytes, density, depth = facts["file_mb"], facts["mb_per_km2"], facts["occlusion_m"]
     largest = facts["largest_type_group"]
-    seen = [item for item in facts["occurrences"] if item["number"]]
-    own = sum(item["range_m"] != facts["radius_m"] for item in seen)
-    others = f" ({own} classes have their own)" if own else ""
-    occlusion = "none" if hidden is None else f"by buildings, more than {hidden:g} m deep"
+    present = [item for item in facts["occurrences"] if item["number"]]
+    exceptions = sum(item["range_m"] != facts["radius_m"] for item in present)
+    others = f" ({exceptions} classes have their own)" if exceptions else ""
+    occlusion = "none" if depth is None else f"by buildings, more than {depth:g} m deep"
     types = largest["types"]
-    if len(types) > LONGEST_TYPES:
-        types = f"{types[:LONGEST_TYPES]}… ({len(types)} objects)"
+    if len(types) > MOST_TYPES:
+        types = f"{types[:MOST_TYPES]}… ({len(types)} objects)"
     return Table(
         "Database",
         ("Property", "Ours", paris.COLUMN),
@@ -82,8 +82,8 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
             ("Signatures", f"{facts['signatures']:,}", "312,134"),
             ("Mean length", f"{facts['mean_length']:.3f} objects", "14 objects"),
             ("Covered area", f"{facts['covered_km2']:.1f} km²", "79 km²"),
-            ("File", "" if size is None else f"{size:.1f} MB", "38.7 MB"),
-            ("File per km²", "" if dense is None else f"{dense:.2f} MB", "1.24 MB"),
+            ("File", "" if megabytes is None else f"{megabytes:.1f} MB", "38.7 MB"),
+            ("File per km²", "" if density is None else f"{density:.2f} MB", "1.24 MB"),
             ("Largest group by type", f"{types}, {largest['cells']:,} cells", "DDD, 29,958 cells"),
         ),
         (
@@ -94,7 +94,7 @@ def _property_table(facts: Mapping[str, Any]) -> Table:
 
 
 def _viewpoint_text(viewpoints: Mapping[str, Any]) -> str:
-    """Say which cells are looked from."""
+    """Return a text about the cells that have signatures."""
     text: str = {
         "all": "all cells",
         "outdoor": "cells outside buildings",
@@ -115,10 +115,10 @@ def _group_table(facts: Mapping[str, Any]) -> Table:
         tuple(
             (
                 GROUP_LABELS.get(name, name),
-                *(_statistic(name, one[name]) for one in groups),
-                *theirs,
+                *(_statistic_text(name, group[name]) for group in groups),
+                *paper,
             )
-            for name, theirs in paris.GROUPS.items()
+            for name, paper in paris.GROUPS.items()
         ),
         (
             "The paper counts distinct patterns over its 10,000 queries, not over all cells. "
@@ -130,12 +130,12 @@ def _group_table(facts: Mapping[str, Any]) -> Table:
 def _class_table(facts: Mapping[str, Any]) -> Table:
     items = [item for item in facts["occurrences"] if item["number"] or item["objects"]]
     counted = facts["density_from"] == "objects"
-    missed = "" if facts["occlusion_m"] is None else ", without what buildings hide"
+    omission = "" if facts["occlusion_m"] is None else ", without what buildings hide"
     density = (
         "Objects per km² of the covered area."
         if counted
         else "Objects per km² are estimated: what the mean cell sees, divided by the area within "
-        f"range of it{missed}."
+        f"range of it{omission}."
     )
     objects = {"Objects": [f"{item['objects']:,}" for item in items]} if counted else {}
     return Table.of_columns(
@@ -151,7 +151,7 @@ def _class_table(facts: Mapping[str, Any]) -> Table:
     )
 
 
-def _statistic(name: str, value: float | None) -> str:
+def _statistic_text(name: str, value: float | None) -> str:
     """Return one statistic of group sizes as text."""
     if value is None:
         return ""

@@ -1,4 +1,4 @@
-"""Tables of an evaluation, with the paper's figures beside them where it ran the same settings."""
+"""Tables of an evaluation, with the paper's figures if the paper has the same settings."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Titles of the figures of an evaluation, by column; those of the tables by group are shorter.
 FIGURES = {
     **{f"p{metres}": f"P(error ≤ {metres} m)" for metres in ERROR_BREAKS},
     **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
@@ -26,7 +27,7 @@ FIGURES = {
     "precision": "Right answers, of these",
     "in_region": "True cell in the region of 90 %",
 }
-GROUPED = {
+GROUP_FIGURES = {
     **{f"p{metres}": f"P(≤ {metres} m)" for metres in ERROR_BREAKS[1:]},
     **{f"recall{percent}": f"recall@{percent} %" for percent in (1, 10)},
     "coverage": "Answered",
@@ -36,39 +37,39 @@ GROUPED = {
 
 
 def evaluation_headline(evaluation: Evaluation) -> str:
-    """Return the result in one sentence: the share within 50 m and, by likelihood, of answers."""
+    """Return the result in one sentence: success within 50 m and, if there are any, answers."""
     means = evaluation.means()
     p50, low, high = (float(means[name]["p50"]) for name in ("value", "low", "high"))
     near = f"within {evaluation.success_metres} m"
     best = "" if evaluation.top == 1 else f" by the best of {evaluation.top:,} candidates"
-    said = (
+    sentence = (
         f"{short_percent(p50)} of {len(evaluation.queries):,} queries were placed {near}{best} "
         f"(95 %: {short_percent(low, unit='')} to {short_percent(high)})"
     )
     if "coverage" not in means.index:
-        return f"{said}."
+        return f"{sentence}."
     answered, right = (float(means["value"][name]) for name in ("coverage", "precision"))
     if not answered:
-        return f"{said}; the method was not sure enough to answer any of them."
+        return f"{sentence}; the method was not sure enough to answer any of them."
     return (
-        f"{said}; the method was sure enough to answer {short_percent(answered)}, and "
+        f"{sentence}; the method was sure enough to answer {short_percent(answered)}, and "
         f"{short_percent(right)} of these answers were right."
     )
 
 
 def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
-    """Return the settings and the figures of an evaluation, in all and group by group.
+    """Return the settings and the figures of an evaluation, in total and by group.
 
     Parameters
     ----------
     evaluation : Evaluation
-        What to show.
+        The evaluation.
 
     Returns
     -------
     tuple of Table
-        Settings, figures, figures by length and by ambiguity; of the likelihood method, also
-        what stated chances are worth.
+        Settings, figures, figures by length and by ambiguity; for the likelihood method, also
+        the calibration of the chances and the coverage of the answers.
 
     Examples
     --------
@@ -112,17 +113,17 @@ def evaluation_tables(evaluation: Evaluation) -> tuple[Table, ...]:
 
 
 def evaluation_settings(evaluation: Evaluation) -> dict[str, str]:
-    """Return what was asked of what, by name."""
-    asked, database = evaluation.asked, evaluation.database
+    """Return the settings of the queries, the method and the database, by title."""
+    spec, database = evaluation.asked, evaluation.database
     megabytes = database["mb_per_km2"]
-    elsewhere = "" if evaluation.city is None else f" of {evaluation.city}"
+    city = "" if evaluation.city is None else f" of {evaluation.city}"
     return {
         "Method": str(evaluation.method),
         "Best candidates that count (t)": f"{evaluation.top:,}",
-        "Distortions": chain_text(asked.distortions) or "none",
+        "Distortions": chain_text(spec.distortions) or "none",
         "Queries": f"{len(evaluation.queries):,}",
-        "Seen from": asked.seen_from + elsewhere,
-        "Seeds": ", ".join(map(str, asked.seeds)),
+        "Seen from": spec.seen_from + city,
+        "Seeds": ", ".join(map(str, spec.seeds)),
         "Cells": f"{database['cells']:,}",
         "Mean length": f"{database['mean_length']:.3f} objects",
         "Visibility range": f"{database['radius_m']:g} m",
@@ -133,21 +134,27 @@ def evaluation_settings(evaluation: Evaluation) -> dict[str, str]:
 
 
 def _figure_table(evaluation: Evaluation) -> Table:
-    """Return the figures, the paper's beside those that it has."""
+    """Return the figures, with the paper's for comparison."""
     means = evaluation.means()
     p50, recall10 = paris_accuracy(evaluation)
-    theirs = {"p50": p50, "recall10": recall10}
+    paper = {"p50": p50, "recall10": recall10}
     rows = []
     for name in [name for name in FIGURES if name in means.index]:
-        value, low, high = (float(means[part][name]) for part in ("value", "low", "high"))
-        shown = figure(value), interval(low, high), figure(theirs.get(name))
-        rows.append((FIGURES[name], *shown))
+        value, low, high = (float(means[column][name]) for column in ("value", "low", "high"))
+        cells = figure(value), interval(low, high), figure(paper.get(name))
+        rows.append((FIGURES[name], *cells))
     errors = evaluation.queries["error_m"].to_numpy(dtype=np.float64)
     turns = evaluation.queries["heading_error"].to_numpy(dtype=np.float64)
-    rows.append(("Median error", *_amounts(percentile(errors, 50), " m"), ""))
-    rows.append(("90th percentile of the error", *_amounts(percentile(errors, 90), " m"), ""))
+    percentiles = [
+        ("Median error", errors, 50, " m"),
+        ("90th percentile of the error", errors, 90, " m"),
+    ]
     if not np.isnan(turns).all():
-        rows.append(("Median error of the heading", *_amounts(percentile(turns, 50), "°"), ""))
+        percentiles.append(("Median error of the heading", turns, 50, "°"))
+    for title, values, share, unit in percentiles:
+        value, low, high = percentile(values, share)
+        text = figure(value, ",.1f") + (unit if np.isfinite(value) else "")
+        rows.append((title, text, interval(low, high, ",.1f"), ""))
     rows += [
         ("Successful queries", f"{evaluation.successful.mean():.4f}", "", ""),
         ("Unlocalized queries", f"{evaluation.unlocalized:,}", "", ""),
@@ -164,23 +171,17 @@ def _figure_table(evaluation: Evaluation) -> Table:
     return Table("Figures", columns, tuple(rows), note)
 
 
-def _amounts(values: tuple[float, float, float], unit: str) -> tuple[str, str]:
-    """Return a percentile and its interval."""
-    value, low, high = values
-    return figure(value, ",.1f") + (unit if np.isfinite(value) else ""), interval(low, high, ",.1f")
-
-
 def _group_table(groups: pd.DataFrame, title: str, heading: str) -> Table:
-    """Return figures group by group."""
+    """Return the figures of each group of queries."""
     figures = {
-        label: map(figure, groups[name]) for name, label in GROUPED.items() if name in groups
+        label: map(figure, groups[name]) for name, label in GROUP_FIGURES.items() if name in groups
     }
     labels, numbers = map(str, groups.iloc[:, 0]), map("{:,}".format, groups["n"])
     return Table.of_columns(title, {heading: labels, "Queries": numbers, **figures})
 
 
 def paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
-    """Return the paper's P(error <= 50 m) and recall@10 % if it ran these settings."""
+    """Return the paper's P(error <= 50 m) and recall@10 % for these settings, else None."""
     if _paper_level(evaluation) != "medium":
         return None, None
     database = evaluation.database
@@ -188,27 +189,27 @@ def paris_accuracy(evaluation: Evaluation) -> tuple[float | None, float | None]:
 
 
 def paris_points(evaluation: Evaluation) -> tuple[tuple[float, float, str], ...]:
-    """Return what the paper tells of the error curve of these settings, for a plot."""
+    """Return the points of the paper on the error curve of these settings, for a plot."""
     p50, _ = paris_accuracy(evaluation)
     if p50 is not None:
         return ((50.0, p50, "Paris, the same settings"),)
-    told = paris.READ_OFF.get(f"{_paper_level(evaluation)}_small_error")
-    return () if told is None else ((10.0, told, "Paris, small errors (text)"),)
+    share = paris.READ_OFF.get(f"{_paper_level(evaluation)}_small_error")
+    return () if share is None else ((10.0, share, "Paris, small errors (text)"),)
 
 
 def _paper_level(evaluation: Evaluation) -> str | None:
-    """Return the level of distortion if the paper ran its recommended method so."""
-    asked = evaluation.asked
+    """Return the level of distortion if the settings are those of the paper, else None."""
+    spec = evaluation.asked
     # The paper does not say whether it normalised, sorted again or drew classes by frequency.
     measures = str(evaluation.method)
     same_method = measures in {"edit+edit:5%", "edit+edit:5%:raw"} and evaluation.top == 1
-    if not (same_method and asked.seen_from == "cells"):
+    if not (same_method and spec.seen_from == "cells"):
         return None
     if evaluation.database["step_m"] != paris.STEP_M:
         return None
     for level, resort, false_class in product(paris.ERRORS, (True, False), get_args(FalseClass)):
-        same = replace(DISTORTIONS[level], resort=resort, false_class=false_class)
-        if asked.distortions == (same,):
+        distortion = replace(DISTORTIONS[level], resort=resort, false_class=false_class)
+        if spec.distortions == (distortion,):
             return level
     return None
 
@@ -216,10 +217,10 @@ def _paper_level(evaluation: Evaluation) -> str | None:
 def comparison_sentence(
     comparison: pd.DataFrame, changed: tuple[int, int], *, names: tuple[str, str]
 ) -> str:
-    """Return in words what a comparison measured: the difference within 50 m, and if it is chance.
+    """Return a sentence about the difference in success within 50 m, and whether it may be chance.
 
-    `changed` counts the queries gained and lost (`evaluation.compare.changed_successes`); `names`
-    are what the first and the second results are called.
+    `changed` are the numbers of queries gained and lost (`evaluation.changed_successes`); `names`
+    are the names of the first and the second results.
     """
     figures = comparison.set_index("figure")
     points = figures.loc["p50", ["difference", "low", "high"]].to_numpy(np.float64) * 100.0
@@ -231,15 +232,15 @@ def comparison_sentence(
         return f"{second} places as many {within} as {first}."
     more, low, high = (f"{round(point, 1) + 0.0:.1f}" for point in points)  # no -0
     chance = "" if points[1] > 0.0 else ", which may be chance"
-    gained, lost = changed
+    gains, losses = changed
     return (
         f"{second} places {more} points {word} {within} than {first}{chance} "
-        f"(95 %: {low} to {high}): {gained:,} queries gained, {lost:,} lost."
+        f"(95 %: {low} to {high}): {gains:,} queries gained, {losses:,} lost."
     )
 
 
 def comparison_table(comparison: pd.DataFrame, title: str) -> Table:
-    """Return a comparison (see `evaluation.compare.compare_evaluations`), one row a figure."""
+    """Return a comparison (see `evaluation.compare_evaluations`), with a row for each figure."""
     low, high = comparison["low"], comparison["high"]
     verdicts = np.where(low * high > 0, np.where(low > 0, "more", "less"), "")
     return Table.of_columns(

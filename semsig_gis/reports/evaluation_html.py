@@ -1,7 +1,8 @@
-"""The report of an evaluation: how far off, where, for whom, how sure, and the worst failures."""
+"""The report of an evaluation: errors, map, groups of queries, chances and worst failures."""
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from semsig_gis.database import SignatureDatabase
     from semsig_gis.evaluation import Evaluation
 
-GROUPED = {
+GROUP_COLUMNS = {
     "p50": "P(error ≤ 50 m)",
     "recall10": "recall@10 %",
     "coverage": "answered",
@@ -40,24 +41,24 @@ GROUPED = {
 def evaluation_page(
     evaluation: Evaluation, database: SignatureDatabase, *, name: str, command: str = ""
 ) -> Report:
-    """Put together what an evaluation found, to be written by `reports.page.write_page`.
+    """Return the report of an evaluation, for `write_page`.
 
     Parameters
     ----------
     evaluation : Evaluation
-        What was found.
+        The evaluation.
     database : SignatureDatabase
         The database that was searched.
     name : str
-        What the city is called.
+        Name of the city.
     command : str, optional
-        The command that did it.
+        Command line of the evaluation.
 
     Returns
     -------
     Report
-        Headline, error curve, map, success by objects seen and by how many cells look the same,
-        what stated chances are worth, and the worst failures as pairs of scenes.
+        Headline, error curve, map, success by objects seen and by number of equal cells,
+        calibration of the chances, and the worst failures as pairs of scenes.
 
     Raises
     ------
@@ -71,8 +72,15 @@ def evaluation_page(
     >>> evaluation_page(evaluation, demo_database, name="A city").title
     'A city: how well queries are placed'
     """
-    evaluation.rows_in(database)
+    evaluation.rows_in(database)  # raises if another database was searched
     settings = evaluation_settings(evaluation)
+    text = (
+        "The true cell, next to the cell that it was mistaken for. Letters "
+        "around the circle are the distorted query."
+    )
+    pairs = failure_pairs(evaluation, database)
+    failure = Section(name="failures", title="The worst failures", text=(text,), pairs=pairs)
+    failures = [failure] if pairs else []
     return Report(
         title=f"{name}: how well queries are placed",
         headline=evaluation_headline(evaluation),
@@ -87,14 +95,14 @@ def evaluation_page(
             *settings.items(),
             ("Seconds a query", f"{evaluation.seconds_per_query:.4f}"),
             *evaluation.versions.items(),
-            *((name.replace("_gb", ", GB"), str(one)) for name, one in evaluation.machine.items()),
+            *((key.replace("_gb", ", GB"), str(fact)) for key, fact in evaluation.machine.items()),
         ),
         command=command,
         sections=(
             _error_section(evaluation, database),
             _group_section(evaluation),
             *_chance_sections(evaluation),
-            *_failure_sections(evaluation, database),
+            *failures,
         ),
         taxonomy=database.taxonomy,
         facts=evaluation.summary(),
@@ -117,21 +125,21 @@ def _error_section(evaluation: Evaluation, database: SignatureDatabase) -> Secti
         Number(row, "", value, low=low, high=high, unit="m", decimals=1)
         for row, (value, low, high) in percentiles.items()
     ]
-    words = [f"Half of the queries are off by {length(median[0])} or less."]
+    sentences = [f"Half of the queries are off by {length(median[0])} or less."]
     if evaluation.unlocalized:
-        words.append(
+        sentences.append(
             f"Of {evaluation.unlocalized:,} the distortion left nothing to compare: their error is "
             "infinite."
         )
     points = paris_points(evaluation)
     if points:
-        words.append("The paper's figures are of another city, Paris.")
+        sentences.append("The paper's figures are of another city, Paris.")
     best = "" if evaluation.top == 1 else f", best of {evaluation.top:,}"
     curve = curve_of(evaluation, f"{evaluation.method}{best}", "error")
     return Section(
         name="errors",
         title="How far off, and where",
-        text=(" ".join(words),),
+        text=(" ".join(sentences),),
         numbers=tuple(numbers),
         plots=(plot_of("evaluation", "Share of queries by error", "error", [curve], points),),
         maps=(
@@ -146,10 +154,11 @@ def _error_section(evaluation: Evaluation, database: SignatureDatabase) -> Secti
 
 
 def _group_section(evaluation: Evaluation) -> Section:
-    lengths, alike = evaluation.by_length(), evaluation.by_ambiguity()
+    lengths, ambiguities = evaluation.by_length(), evaluation.by_ambiguity()
+    ambiguity = "cells with the same types, the true one included"
     groups = (
         (lengths, "seen", "objects that are really seen", "objects seen: {}"),
-        (alike, "alike", "cells with the same types, the true one included", "cells alike: {}"),
+        (ambiguities, "alike", ambiguity, "cells alike: {}"),
     )
     return Section(
         name="groups",
@@ -160,9 +169,7 @@ def _group_section(evaluation: Evaluation) -> Section:
                 "told apart from them."
             ),
         ),
-        numbers=tuple(
-            number for table, _, _, row in groups for number in _group_numbers(table, row)
-        ),
+        numbers=tuple(itertools.chain(*(_group_numbers(table, row) for table, *_, row in groups))),
         plots=tuple(_group_plot(table, name, x_label) for table, name, x_label, _ in groups),
     )
 
@@ -171,49 +178,43 @@ def _group_numbers(groups: pd.DataFrame, label: str) -> Iterator[Number]:
     for group in groups.to_dict("records"):
         row = label.format(next(iter(group.values())))
         yield Number(row, "queries", group["n"], decimals=0)
-        for name, column in GROUPED.items():
+        for name, column in GROUP_COLUMNS.items():
             if name in group:
                 low, high = (group.get(f"{name}_{end}") for end in ("low", "high"))
                 yield Number(row, column, group[name], low=low, high=high)
 
 
 def _group_plot(groups: pd.DataFrame, name: str, x_label: str) -> Plot:
-    some = groups.assign(place=np.arange(len(groups), dtype=np.float64)).dropna(subset="p50")
-    columns = {label: tuple(some[label].tolist()) for label in some}
-    curves = [
-        Curve(
-            label="within 50 m",
-            x=columns["place"],
-            y=columns["p50"],
-            low=columns["p50_low"],
-            high=columns["p50_high"],
-        )
-    ]
+    numbered = groups.assign(position=np.arange(len(groups), dtype=np.float64))
+    table = numbered.dropna(subset="p50")  # groups with queries
+    columns = {label: tuple(table[label].tolist()) for label in table}
+    x, low, high = (columns[label] for label in ("position", "p50_low", "p50_high"))
+    curves = [Curve(label="within 50 m", x=x, y=columns["p50"], low=low, high=high)]
     if "coverage" in columns:
-        curves.append(Curve(label="answered", x=columns["place"], y=columns["coverage"]))
+        curves.append(Curve(label="answered", x=x, y=columns["coverage"]))
     return Plot(
         name=f"evaluation-{name}",
         title=f"Success by {x_label}",
         x_label=x_label,
         y_label="share of the queries",
         curves=tuple(curves),
-        ticks=tuple((float(at), one) for at, one in enumerate(groups.iloc[:, 0])),
+        ticks=tuple((float(x), text) for x, text in enumerate(groups.iloc[:, 0])),
     )
 
 
 def _chance_sections(evaluation: Evaluation) -> Iterator[Section]:
-    """Yield what chances are worth, of a method that states them."""
+    """Yield the section about the predicted chances, if the method has chances."""
     if evaluation.method.noise is None:
         return
     bins, rules = evaluation.calibration(), evaluation.coverage_curve()
     numbers = []
-    for one in bins.to_dict("records"):
-        row = f"{one['from']:g} to {one['to']:g}"
-        numbers.append(Number(row, "queries", one["n"], decimals=0))
-        if one["n"]:
-            ends = {"low": one["low"], "high": one["high"]}
-            numbers.append(Number(row, "stated", one["stated"], decimals=3))
-            numbers.append(Number(row, "came true", one["true"], **ends, decimals=3))
+    for chances in bins.to_dict("records"):
+        row = f"{chances['from']:g} to {chances['to']:g}"
+        numbers.append(Number(row, "queries", chances["n"], decimals=0))
+        if chances["n"]:
+            ends = {"low": chances["low"], "high": chances["high"]}
+            numbers.append(Number(row, "stated", chances["stated"], decimals=3))
+            numbers.append(Number(row, "came true", chances["true"], **ends, decimals=3))
     answered = rules[rules["answered"] > 0]
     columns = {name: tuple(answered[name].tolist()) for name in answered}
     x = columns["threshold"]
@@ -246,19 +247,3 @@ def _chance_sections(evaluation: Evaluation) -> Iterator[Section]:
             ),
         ),
     )
-
-
-def _failure_sections(evaluation: Evaluation, database: SignatureDatabase) -> Iterator[Section]:
-    pairs = failure_pairs(evaluation, database)
-    if pairs:
-        yield Section(
-            name="failures",
-            title="The worst failures",
-            text=(
-                (
-                    "The true cell, next to the cell that it was mistaken for. Letters "
-                    "around the circle are the distorted query."
-                ),
-            ),
-            pairs=pairs,
-        )

@@ -1,4 +1,4 @@
-"""Tables of how well a city can be told apart, and of what each class adds."""
+"""Tables and report of the identifiability of the cells of a city, and of its classes."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ SCORES = {
 }
 
 
-def shot(view: float) -> str:
-    """Return what a query of so many degrees is called."""
+def query_name(view: float) -> str:
+    """Return the name of a query with a field of view in degrees."""
     return "query" if view == FULL_TURN else f"photo of {view:g} degrees"
 
 
 def identifiability_tables(
     identifiability: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
-    """Return tables of the mean cell with the bands of cells, and of what each class adds.
+    """Return tables of the mean cell with the bands of cells, and of the gain by each class.
 
-    `object_counts` is by class code; without it the columns about objects are left out.
+    `object_counts` is by class code; without it the columns about objects are omitted.
     """
     facts = identifiability.summary(object_counts=object_counts)
     within = f"within {facts['radius_m']:g} m"
@@ -47,7 +47,7 @@ def identifiability_tables(
     }
     whole = Table(
         title=f"Identifiability, {facts['noise']} noise",
-        columns=(f"A {shot(facts['view_degrees'])} from the mean cell", ""),
+        columns=(f"A {query_name(facts['view_degrees'])} from the mean cell", ""),
         rows=tuple({**cells, **bits, **bands}.items()),
         note=f"Expected before any query, by {facts['trials']:,} simulated ones.",
     )
@@ -74,12 +74,12 @@ def check_tables(check: IdentifiabilityCheck) -> tuple[Table, ...]:
     calibration = Table.of_columns(
         "Do the chances come true?",
         {
-            "Chance to be found": [f"{one.low:g} to {one.high:g}" for one in check.bins],
-            "Queries": [f"{one.queries:,}" for one in check.bins],
-            "Stated": [percent(one.stated) for one in check.bins],
-            "Found": [percent(one.true) for one in check.bins],
+            "Chance to be found": [f"{item.low:g} to {item.high:g}" for item in check.bins],
+            "Queries": [f"{item.queries:,}" for item in check.bins],
+            "Stated": [percent(item.stated) for item in check.bins],
+            "Found": [percent(item.true) for item in check.bins],
             "Interval (95 %)": [
-                f"{percent(one.true_low)} to {percent(one.true_high)}" for one in check.bins
+                f"{percent(item.true_low)} to {percent(item.true_high)}" for item in check.bins
             ],
         },
         f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",
@@ -103,12 +103,22 @@ def identifiability_page(
     object_counts: Mapping[int, int] | None = None,
     command: str = "",
 ) -> Report:
-    """Put together what is known of the cells of a database, and whether fresh queries agree."""
+    """Return the report of the identifiability of a database and its check by new queries."""
     facts = identifiability.summary(object_counts=object_counts)
+    query = query_name(facts["view_degrees"])
+    shares = _cell_chances(facts)
+    for band, share in _band_shares(facts).items():
+        shares[f"cells found with a chance of {band}"] = share
+    cells = Section(
+        name="cells",
+        title="Cells",
+        text=("The first three are of a query from the mean cell, the others shares of cells.",),
+        numbers=tuple(Number(row, "share", share) for row, share in shares.items()),
+    )
     return Report(
         title=f"Where a query can be placed in {name}",
         headline=(
-            f"From the mean cell, a {shot(facts['view_degrees'])} is placed within "
+            f"From the mean cell, a {query} is placed within "
             f"{facts['radius_m']:g} m with a chance of {short_percent(facts['chance_found'])}; of "
             f"{check.queries:,} fresh ones, {short_percent(check.found)} were."
         ),
@@ -116,7 +126,7 @@ def identifiability_page(
         text=(
             (
                 "Before any query, every cell gets the chance that a "
-                f"{shot(facts['view_degrees'])} from it will be placed "
+                f"{query} from it will be placed "
                 f"within {facts['radius_m']:g} m, by {facts['trials']:,} simulated queries and by "
                 f"how like the other cells are. {check.queries:,} new queries show whether the "
                 "chances come true."
@@ -131,7 +141,7 @@ def identifiability_page(
             ("semsig_gis", __version__),
         ),
         sections=(
-            _cell_section(facts),
+            cells,
             _class_section(facts),
             _calibration_section(check),
             _rank_section(check),
@@ -157,18 +167,6 @@ def _band_shares(facts: Mapping[str, Any]) -> dict[str, float]:
     return {f"{band['from']:g} to {band['to']:g}": band["share"] for band in bands}
 
 
-def _cell_section(facts: Mapping[str, Any]) -> Section:
-    shares = _cell_chances(facts)
-    for band, share in _band_shares(facts).items():
-        shares[f"cells found with a chance of {band}"] = share
-    return Section(
-        name="cells",
-        title="Cells",
-        text=("The first three are of a query from the mean cell, the others shares of cells.",),
-        numbers=tuple(Number(row, "share", share) for row, share in shares.items()),
-    )
-
-
 def _class_section(facts: Mapping[str, Any]) -> Section:
     numbers = []
     for item in facts["classes"]:
@@ -189,20 +187,16 @@ def _class_section(facts: Mapping[str, Any]) -> Section:
 
 def _calibration_section(check: IdentifiabilityCheck) -> Section:
     numbers = []
-    for one in check.bins:
-        row = f"{one.low:g} to {one.high:g}"
+    for item in check.bins:
+        row = f"{item.low:g} to {item.high:g}"
         numbers += [
-            Number(row, "queries", one.queries, decimals=0),
-            Number(row, "stated", one.stated, decimals=3),
-            Number(row, "found", one.true, low=one.true_low, high=one.true_high, decimals=3),
+            Number(row, "queries", item.queries, decimals=0),
+            Number(row, "stated", item.stated, decimals=3),
+            Number(row, "found", item.true, low=item.true_low, high=item.true_high, decimals=3),
         ]
-    curve = Curve(
-        label="fresh queries",
-        x=tuple(one.stated for one in check.bins),
-        y=tuple(one.true for one in check.bins),
-        low=tuple(one.true_low for one in check.bins),
-        high=tuple(one.true_high for one in check.bins),
-    )
+    points = [(item.stated, item.true, item.true_low, item.true_high) for item in check.bins]
+    x, y, low, high = zip(*points, strict=True) if points else ((), (), (), ())
+    curve = Curve(label="fresh queries", x=x, y=y, low=low, high=high)
     plot = Plot(
         name="identifiability-calibration",
         title="Chance to be found: predicted and observed",

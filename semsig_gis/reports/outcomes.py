@@ -1,4 +1,4 @@
-"""A small map of where queries were asked, and which of them were successful."""
+"""A small map of successful and failed queries."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from semsig_gis.reports.plots import Picture
 
 MOST_SQUARES = 400  # along a side
-MANY_PLACES = 2000  # which are drawn as pixels
+MANY_PLACES = 2000  # queries beyond this number are drawn as pixels
 # Inches.
 WIDTH, MARGIN = 5.0, 0.1
 LEAST_HEIGHT, MOST_HEIGHT = 2.0, 3.4
@@ -48,12 +48,14 @@ def outcome_map(
 
 
 def draw_map(shown: OutcomeMap) -> Picture:
-    """Draw a map, north up: the same bytes for the same map."""
+    """Draw a map, north up; the same map gives the same bytes."""
+    # The extent of the cells and of the queries, with a margin.
     extent = shown.step * np.array(shown.ground.shape[::-1])
     low = np.minimum(shown.places.min(axis=0, initial=0.0), 0.0)
     high = np.maximum(shown.places.max(axis=0, initial=0.0), extent)
     margin = 0.03 * (high - low).max()
     across, up = (high - low + 2 * margin).tolist()
+    # The height of the map follows its shape, within limits; the map is centred in it.
     titles = textwrap.wrap(label(shown.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
     above = TITLE_LINE * len(titles) + 0.12
     inside = WIDTH - 2 * MARGIN
@@ -61,8 +63,10 @@ def draw_map(shown: OutcomeMap) -> Picture:
     reach = np.array([inside, tall]) / 2 * max(across / inside, up / tall)
     (left, bottom), (right, top) = (low + high) / 2 - reach, (low + high) / 2 + reach
     height = above + tall + LEGEND
-    kinds = dict(zip(OUTCOMES, (shown.successful, ~shown.successful), strict=True))
-    looks = {kind: _look(mark, len(shown.places)) for kind, mark in OUTCOMES.items()}
+    rows = dict(zip(OUTCOMES, (shown.successful, ~shown.successful), strict=True))
+    options = {
+        outcome: _outcome_marker(mark, len(shown.places)) for outcome, mark in OUTCOMES.items()
+    }
     with blank_figure(WIDTH, height) as figure:
         place = (MARGIN / WIDTH, LEGEND / height, inside / WIDTH, tall / height)
         axes = figure.add_axes(place)
@@ -72,16 +76,16 @@ def draw_map(shown: OutcomeMap) -> Picture:
         axes.imshow(pixels, origin="lower", extent=ends, interpolation="nearest", aspect="auto")
         axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
         many = len(shown.places) > MANY_PLACES
-        for kind, some in reversed(kinds.items()):
-            axes.plot(*shown.places[some].T, **looks[kind], rasterized=many)
+        for outcome, selected in reversed(rows.items()):
+            axes.plot(*shown.places[selected].T, **options[outcome], rasterized=many)
         draw_north(axes)
         draw_scale(axes, float(reach[0]))
         heading: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5}
         figure.text(MARGIN / WIDTH, 1 - 0.08 / height, "\n".join(titles), **heading)
-        counts = {kind: f"{kind}: {int(some.sum()):,}" for kind, some in kinds.items()}
+        counts = {name: f"{name}: {int(selected.sum()):,}" for name, selected in rows.items()}
         keys = [
-            (Line2D([], [], **{**looks[kind], "markersize": 7.0}), text)
-            for kind, text in counts.items()
+            (Line2D([], [], **{**options[outcome], "markersize": 7.0}), text)
+            for outcome, text in counts.items()
         ]
         place_of_keys = (MARGIN / WIDTH, 0.24 / height, (WIDTH - MARGIN) / WIDTH)
         draw_legend(figure, keys, place=place_of_keys, columns=2, size=9, sign_width=1)
@@ -89,7 +93,8 @@ def draw_map(shown: OutcomeMap) -> Picture:
         return saved(figure, title=shown.title, description=description)
 
 
-def _look(mark: Mark, places: int) -> dict[str, Any]:
+def _outcome_marker(mark: Mark, places: int) -> dict[str, Any]:
+    """Return options of matplotlib for the markers of an outcome; many places are smaller."""
     marker, share = MARKERS[mark.shape]
     size = 5.0 if places <= MANY_PLACES / 4 else 3.5 if places <= MANY_PLACES else 2.5
     return {
@@ -97,7 +102,7 @@ def _look(mark: Mark, places: int) -> dict[str, Any]:
         "marker": marker,
         "color": mark.colour,
         "markersize": share * size,
-        # White on either ground, so that the dark one is seen in the dark.
+        # White edges make dark markers visible on the dark background, too.
         "markeredgecolor": WHITE,
         "markeredgewidth": 0.1 * size,
     }

@@ -1,4 +1,4 @@
-"""Curves as pictures that also read in black and white."""
+"""Draw plots of curves that are readable in black and white, and save figures."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ COLOURS = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
     *("#333333", "#882255", "#999933"),
 )
-"""Colours that colour-blind people tell apart: those of Okabe and Ito, and two of Tol."""
+"""Colours that colour-blind people can distinguish: of Okabe and Ito, and two of Tol."""
 
-# Of what is drawn and what it is drawn on; a letter on a sign is just black or white.
+# Colours of the foreground and the background; a letter on a sign is plain black or white.
 INK: str = "#222222"
 GROUND: str = "#fefefe"
 AXIS, TICK, GRID, SOFT = "#777777", "#555555", "#dddddd", "#999999"
@@ -57,10 +57,10 @@ DARK: Mapping[str, str] = MappingProxyType(
         "#882255": "#d77ba6",
     }
 )
-"""What colours become in the dark; all others are seen on both grounds."""
+"""Colours that are replaced on a dark background; all others are visible on both backgrounds."""
 
 DOTS_PER_INCH = 200
-# Text stays text in an SVG: a reader can search it, copy it and read it in any script.
+# Text stays text in an SVG, so that it can be searched and copied, in any script.
 SETTINGS = {
     "svg.fonttype": "none",
     "svg.hashsalt": "semsig_gis",
@@ -82,10 +82,7 @@ SETTINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture in two formats; ``description`` tells what is seen to those who cannot see it.
-
-    The SVG carries it as its ``desc``, from which the documentation takes it.
-    """
+    """A picture in two formats; ``description`` is the alternative text, also in the SVG."""
 
     svg: bytes = field(repr=False)
     png: bytes = field(repr=False)
@@ -98,35 +95,35 @@ class Picture:
 
 @contextlib.contextmanager
 def blank_figure(width: float, height: float) -> Iterator[Figure]:
-    """Give an empty figure (inches) with settings of our own, until the block ends."""
-    # The backend stays as it is: it is the one of whoever draws on a screen.
+    """Yield an empty figure (inches) with fixed settings, whatever the user has set."""
+    # The backend is not changed: the user may draw on a screen.
     settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS}
     del settings["backend"]
     with mpl.rc_context(settings), warnings.catch_warnings():
-        # A PNG shows boxes for what its font does not have; a browser has fonts of its own.
+        # A PNG shows boxes for missing glyphs; a browser uses other fonts for an SVG.
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         yield Figure(figsize=(width, height), facecolor=GROUND)
 
 
 def saved(figure: Figure, *, title: str, description: str) -> Picture:
-    """Return a figure as files without dates and names of programs, within `blank_figure`.
+    """Return a figure of `blank_figure` as files, without dates and program names.
 
-    Title and description are what a screen reader says.
+    Title and description are for screen readers.
     """
     svg, png = io.BytesIO(), io.BytesIO()
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(svg, format="svg", metadata=nothing)
+    no_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(svg, format="svg", metadata=no_metadata)
     figure.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    # Without the document type, which names an address on the web.
-    _, opened, rest = svg.getvalue().decode("utf-8").partition("<svg ")
+    # Drop the document type, which has an address on the web, and add the texts.
+    _, start, rest = svg.getvalue().decode("utf-8").partition("<svg ")
     head, _, body = rest.partition(">")
     text = f"<title>{escape(one_line(title))}</title>\n<desc>{escape(one_line(description))}</desc>"
-    page = f'<?xml version="1.0" encoding="utf-8"?>\n{opened}role="img" {head}>\n{text}{body}'
+    page = f'<?xml version="1.0" encoding="utf-8"?>\n{start}role="img" {head}>\n{text}{body}'
     return Picture(page.encode("utf-8"), png.getvalue(), one_line(description))
 
 
 def in_the_dark(svg: bytes) -> bytes:
-    """Return a drawing of `saved` that is dark on a screen where its reader likes that."""
+    """Return an SVG of `saved` that is dark on a screen if the reader prefers dark colours."""
     rules = "".join(
         f'[style*="{part}: {light}"]{{{part}:{dark}!important}}'
         for light, dark in DARK.items()
@@ -138,7 +135,7 @@ def in_the_dark(svg: bytes) -> bytes:
 
 
 def label(text: str, length: int) -> str:
-    """Return text on one line of at most so many letters, of which, say, a Chinese one is two."""
+    """Truncate text to one line of `length` columns; wide characters count twice."""
     plain = one_line(text)
     wide = (unicodedata.east_asian_width(letter) in "WF" for letter in plain)
     ends = list(itertools.accumulate(1 + is_wide for is_wide in wide))
@@ -150,11 +147,11 @@ def label(text: str, length: int) -> str:
 def cell_pixels(
     database: SignatureDatabase, values: NDArray[np.float64], *, most: int
 ) -> tuple[NDArray[np.float64], float]:
-    """Return numbers of cells as an image, south first, NaN where none is, and a pixel's metres.
+    """Return numbers of cells as an image, south first, NaN without a cell, and a pixel's metres.
 
-    In a city with more than `most` cells a side, one of those that share a pixel is drawn.
+    If a side has more than `most` cells, several cells share a pixel, which has the value of one.
     """
-    columns, rows = (one - one.min() for one in (database.columns, database.rows))
+    columns, rows = (axis - axis.min() for axis in (database.columns, database.rows))
     merged = math.ceil((max(columns.max(), rows.max()) + 1) / most)
     columns, rows = columns // merged, rows // merged
     image = np.full((rows.max() + 1, columns.max() + 1), np.nan)
@@ -171,19 +168,20 @@ def draw_legend(
     size: float,
     sign_width: float,
 ) -> None:
-    """Draw a legend in columns of one width, at left, top and width as shares of the figure's.
+    """Draw a legend in columns of equal width.
 
-    ``size`` is in points, ``sign_width`` in letters.
+    `place` is left, top and width as shares of the figure; `size` is in points, `sign_width` in
+    letters.
     """
     left, top, width = place
     rows = math.ceil(len(keys) / columns)
     for column in range(columns):
-        part = keys[column * rows : (column + 1) * rows]
-        if part:
+        column_keys = keys[column * rows : (column + 1) * rows]
+        if column_keys:
             figure.legend(
-                [sign for sign, _ in part],
-                # matplotlib leaves out what begins with an underscore.
-                [f" {text}" if text.startswith("_") else text for _, text in part],
+                [sign for sign, _ in column_keys],
+                # matplotlib omits labels that begin with an underscore.
+                [f" {text}" if text.startswith("_") else text for _, text in column_keys],
                 loc="upper left",
                 bbox_to_anchor=(left + column * width / columns, top),
                 frameon=False,
@@ -196,26 +194,26 @@ def draw_legend(
             )
 
 
-# So many colours, dashes and markers that no two curves of a plot look alike.
+# The numbers of colours, dashes and markers differ, so that their combinations do not repeat.
 DASHES = ("-", (0, (5, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.4, 1.2)))
-# Each with the size at which it looks as large as the others.
-MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
+# Each marker with the size at which it looks as large as the others.
+LINE_MARKERS = (("o", 5.2), ("s", 5.0), ("^", 6.4), ("D", 4.8), ("v", 6.4), ("P", 7.0), ("X", 7.0))
 BAND_SHADE, MANY_BANDS = 0.16, 4
 FEW_POINTS = 12
 FEW_TICKS, MANY_TICKS = 6, 9
-# Of a logarithmic axis, in every decade: as many as there is room for.
-STEPS = ((1, 2, 5), (1, 5), (1,))
+# Ticks of each decade of a logarithmic axis; the first choice that is not too many is used.
+DECADE_STEPS = ((1, 2, 5), (1, 5), (1,))
 RIGHT_END = 0.9  # share of the width
 MARKERS_APART = 0.14  # share of the diagonal
-# Inches: so small that letters can be read where a page is as wide as a phone.
+# Inches: small enough that letters are readable on the screen of a phone.
 WIDTH = 5.0
 LEFT, RIGHT = 0.66, 0.2
 AXES_HEIGHT = 2.8
 TITLE_LINE, LEGEND_LINE = 0.22, 0.2
 BELOW_AXES = 0.52
 TITLE_LETTERS = 55
-# How many columns a legend has by the letters of its longest label.
-COLUMNS = ((9, 4), (14, 3), (25, 2))
+# Largest number of letters of a label, and the number of columns of a legend.
+LEGEND_COLUMNS = ((9, 4), (14, 3), (25, 2))
 LONGEST_LABEL = 54
 
 
@@ -225,7 +223,7 @@ def draw_plot(plot: Plot) -> Picture:
     Parameters
     ----------
     plot : Plot
-        Its curves; those of many points have a band for their intervals, those of few have bars.
+        The plot; a curve of many points has a band for its intervals, one of few points has bars.
 
     Returns
     -------
@@ -241,7 +239,12 @@ def draw_plot(plot: Plot) -> Picture:
     'Errors. Share by m. Edit: 0.5 at 0, 1 at 50.'
     """
     titles = textwrap.wrap(label(plot.title, 2 * TITLE_LETTERS), TITLE_LETTERS)
-    curves, others = _keys(plot), _other_keys(plot)
+    curves: Keys = [
+        (Line2D([], [], **_line_options(number)), label(curve.label, LONGEST_LABEL))
+        for number, curve in enumerate(plot.curves)
+    ]
+    others = _other_keys(plot)
+    # The figure is as high as its titles, axes and legends need.
     heights = [LEGEND_LINE * math.ceil(len(keys) / _columns(keys)) for keys in (curves, others)]
     below = BELOW_AXES + sum(heights) + 0.08
     above = TITLE_LINE * len(titles) + 0.16
@@ -252,18 +255,18 @@ def draw_plot(plot: Plot) -> Picture:
         draw_frame(axes, plot)
         for number, curve in enumerate(plot.curves):
             draw_curve(axes, curve, number, len(plot.curves))
-        _draw_paper(axes, plot.paper)
-        look: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5, "linespacing": 1.25}
-        figure.text(0.1 / WIDTH, 1 - 0.08 / height, "\n".join(titles), **look)
+        _draw_paper_points(axes, plot.paper)
+        font: dict[str, Any] = {"va": "top", "weight": "bold", "size": 10.5, "linespacing": 1.25}
+        figure.text(0.1 / WIDTH, 1 - 0.08 / height, "\n".join(titles), **font)
         for keys, top in ((curves, sum(heights)), (others, heights[1])):
             place = (LEFT / WIDTH, (top + 0.04) / height, (WIDTH - LEFT) / WIDTH)
             columns = _columns(keys)
             draw_legend(figure, keys, place=place, columns=columns, size=9, sign_width=3.2)
-        return saved(figure, title=plot.title, description=_described(plot))
+        return saved(figure, title=plot.title, description=_plot_description(plot))
 
 
 def draw_frame(axes: Axes, plot: Plot) -> None:
-    """Draw the axes of a plot: what they show, from where to where."""
+    """Set the limits, labels, ticks and grid of the axes of a plot."""
     xs = itertools.chain(*(curve.x for curve in plot.curves), (x for x, _, _ in plot.paper))
     values = sorted({x for x in xs if math.isfinite(x)}) or [0.0, 1.0]
     left, right = values[0], values[-1]
@@ -281,9 +284,9 @@ def draw_frame(axes: Axes, plot: Plot) -> None:
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     if plot.ticks:
-        places = [x for x, _ in plot.ticks]
-        axes.set_xticks(places, [label(text, 20) for _, text in plot.ticks])
-        axes.set_xlim(min(places) - 0.4, max(places) + 0.4)
+        positions = [x for x, _ in plot.ticks]
+        axes.set_xticks(positions, [label(text, 20) for _, text in plot.ticks])
+        axes.set_xlim(min(positions) - 0.4, max(positions) + 0.4)
     elif len(values) <= FEW_TICKS and not plot.log:
         axes.set_xticks(values, [f"{x:g}" for x in values])
     if plot.diagonal:
@@ -291,18 +294,18 @@ def draw_frame(axes: Axes, plot: Plot) -> None:
 
 
 def _draw_log_axis(axes: Axes, values: Sequence[float]) -> None:
-    """Scale the x axis by the logarithm; a 0 stands a little before the least x above it."""
-    above = [x for x in values if x > 0.0] or [1.0]
-    least, most = above[0], above[-1]
+    """Make the x axis logarithmic; a 0 is shown to the left of the smallest positive x."""
+    positive = [x for x in values if x > 0.0] or [1.0]
+    least, most = positive[0], positive[-1]
     with_zero = values[0] <= 0.0
     if with_zero:
         axes.set_xscale("symlog", linthresh=least, linscale=0.25)
     else:
         axes.set_xscale("log")
     decades = range(math.floor(math.log10(least)), math.ceil(math.log10(most)) + 1)
-    for steps in STEPS:
-        some = [step * 10.0**power for power in decades for step in steps]
-        ticks = [0.0] * with_zero + [one for one in some if least <= 1.001 * one <= 1.002 * most]
+    for steps in DECADE_STEPS:
+        numbers = [step * 10.0**power for power in decades for step in steps]
+        ticks = [0.0] * with_zero + [x for x in numbers if least <= 1.001 * x <= 1.002 * most]
         if len(ticks) < MANY_TICKS:
             break
     axes.set_xticks(ticks, [f"{tick:,g}" for tick in ticks])
@@ -312,26 +315,28 @@ def _draw_log_axis(axes: Axes, values: Sequence[float]) -> None:
 
 
 def draw_curve(axes: Axes, curve: Curve, number: int, curves: int) -> None:
-    """Draw one of so many curves, with its band or bars; its line is the last of the axes."""
-    look = _look(number)
+    """Draw curve `number` of `curves`, with its band or bars; its line is the last of the axes."""
+    options = _line_options(number)
+    colour = options["color"]
     x, y = np.asarray(curve.x, np.float64), np.asarray(curve.y, np.float64)
     few = int((np.isfinite(x) & np.isfinite(y)).sum()) <= FEW_POINTS
     if curve.low:
         low, high = np.asarray(curve.low, np.float64), np.asarray(curve.high, np.float64)
         if few:
-            axes.vlines(x, low, high, colors=look["color"], linewidth=1.2)
+            axes.vlines(x, low, high, colors=colour, linewidth=1.2)
             for ends in (low, high):
-                axes.plot(x, ends, linestyle="", marker="_", color=look["color"], markersize=6)
+                axes.plot(x, ends, linestyle="", marker="_", color=colour, markersize=6)
         else:
             shade = BAND_SHADE if curves <= MANY_BANDS else 0.6 * BAND_SHADE
-            axes.fill_between(x, low, high, color=look["color"], alpha=shade, linewidth=0)
-    # Each curve has its markers elsewhere, so that curves on one another are seen.
+            axes.fill_between(x, low, high, color=colour, alpha=shade, linewidth=0)
+    # The markers of the curves are shifted, so that curves that coincide are both visible.
     every = None if few else (MARKERS_APART * number / curves, MARKERS_APART)
-    axes.plot(x, y, markevery=every, zorder=3, **look)
+    axes.plot(x, y, markevery=every, zorder=3, **options)
 
 
-def _look(number: int) -> dict[str, Any]:
-    marker, size = MARKERS[number % len(MARKERS)]
+def _line_options(number: int) -> dict[str, Any]:
+    """Return options of matplotlib for the line of a curve."""
+    marker, size = LINE_MARKERS[number % len(LINE_MARKERS)]
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": DASHES[number % len(DASHES)],
@@ -343,38 +348,32 @@ def _look(number: int) -> dict[str, Any]:
     }
 
 
-def _draw_paper(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
-    across = axes.transScale + axes.transLimits
+def _draw_paper_points(axes: Axes, points: Sequence[tuple[float, float, str]]) -> None:
+    """Draw the points of the paper; several points are numbered, on the side with room."""
+    to_shares = axes.transScale + axes.transLimits
     for number, (x, y, _) in enumerate(points, 1):
-        axes.plot([x], [y], clip_on=False, zorder=5, **_PAPER_LOOK)
+        axes.plot([x], [y], clip_on=False, zorder=5, **_PAPER_MARKER)
         if len(points) > 1:
-            side = -1 if across.transform((x, y))[0] > RIGHT_END else 1
+            side = -1 if to_shares.transform((x, y))[0] > RIGHT_END else 1
             halo = {"facecolor": GROUND, "alpha": 0.8, "edgecolor": "none", "pad": 0.6}
-            look: dict[str, Any] = {"va": "center", "weight": "bold", "size": 9, "bbox": halo}
-            look |= {"xytext": (7 * side, -4), "ha": "left" if side > 0 else "right"}
-            axes.annotate(str(number), (x, y), textcoords="offset points", **look, zorder=6)
+            font: dict[str, Any] = {"va": "center", "weight": "bold", "size": 9, "bbox": halo}
+            font |= {"xytext": (7 * side, -4), "ha": "left" if side > 0 else "right"}
+            axes.annotate(str(number), (x, y), textcoords="offset points", **font, zorder=6)
 
 
-_PAPER_LOOK: dict[str, Any] = {
+_PAPER_MARKER: dict[str, Any] = {
     "color": INK,
     "linestyle": "",
     "marker": "D",
     "markersize": 7.5,
-    "markerfacecolor": "none",  # ours is often below
+    "markerfacecolor": "none",  # a marker of ours is often below it
     "markeredgewidth": 1.7,
 }
 Keys = list[tuple[Line2D | Patch, str]]
 
 
-def _keys(plot: Plot) -> Keys:
-    return [
-        (Line2D([], [], **_look(number)), label(curve.label, LONGEST_LABEL))
-        for number, curve in enumerate(plot.curves)
-    ]
-
-
 def _other_keys(plot: Plot) -> Keys:
-    """Return what the legend says below the curves."""
+    """Return the keys of the legend below those of the curves."""
     keys: Keys = []
     if any(curve.low for curve in plot.curves):
         keys.append((Patch(color=SOFT, alpha=0.4, linewidth=0), "interval of 95 %"))
@@ -383,7 +382,7 @@ def _other_keys(plot: Plot) -> Keys:
         keys.append((Line2D([], [], color=SOFT, linewidth=1, linestyle=dashes), "y = x"))
     several = len(plot.paper) > 1
     for number, (_, _, text) in enumerate(plot.paper, 1):
-        sign = Line2D([], [], **_PAPER_LOOK)
+        sign = Line2D([], [], **_PAPER_MARKER)
         source = f"paper {number}" if several else "paper"
         keys.append((sign, label(f"{source}: {text}", LONGEST_LABEL)))
     return keys
@@ -391,16 +390,17 @@ def _other_keys(plot: Plot) -> Keys:
 
 def _columns(keys: Keys) -> int:
     longest = max((len(text) for _, text in keys), default=0)
-    return next((columns for letters, columns in COLUMNS if longest <= letters), 1)
+    return next((columns for letters, columns in LEGEND_COLUMNS if longest <= letters), 1)
 
 
-def _described(plot: Plot) -> str:
+def _plot_description(plot: Plot) -> str:
+    """Return the alternative text: each curve with its ends, or with all its points by tick."""
     lines = [f"{plot.title}.", f"{_capital(plot.y_label)} by {plot.x_label}."]
     names = dict(plot.ticks)
     for curve in plot.curves:
         ends = range(len(curve.x)) if plot.ticks else [at for at in (0, -1) if curve.x]
-        told = dict.fromkeys((curve.x[at], curve.y[at]) for at in ends)
-        points = ", ".join(f"{y:.4g} at {names.get(x, f'{x:.4g}')}" for x, y in told)
+        ends_once = dict.fromkeys((curve.x[at], curve.y[at]) for at in ends)
+        points = ", ".join(f"{y:.4g} at {names.get(x, f'{x:.4g}')}" for x, y in ends_once)
         lines.append(f"{_capital(curve.label)}: {points or 'no points'}.")
     lines += [f"The paper, {text}: {y:.4g} at {x:.4g}." for x, y, text in plot.paper]
     return " ".join(lines)

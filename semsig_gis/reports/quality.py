@@ -18,25 +18,24 @@ if TYPE_CHECKING:
 
 
 ROW_COUNTS = tuple(field.name for field in fields(RowCounts))
-# A table has no room for all that is said of a layer with many unreadable rows.
-NOTES_SHOWN = 4
-# Tables that are left out where they have nothing to say.
+NOTES_SHOWN = 4  # per layer; one with many unreadable rows would have too many
+# Tables that are omitted when they have no rows.
 MAY_BE_EMPTY = frozenset({"Conflated", "Layers not read"})
 
 
 def quality_tables(report: QualityReport) -> tuple[Table, ...]:
-    """Return objects by class, rows by layer, what was not read or conflated, place and licences.
+    """Return the tables of a quality report: classes, layers, conflation, place and licences.
 
     Parameters
     ----------
     report : QualityReport
-        What `quality_report` gives.
+        Result of `quality_report`.
 
     Returns
     -------
     tuple of Table
-        Four tables, and one more with layers that were not read, with conflated objects and with
-        notes about all of the load.
+        Four tables; if there are any, also a table of layers that were not read, of conflated
+        objects and of notes.
 
     Examples
     --------
@@ -56,7 +55,11 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             "Layers not read",
             ("layer", "class", "objects"),
             tuple(
-                (item.name, ", ".join(item.classes), _count_text(item.objects))
+                (
+                    item.name,
+                    ", ".join(item.classes),
+                    "not counted" if item.objects is None else f"{item.objects:,}",
+                )
                 for item in report.unread
             ),
             note=(
@@ -71,7 +74,7 @@ def quality_tables(report: QualityReport) -> tuple[Table, ...]:
             tuple(
                 (
                     *(item.class_name, item.merged, item.kept, f"{item.count:,}"),
-                    *map(_text, (item.radius, item.median_m, item.largest_m)),
+                    *map(_decimal_text, (item.radius, item.median_m, item.largest_m)),
                 )
                 for item in report.conflated
             ),
@@ -100,7 +103,7 @@ def _class_table(report: QualityReport) -> Table:
         tuple(
             (
                 *(item.class_name, f"{item.objects:,}", f"{item.rows:,}"),
-                *map(_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
+                *map(_decimal_text, (item.per_km2_hull, item.per_km2_occupied, item.nearest_m)),
             )
             for item in report.classes
         ),
@@ -115,34 +118,30 @@ def _class_table(report: QualityReport) -> Table:
 
 def _layer_table(report: QualityReport) -> Table:
     counts = [asdict(item.counts) for item in report.sources]
-    # Most loads have a few reasons only; a terminal has no room for columns of zeros.
-    none = [name for name in ROW_COUNTS[1:] if not any(count[name] for count in counts)]
-    shown = [name for name in ROW_COUNTS if name not in none]
+    # Columns that are 0 in all layers are listed below the table to save width.
+    empty = [name for name in ROW_COUNTS[1:] if not any(count[name] for count in counts)]
+    columns = [name for name in ROW_COUNTS if name not in empty]
     return Table(
         "Rows by layer",
-        ("layer", *shown, "kept", "notes"),
+        ("layer", *columns, "kept", "notes"),
         tuple(
             (
                 item.name,
-                *(f"{count[name]:,}" for name in shown),
+                *(f"{count[name]:,}" for name in columns),
                 *(f"{item.counts.kept:,}", _notes_text(item.notes)),
             )
             for item, count in zip(report.sources, counts, strict=True)
         ),
-        note=f"0 in all layers: {', '.join(none)}." if none else "",
+        note=f"0 in all layers: {', '.join(empty)}." if empty else "",
     )
 
 
-def _text(number: float | None) -> str:
+def _decimal_text(number: float | None) -> str:
     return "" if number is None else f"{number:,.1f}"
 
 
-def _count_text(number: int | None) -> str:
-    return "not counted" if number is None else f"{number:,}"
-
-
-def _notes_text(all_notes: Sequence[str]) -> str:
-    notes = list(brief_notes(all_notes))
+def _notes_text(layer_notes: Sequence[str]) -> str:
+    notes = list(brief_notes(layer_notes))
     more = len(notes) - NOTES_SHOWN
     return "; ".join([*notes[:NOTES_SHOWN], *([f"and {more} more (--json)"] if more > 0 else [])])
 
@@ -151,11 +150,11 @@ CLASS_COUNTS = ("before", "after", "added", "removed", "moved", "gained", "lost"
 
 
 def update_tables(report: UpdateReport) -> tuple[Table, Table]:
-    """Return the objects by class, and the cells."""
+    """Return the tables of an update: objects by class, and cells."""
     counts = [[getattr(item, count) for count in CLASS_COUNTS] for item in report.classes]
-    moved = ["" if item.moved_m is None else f"{item.moved_m:,.2f}" for item in report.classes]
+    metres = ["" if item.moved_m is None else f"{item.moved_m:,.2f}" for item in report.classes]
     names = [item.class_name for item in report.classes]
-    totals = [sum(row[at] for row in counts) for at in range(len(CLASS_COUNTS))]
+    totals = [sum(row[column] for row in counts) for column in range(len(CLASS_COUNTS))]
     layers = f"Layers replaced: {', '.join(report.replaced)}."
     if report.kept:
         layers += f" Layers that stay as they were: {', '.join(report.kept)}."
@@ -172,9 +171,9 @@ def update_tables(report: UpdateReport) -> tuple[Table, Table]:
             "Objects by class",
             ("class", *CLASS_COUNTS, "moved by, m"),
             tuple(
-                (name, *(f"{number:,}" for number in row), metres)
-                for name, row, metres in zip(
-                    [*names, "all"], [*counts, totals], [*moved, ""], strict=True
+                (name, *(f"{number:,}" for number in row), distance)
+                for name, row, distance in zip(
+                    [*names, "all"], [*counts, totals], [*metres, ""], strict=True
                 )
             ),
             note=layers,

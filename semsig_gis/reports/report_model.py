@@ -1,4 +1,4 @@
-"""What a report is made of: numbers beside the paper's, curves, maps, scenes, in sections."""
+"""Data model of a report: sections with numbers, plots, maps and scenes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number of ours, beside the paper's where it prints one.
+    """A number of ours, with the paper's number for comparison if the paper has it.
 
-    ``ours`` is None where it could not be worked out; ``low`` and ``high`` are the ends of its
-    interval of 95 %. The unit of all is ``""`` for a share or a pure number.
+    ``ours`` is None if it could not be computed; ``low`` and ``high`` are the ends of its
+    interval of 95 %. The unit is ``""`` for a share or a pure number.
     """
 
     row: str
@@ -36,7 +36,7 @@ class Number:
 
     @property
     def difference(self) -> float | None:
-        """Ours less the paper's, rounded as it is shown."""
+        """Our number minus the paper's, rounded to the decimals."""
         if self.ours is None or self.paper is None:
             return None
         return round(self.ours - self.paper, self.decimals)
@@ -49,7 +49,7 @@ class Curve:
     Parameters
     ----------
     label : str
-        What the legend says.
+        Text in the legend.
     x, y : tuple of float
         Points, x ascending.
     low, high : tuple of float, optional
@@ -70,28 +70,28 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
-    """A plot of curves, with points that the paper tells.
+    """A plot of curves, with points from the paper.
 
     Parameters
     ----------
     name : str
-        Letters, digits and ``-``: what its files are called.
+        Name of its files: letters, digits and ``-``.
     title : str
-        What it shows.
+        Title.
     x_label, y_label : str
-        What the axes show, with units.
+        Labels of the axes, with units.
     curves : tuple of Curve
         The lines.
     paper : tuple of (float, float, str)
-        Points x, y that the paper's text tells, each with what it is of.
+        Points x, y from the paper's text, each with a description.
     y_range : tuple of float
         Ends of the y axis.
     log : bool, default False
-        Whether the x axis is logarithmic, from the least x above 0 on.
+        Whether the x axis is logarithmic, from the smallest positive x.
     ticks : tuple of (float, str), optional
-        What stands at which x, in place of numbers.
+        Positions and texts of the ticks of the x axis, instead of numbers.
     diagonal : bool, default False
-        Whether the line y = x is drawn, on which chances come true.
+        Whether to draw the line y = x, on which predicted chances equal observed shares.
 
     Examples
     --------
@@ -123,12 +123,13 @@ class SceneObject:
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class Scene(Displayed):
-    """A viewpoint with the street objects around it; its files are called ``name``.
+    """A viewpoint with the street objects around it; ``name`` is the name of its files.
 
     ``lon`` and ``lat`` are in degrees (WGS 84), ``radius`` in metres; ``types`` are the symbols of
-    the signature, clockwise from north, and ``taxonomy`` has their classes. ``others`` are not seen
-    from there. ``asked`` are class and bearing of what a query told. ``answer`` is metres east and
-    north to the place that was answered; ``error_m`` is None where nothing was asked.
+    the signature, clockwise from north, and ``taxonomy`` has their classes. ``others`` are objects
+    that are not visible from the viewpoint. ``asked`` has the class code and the bearing of each
+    object of the query. ``answer`` is metres east and north to the estimated place; ``error_m`` is
+    None without a query.
     """
 
     name: str
@@ -156,7 +157,7 @@ class Scene(Displayed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Two scenes to look at side by side, with a heading and a sentence about both."""
+    """Two scenes to compare, with a heading and a sentence about both."""
 
     title: str
     text: str
@@ -165,11 +166,11 @@ class Pair:
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class OutcomeMap:
-    """A map of where queries were asked, and which were successful; its files are called ``name``.
+    """A map of successful and failed queries; ``name`` is the name of its files.
 
-    ``ground`` tells which squares of ``step`` metres have cells, the first row in the south;
-    ``places`` are metres east and north of its south-west corner, shape (n, 2), and ``successful``
-    (n,) tells the outcome of each.
+    ``ground`` is True for each square of ``step`` metres that has cells, the first row in the
+    south; ``places`` are metres east and north of its south-west corner, shape (n, 2);
+    ``successful``, shape (n,), is the outcome of each query.
     """
 
     name: str
@@ -184,7 +185,7 @@ class OutcomeMap:
 class Section:
     """A part of a report; ``name`` consists of letters, digits and ``-``.
 
-    Its table has the rows and columns of ``numbers`` in the order in which they first come.
+    Its table has the rows and columns of ``numbers`` in order of first occurrence.
     """
 
     name: str
@@ -197,19 +198,19 @@ class Section:
     pairs: tuple[Pair, ...] = ()
 
     @property
-    def drawn(self) -> tuple[Plot | OutcomeMap | Scene, ...]:
-        """Everything of which there is a picture."""
+    def drawings(self) -> tuple[Plot | OutcomeMap | Scene, ...]:
+        """All plots, maps and scenes."""
         paired = (scene for pair in self.pairs for scene in pair.scenes)
         return (*self.plots, *self.maps, *self.scenes, *paired)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report:
-    """A report, which `reports.page.write_report` writes.
+    """A report; `reports.page.write_report` writes it.
 
-    ``headline`` is the result in one sentence. ``settings`` tells what was run on what, as names
-    and values, and ``command`` how; ``taxonomy`` has the classes of the objects in the scenes;
-    ``facts`` holds specs, versions and machine as plain values for JSON.
+    ``headline`` is the result in one sentence. ``settings`` are the names and values of the
+    settings, ``command`` is the command line; ``taxonomy`` has the classes of the objects in the
+    scenes; ``facts`` are specs, versions and machine as plain values for JSON.
     """
 
     title: str

@@ -1,6 +1,6 @@
-"""Shares of the queries that are answered well, as numbers and curves of a report.
+"""Shares of successful queries, as numbers and curves of a report.
 
-Kinds: ``error`` (at most so many metres), ``recall`` (cell among the best so many per cent).
+Kinds: ``error`` (at most a number of metres), ``recall`` (true cell in the best per cent of cells).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     Points = tuple[tuple[float, float, str], ...]
 
-Figure = tuple[str, float]  # the kind of a figure, and how many metres or per cent
+Figure = tuple[str, float]  # kind, and metres or per cent
 
-# What plots show: metres and per cent.
+# Positions on the x axis of plots: metres, per cent.
 STEPS: Mapping[str, tuple[float, ...]] = {
     "error": THRESHOLDS,
     "recall": (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 3, 5, 7, *range(10, 101, 5)),
@@ -43,7 +43,7 @@ COLUMNS = {P10: "P(error ≤ 10 m)", P50: "P(error ≤ 50 m)", RECALL10: "recall
 
 
 class Share(NamedTuple):
-    """A share of queries, with its interval of 95 %; None of no queries."""
+    """A share of queries, with its interval of 95 %; None without queries."""
 
     ours: float | None
     low: float | None = None
@@ -58,19 +58,19 @@ class Share(NamedTuple):
         return cls(mean, *wilson_interval(mean, values.size))
 
     def number(self, row: str, column: str, paper: float | None = None) -> Number:
-        """Return it for a place in a table, beside the paper's."""
+        """Return the share as a number of a table, with the paper's number."""
         return Number(row, column, self.ours, low=self.low, high=self.high, paper=paper)
 
 
 def share_of(
-    case: Evaluation, figure: Figure, some: NDArray[np.bool_] | slice = slice(None)
+    case: Evaluation, figure: Figure, rows: NDArray[np.bool_] | slice = slice(None)
 ) -> Share:
-    """Return the share of the queries, or of some, that are right by a figure."""
-    return Share.of(share_values(case, figure)[some])
+    """Return the share of the queries, or of the queries in `rows`, that succeed by a figure."""
+    return Share.of(share_values(case, figure)[rows])
 
 
 def share_values(case: Evaluation, figure: Figure) -> NDArray[np.float64]:
-    """Return the chance of each query to be right."""
+    """Return the chance of each query to succeed by a figure."""
     kind, at = figure
     if kind == "error":
         return np.asarray(case.queries[f"p{at}"], dtype=np.float64)
@@ -82,44 +82,44 @@ def curve_of(
     case: Evaluation,
     label: str,
     kind: str,
-    some: NDArray[np.bool_] | slice = slice(None),
+    rows: NDArray[np.bool_] | slice = slice(None),
     *,
     band: bool = True,
 ) -> Curve:
-    """Return the curve of some of the queries, with or without its intervals."""
-    shares = {at: share_of(case, (kind, at), some) for at in STEPS[kind]}
+    """Return the curve of the queries in `rows`, with or without its intervals."""
+    shares = {at: share_of(case, (kind, at), rows) for at in STEPS[kind]}
     points = [(float(at), *share) for at, share in shares.items() if share.ours is not None]
     x, y, low, high = zip(*points, strict=True) if points else ((), (), (), ())
     return Curve(label=label, x=x, y=y, low=low if band else (), high=high if band else ())
 
 
 def plot_of(name: str, title: str, kind: str, curves: Iterable[Curve], paper: Points = ()) -> Plot:
-    """Return a plot of the curves that have points, with the paper's."""
+    """Return a plot of the curves that have points, with the paper's points."""
     x_label, y_label = AXES[kind]
     return Plot(
         name=f"{name}-{kind}",
         title=title,
         x_label=x_label,
         y_label=y_label,
-        curves=tuple(one for one in curves if one.x),
+        curves=tuple(curve for curve in curves if curve.x),
         paper=paper,
         log=True,
     )
 
 
 def calibration_plot(name: str, cases: Mapping[str, Evaluation]) -> Plot:
-    """Return a plot of how often the chances that a method states come true."""
+    """Return a plot of observed shares by predicted chances, with a curve for each case."""
+    curves = []
+    for label, case in cases.items():
+        bins = case.calibration().dropna(subset=["true"])
+        names = ("stated", "true", "low", "high")
+        x, y, low, high = (tuple(bins[name].tolist()) for name in names)
+        curves.append(Curve(label=label, x=x, y=y, low=low, high=high))
     return Plot(
         name=f"{name}-calibration",
         title="How often stated chances come true",
         x_label="chance stated",
         y_label="share that came true",
-        curves=tuple(_calibration(case, label) for label, case in cases.items()),
+        curves=tuple(curves),
         diagonal=True,
     )
-
-
-def _calibration(case: Evaluation, label: str) -> Curve:
-    table = case.calibration().dropna(subset=["true"])
-    x, y, low, high = (tuple(table[name].tolist()) for name in ("stated", "true", "low", "high"))
-    return Curve(label=label, x=x, y=y, low=low, high=high)

@@ -1,4 +1,4 @@
-"""Tables for people: on a terminal, in Markdown and on a page."""
+"""Texts and tables that several reports share, and the table of the numbers of a section."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ if TYPE_CHECKING:
 
 
 def distortion_rows(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Return what a table says of the plane and the ground (`Distortion.to_dict`)."""
+    """Return rows about the distortion of the map projection (`Distortion.to_dict`)."""
     if facts["stretch"] is None:
         return (("Grid north", "unknown"), ("Lengths", "unknown"))
-    # Plus 0 so that there is no minus before a zero.
-    turned = " to ".join(dict.fromkeys(f"{round(x, 2) + 0.0:.2f}°" for x in facts["convergence"]))
+    # Adding 0 changes -0 to 0.
+    angles = " to ".join(dict.fromkeys(f"{round(x, 2) + 0.0:.2f}°" for x in facts["convergence"]))
     return (
-        ("Grid north", f"at most {facts['angle']:.2f}° off true north ({turned} clockwise)"),
+        ("Grid north", f"at most {facts['angle']:.2f}° off true north ({angles} clockwise)"),
         ("Lengths", f"at most {100 * facts['stretch']:.2g} % off"),
     )
 
 
 def note_tables(notes: Sequence[str]) -> tuple[Table, ...]:
-    """Return a table of notes; none where there are no notes."""
+    """Return a table of the notes, or no table if there are none."""
     rows = tuple((note,) for note in brief_notes(notes))
     return (Table("Notes", ("note",), rows),) if rows else ()
 
 
-# A note about one row, with the name of its layer or without.
-_ROW = re.compile(r"([^:]*: )?row \d+: ")
+# A note about one row, with or without the name of its layer.
+_ROW_NOTE = re.compile(r"([^:]*: )?row \d+: ")
 
 
 def brief_notes(notes: Iterable[str]) -> Iterator[str]:
-    """Yield notes; of those about single rows of a layer the first, and how many follow it."""
+    """Yield the notes; successive notes about rows of a layer become the first and a number."""
 
     def layer(note: str) -> str | None:
-        found = _ROW.match(note)
-        return found and (found[1] or "")
+        match = _ROW_NOTE.match(note)
+        return match and (match[1] or "")
 
-    for name, run in itertools.groupby(notes, key=layer):
-        first, *others = run
+    for name, group in itertools.groupby(notes, key=layer):
+        first, *others = group
         if name is None:
             yield from (first, *others)
         else:
@@ -69,9 +69,10 @@ def length(metres: float) -> str:
 
 
 OURS, INTERVAL, PAPER, DIFFERENCE = "ours", "95 %", "paper", "difference"
-NARROW = {DIFFERENCE: "diff."}
-NOTHING = "\u2013"
-# In letters: what fits on A4 paper and on 900 pixels; labels take so much before they wrap.
+SHORT_HEADINGS = {DIFFERENCE: "diff."}
+NO_NUMBER = "\u2013"
+# Widths in letters: of a table on A4 paper or 900 pixels, of labels until they wrap, and between
+# columns.
 WIDEST = 102
 NARROWEST_LABEL, WIDEST_LABEL, GAP = 14, 28, 3
 OUTSIDE = "Bold: the paper's figure is outside our interval of 95 %."
@@ -84,62 +85,55 @@ class _Cell(NamedTuple):
 
 
 def number_table(numbers: Sequence[Number]) -> Table:
-    """Lay out at least one number, rows and columns in the order in which they first come.
+    """Return a table of at least one number; rows and columns are in order of first occurrence.
 
-    Where that would be too wide for a sheet of paper, each number has a row of its own.
+    If that is too wide for a sheet of paper, each number is in a separate row.
     """
-    units = _units(numbers)
+    # A column whose numbers have different units shows the unit with each number.
+    units: Units = {}
+    for number in numbers:
+        unit = units.setdefault(number.column, number.unit)
+        units[number.column] = unit if unit == number.unit else None
     names = {number.column: one_line(number.column) for number in numbers}
     for column, name in names.items():
-        unit = one_line(units[column] or "")
-        names[column] = ", ".join(part for part in (name, unit) if part)
-    table = _side_by_side(numbers, names, units)
+        heading = (name, one_line(units[column] or ""))
+        names[column] = ", ".join(part for part in heading if part)
+    table = _wide_table(numbers, names, units)
     if table is None or _width(table) > WIDEST:
-        table = _one_a_row(numbers, names, units)
+        table = _long_table(numbers, names, units)
     return replace(table, note=OUTSIDE if any(map(_is_outside, numbers)) else "")
 
 
 Units = dict[str, str | None]
 
 
-def _units(numbers: Iterable[Number]) -> Units:
-    """Return the unit of each column; None where its numbers have several."""
-    units: Units = {}
-    for number in numbers:
-        unit = units.setdefault(number.column, number.unit)
-        units[number.column] = unit if unit == number.unit else None
-    return units
+def _wide_table(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Table | None:
+    """Return a table with a group of columns for each column of `numbers`.
 
-
-def _side_by_side(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Table | None:
-    """Return a group of columns for each column; None where a place has two numbers."""
-    placed = {(number.row, number.column): number for number in numbers}
-    if len(placed) < len(numbers):
+    None if a row has two numbers in one column.
+    """
+    by_place = {(number.row, number.column): number for number in numbers}
+    if len(by_place) < len(numbers):
         return None
-    own = len(names) == 1  # then the interval has a column of its own
+    single = len(names) == 1  # then the interval is a separate column
     kinds = {
         column: [
             kind
             for kind in _kinds(number for number in numbers if number.column == column)
-            if own or kind != INTERVAL
+            if single or kind != INTERVAL
         ]
         for column in names
     }
-    rows = [
-        [
-            _Cell(one_line(row)),
-            *(
-                cell
-                for column, shown in kinds.items()
-                for cell in _cells(
-                    placed.get((row, column)), shown, with_unit=units[column] is None, own=own
-                )
-            ),
-        ]
-        for row in dict.fromkeys(number.row for number in numbers)
-    ]
+    rows = []
+    for row in dict.fromkeys(number.row for number in numbers):
+        cells = [_Cell(one_line(row))]
+        for column, shown in kinds.items():
+            number, with_unit = by_place.get((row, column)), units[column] is None
+            cells += _cells(number, shown, with_unit=with_unit, interval_column=single)
+        rows.append(cells)
+    headings = {} if single else SHORT_HEADINGS
     groups = tuple(
-        (names[column], tuple(shown if own else [NARROW.get(kind, kind) for kind in shown]))
+        (names[column], tuple(headings.get(kind, kind) for kind in shown))
         for column, shown in kinds.items()
     )
     columns = [
@@ -151,13 +145,14 @@ def _side_by_side(numbers: Sequence[Number], names: dict[str, str], units: Units
     return _table(1, columns, rows, groups if in_two_rows else ())
 
 
-def _one_a_row(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Table:
+def _long_table(numbers: Sequence[Number], names: dict[str, str], units: Units) -> Table:
+    """Return a table with a separate row for each number, grouped by the rows of `numbers`."""
     kinds = _kinds(numbers)
     rows = [
         [
             _Cell(one_line(row)),
             _Cell(names[number.column]),
-            *_cells(number, kinds, with_unit=units[number.column] is None, own=True),
+            *_cells(number, kinds, with_unit=units[number.column] is None, interval_column=True),
         ]
         for row in dict.fromkeys(number.row for number in numbers)
         for number in numbers
@@ -185,7 +180,7 @@ def _table(
 
 
 def _kinds(numbers: Iterable[Number]) -> list[str]:
-    """Return the columns that some of the numbers fill."""
+    """Return the kinds of columns that at least one of the numbers fills."""
     filled = {OURS}
     for number in numbers:
         if number.low is not None or number.high is not None:
@@ -196,31 +191,31 @@ def _kinds(numbers: Iterable[Number]) -> list[str]:
 
 
 def _cells(
-    number: Number | None, kinds: Iterable[str], *, with_unit: bool, own: bool
+    number: Number | None, kinds: Iterable[str], *, with_unit: bool, interval_column: bool
 ) -> list[_Cell]:
     if number is None:
         return [_Cell("") for _ in kinds]
     unit = f" {one_line(number.unit)}" if with_unit and number.unit else ""
 
-    def shown(value: float | None, sign: str = "") -> str:
-        return "" if value is None else _shown(value, number.decimals, sign) + unit
+    def text(value: float | None, sign: str = "") -> str:
+        return "" if value is None else _number_text(value, number.decimals, sign) + unit
 
     ours = math.nan if number.ours is None else number.ours
     ends = ""
     if number.low is not None and number.high is not None:
-        ends = f"{_shown(number.low, number.decimals)} to {shown(number.high)}"
+        ends = f"{_number_text(number.low, number.decimals)} to {text(number.high)}"
     cells = {
-        OURS: _Cell(shown(ours), "" if own else ends),
+        OURS: _Cell(text(ours), "" if interval_column else ends),
         INTERVAL: _Cell(ends),
-        PAPER: _Cell(shown(number.paper)),
-        DIFFERENCE: _Cell(shown(number.difference, "+"), bold=_is_outside(number)),
+        PAPER: _Cell(text(number.paper)),
+        DIFFERENCE: _Cell(text(number.difference, "+"), bold=_is_outside(number)),
     }
     return [cells[kind] for kind in kinds]
 
 
-def _shown(value: float, decimals: int, sign: str = "") -> str:
+def _number_text(value: float, decimals: int, sign: str = "") -> str:
     if math.isnan(value):
-        return NOTHING
+        return NO_NUMBER
     if math.isinf(value):
         return "infinite" if value > 0 else "-infinite"
     rounded = round(value, decimals) + 0.0  # no -0
@@ -234,7 +229,7 @@ def _is_outside(number: Number) -> bool:
 
 
 def _width(table: Table) -> int:
-    """Return about how many letters wide a table with one column of labels is."""
+    """Return the approximate width in letters of a table with one column of labels."""
     longest = max(len(row[0]) for row in table.rows)
     total = min(max(longest, NARROWEST_LABEL), WIDEST_LABEL)
     groups = table.groups or [(column, (column,)) for column in table.columns[1:]]
@@ -243,7 +238,7 @@ def _width(table: Table) -> int:
         for name, columns in groups
         for column in columns
     ]
-    small = 0.8  # an interval below its figure is in small letters
+    small = 0.8  # relative size of the letters of an interval below its figure
     for at, heading in enumerate(headings, start=1):
         letters = (
             max(len(line[at]), round(small * len(table.intervals.get((row, at), ""))))

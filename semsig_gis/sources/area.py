@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import itertools
 import math
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ import shapely
 from semsig_gis.core import HALF_TURN, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
 
     import numpy as np
     from numpy.typing import NDArray
@@ -85,6 +87,27 @@ def tiles_of(area: Area, tile_deg: float, *, remedy: str) -> list[Tile]:
         grid = Tile((west, south, east, north)).parts(max(1, columns), max(1, rows), splits=0)
         tiles.extend(_touching(area, grid))
     return tiles
+
+
+def fetch_tiles(
+    tiles: Iterable[Tile],
+    area: Area,
+    fetch_tile: Callable[[Tile], Path | None],
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Return the files of tiles; a tile without a file, because it is too large, is split."""
+    waiting = collections.deque(tiles)
+    paths: list[Path] = []
+    while waiting:
+        tile = waiting.popleft()
+        path = fetch_tile(tile)
+        if path is None:
+            waiting.extendleft(reversed(tile.quarters(area)))
+            continue
+        paths.append(path)
+        if progress is not None:
+            progress(len(paths), len(paths) + len(waiting))
+    return paths
 
 
 def _touching(area: Area, tiles: Iterable[Tile]) -> list[Tile]:

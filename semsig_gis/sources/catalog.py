@@ -311,11 +311,6 @@ def data_folder() -> Traversable:
     return Path(__file__).resolve().parents[2] / "data_sources"
 
 
-@functools.lru_cache
-def _parse_catalog(text: str, where: str) -> Catalog:
-    return _checked_catalog(parse_toml(text, where), where)
-
-
 def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     where = f"catalogue {where}"
     check_keys(content, CATALOG_KEYS, where, ("name", "title", "layers"))
@@ -362,8 +357,14 @@ def _checked_catalog(content: dict[str, Any], where: str) -> Catalog:
     )
 
 
+# The same text is parsed only once.
+_parse_catalog = functools.lru_cache(
+    lambda text, where: _checked_catalog(parse_toml(text, where), where)
+)
+
+
 def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
-    classes = []
+    fields = {}
     for number, item in enumerate(items, start=1):
         place = f"{where}, class {number}"
         if not isinstance(item, dict):
@@ -374,8 +375,11 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
             for key, most in MEASURES.items()
             if key in item
         }
+        fields[place] = {**item, **lengths}
+    classes = []
+    for place, values in fields.items():
         try:
-            classes.append(ObjectClass(**{**item, **lengths}))
+            classes.append(ObjectClass(**values))
         except CatalogError as error:
             raise CatalogError(f"{place}: {error}") from error
     return tuple(classes)

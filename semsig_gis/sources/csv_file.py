@@ -155,7 +155,11 @@ def _encoding(open_: Callable[[], IO[bytes]], what: str) -> tuple[str, str, tupl
         if name in match.could_be_from_charset
     ]
     *_, best = min(ranked, default=(None,))
-    if best is None or (wide and not _is_text(head, best)):
+    text = "\0" if wide else ""
+    if wide and best is not None:
+        with contextlib.suppress(UnicodeDecodeError):
+            text = codecs.getincrementaldecoder(best)().decode(head)
+    if best is None or "\0" in text:
         raise _unknown_encoding(what)
     return best, "strict", (f"the file is not in UTF-8; it is read as {best}",)
 
@@ -166,13 +170,6 @@ def _symbol_share(text: str) -> float:
     foreign = [letter for letter in text if not letter.isascii()]
     symbols = sum(unicodedata.category(letter) in SYMBOLS or letter in "¿¡" for letter in foreign)
     return symbols / max(len(foreign), 1)
-
-
-def _is_text(head: bytes, encoding: str) -> bool:
-    with contextlib.suppress(UnicodeDecodeError):
-        text = codecs.getincrementaldecoder(encoding)().decode(head)
-        return "\0" not in text
-    return False
 
 
 def _unknown_encoding(what: str) -> SourceError:

@@ -206,6 +206,6 @@ def read_csv_layer(
             place = str(error)
         rows.add([row[field] for field in rules.fields], str(rows.read), place)
     own = table.crs
-    system, notes = choose_crs(own, implicit=False, expected=spec.crs, requested=crs, where=where)
+    system, notes = choose_crs(own, expected=spec.crs, requested=crs, where=where)
     notes = (*table.file.notes, *notes)
     return raw_layer(rows, rules, system, by_file=own is not None, notes=notes)

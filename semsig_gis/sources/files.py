@@ -135,6 +135,7 @@ def _group_paths(
     files: list[Path] = []
     in_folders: list[Path] = []
     tagged: list[Path] = []
+    by_tags = any(spec.reader == TAGS_READER for spec in specs)
     for path in dict.fromkeys(Path(item) for item in paths):
         if not path.exists():
             raise SourceError(f"{path} does not exist; give a file or a folder of files.")
@@ -142,7 +143,11 @@ def _group_paths(
         if any(matches_pattern(file.name, spec.files) for file in inside for spec in specs):
             (in_folders if path.is_dir() else files).extend(inside)
             continue
-        with_tags = [file for file in inside if _has_tags(file, specs, skip_damaged=path.is_dir())]
+        with_tags = []
+        # Only layers that are selected by tags may be in a file of any name.
+        for file in inside if by_tags else ():
+            with contextlib.suppress(*([SourceError] if path.is_dir() else [])):
+                with_tags += [] if file_reader(file) is None else [file]
         if not with_tags:
             patterns: dict[tuple[str, ...], list[str]] = {}
             for spec in specs:
@@ -153,19 +158,9 @@ def _group_paths(
                 for names_of_files, names in patterns.items()
             )
             verb = "contains no file of" if path.is_dir() else "is not the file of"
-            tags = any(spec.reader == TAGS_READER for spec in specs)
-            more = ", or any vector file with columns of OpenStreetMap's tags" if tags else ""
+            more = ", or any vector file with columns of OpenStreetMap's tags" if by_tags else ""
             raise SourceError(
                 f"{path} {verb} any layer; the layers and their files are {layers}{more}."
             )
         tagged.extend(with_tags)
     return files, in_folders, tagged
-
-
-def _has_tags(path: Path, specs: Iterable[LayerSpec], *, skip_damaged: bool) -> bool:
-    """Whether a file has OpenStreetMap tags and a layer is selected by tags."""
-    if all(spec.reader != TAGS_READER for spec in specs):
-        return False
-    with contextlib.suppress(*([SourceError] if skip_damaged else [])):
-        return file_reader(path) is not None
-    return False

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import collections
 import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources.area import tiles_of
+from semsig_gis.sources.area import fetch_tiles, tiles_of
 from semsig_gis.sources.http.fetch import DEFAULT_HTTP, HttpError, fetch, host_of
 from semsig_gis.sources.rows import WGS84, RowRules, Rows, choose_crs, raw_layer
 from semsig_gis.storage import parse_json
@@ -16,7 +15,7 @@ from semsig_gis.storage import parse_json
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from semsig_gis.sources.area import Area
+    from semsig_gis.sources.area import Area, Tile
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layer import RawLayer
@@ -61,9 +60,7 @@ def read_layers(
             except (KeyError, TypeError, ValueError):
                 position = f"map feature {feature.get('id')} has no position"
             rows.add([feature.get(field) for field in rules.fields], name, position)
-        system, notes = choose_crs(
-            WGS84, implicit=False, expected=spec.crs, requested=crs, where=rules.file
-        )
+        system, notes = choose_crs(WGS84, expected=spec.crs, requested=crs, where=rules.file)
         layers.append(raw_layer(rows, rules, system, by_file=True, notes=notes))
     return tuple(layers)
 
@@ -110,10 +107,8 @@ def fetch_layers(
         common["object_values"] = ",".join(values)
     # A box that is too large fails again, so only the smallest boxes get all attempts.
     short_spec = dataclasses.replace(spec, attempts=min(spec.attempts, 2))
-    waiting = collections.deque(tiles_of(area, TILE_DEG, remedy="give a smaller one"))
-    paths: list[Path] = []
-    while waiting:
-        tile = waiting.popleft()
+
+    def fetch_tile(tile: Tile) -> Path | None:
         last = tile.splits == MOST_SPLITS
         try:
             path = fetch(
@@ -133,15 +128,12 @@ def fetch_layers(
                 ) from error
             if error.status != TOO_MUCH or last:
                 raise
-            full = True
+            return None
         if full and last:
             raise SourceError(
                 f"{host} sends no more than {MOST_FEATURES:,} features of even the smallest box."
             )
-        if full:
-            waiting.extendleft(reversed(tile.quarters(area)))
-            continue
-        paths.append(path)
-        if progress is not None:
-            progress(len(paths), len(paths) + len(waiting))
-    return paths
+        return None if full else path
+
+    tiles = tiles_of(area, TILE_DEG, remedy="give a smaller one")
+    return fetch_tiles(tiles, area, fetch_tile, progress)

@@ -86,7 +86,12 @@ def usable_crs(text: str) -> CRS | None:
 
 
 def choose_crs(
-    own: CRS | None, *, implicit: bool, expected: str | None, requested: str | None, where: str
+    own: CRS | None,
+    *,
+    implicit: bool = False,
+    expected: str | None,
+    requested: str | None,
+    where: str,
 ) -> tuple[CRS, tuple[str, ...]]:
     """Return CRS and notes of a layer: the file's `own` CRS, else `requested` or `expected`.
 

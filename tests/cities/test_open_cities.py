@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 from open_cities import CITIES, serve, write_files
-from servers import Server
 
 from semsig_gis.objects import assemble, choose_layers, read_files
 from semsig_gis.sources import data_folder, fetch_layers, load_catalog, open_cache, parse_area
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
+
+    from servers import Server
 
 
 @pytest.mark.parametrize("name", CITIES)
@@ -54,12 +54,6 @@ def test_layers_are_fetched_from_the_service_of_a_city(
     assert {layer.spec.name: layer.counts.kept for layer in loaded_layers} == {
         layer: len(good) for layer, (_, good, _) in layers.items()
     }
-
-
-@pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
 
 
 @pytest.mark.parametrize("name", CITIES)

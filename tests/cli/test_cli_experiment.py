@@ -36,7 +36,7 @@ def _spec(town: Path) -> None:  # noqa: ARG001
     write_spec()
 
 
-def test_an_experiment_is_run_and_compared(run: Run, run_ok: RunOk) -> None:
+def test_experiment_is_run_resumed_and_compared(run: Run, run_ok: RunOk) -> None:
     code, out, _ = run(EXPERIMENT, "results")
     assert code == 0
     for words in ("phone: medium, compass:5, view:180", "refined, t = 1", "results: results"):
@@ -51,14 +51,14 @@ def test_an_experiment_is_run_and_compared(run: Run, run_ok: RunOk) -> None:
     out = run_ok("compare", *paths)
     assert f"{paths[1]} places " in out.splitlines()[0]
     assert "p50" in out
-    assert paths[0] in "".join(out.split())  # lines are broken at 80 signs
+    assert paths[0] in "".join(out.split())  # lines are wrapped at 80 characters
     same = json.loads(run_ok("compare results results --json"))
     assert list(same) == cases
     assert {row["difference"] for row in same["phone/paper-top1"]} <= {0.0, None}
     run_ok("map city.parquet --evaluation", paths[1], "--out", "map.html")
 
 
-def test_what_is_refused(run: Run, run_ok: RunOk) -> None:
+def test_invalid_experiments_and_comparisons_are_refused(run: Run, run_ok: RunOk) -> None:
     sentence(run(EXPERIMENT, "results", "--workers", -1), "--workers was given as -1", "0 to 1,024")
     write_spec(SPEC.replace("edit+edit", "edti+edit"))
     sentence(run(EXPERIMENT, "results"), "'edti'", "nearest is 'edit'")
@@ -75,7 +75,7 @@ def test_what_is_refused(run: Run, run_ok: RunOk) -> None:
     sentence(run(pair), "a single evaluation", "none in common")
 
 
-def test_distortions_on_the_command_line(run_ok: RunOk) -> None:
+def test_options_make_distortions(run_ok: RunOk) -> None:
     default = "light:resort=false:false_class=frequency"
     several = "--distortion medium,missing:bench,view:120 --keep-order"
     for options, distortions in (

@@ -1,7 +1,8 @@
-"""Exports as their user meets them: export, import, and localize --out."""
+"""The commands export and import, and localize --out."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,11 +17,13 @@ import rasterio
 from sentences import sentence
 from small_city import chances_of, small_city, small_evaluation
 
-from semsig_gis.cli.localize import print_answer
+from semsig_gis.cli.localize import print_localization
 from semsig_gis.database import ObjectStore, open_database, save_database, save_with_store
 from semsig_gis.evaluation import save_evaluation, save_identifiability
 from semsig_gis.exports import cell_errors
+from semsig_gis.localization import Localization, localize
 from semsig_gis.objects import open_objects, save_objects
+from semsig_gis.observation import parse_view
 
 if TYPE_CHECKING:
     from conftest import Run, RunOk
@@ -31,8 +34,7 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run in a folder with a database with its identifiability, objects and an evaluation."""
     monkeypatch.chdir(tmp_path)
     database, objects = small_city()
-    # What was read is saved once more: a coordinate system then has other words than one that was
-    # named.
+    # Saved twice: a coordinate system that was read has another text than one that was named.
     save_database(database, "city.parquet")
     save_database(open_database("city.parquet"), "city.parquet")
     save_identifiability(chances_of(database), "city.parquet")
@@ -41,7 +43,7 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_evaluation(small_evaluation(), "evaluation")
 
 
-def test_a_city_goes_into_a_geopackage_and_back(run: Run) -> None:
+def test_city_is_exported_to_a_geopackage_and_imported(run: Run) -> None:
     more = "--objects objects.parquet --evaluation evaluation"
     code, out, err = run(f"export city.parquet --out city.gpkg {more}")
     assert (code, err, "city.gpkg" in out) == (0, "", True)
@@ -51,14 +53,14 @@ def test_a_city_goes_into_a_geopackage_and_back(run: Run) -> None:
     }
     code, out, err = run("import city.gpkg --out back.parquet --objects back_objects.parquet")
     assert (code, err, f"{len(small_city()[0]):,} cells" in out) == (0, "", True)
-    # With the columns that semsig identify put there, of which a -0.0 comes back as 0.0.
+    # With the columns of semsig identify.
     again, before = pq.read_table("back.parquet"), pq.read_table("city.parquet")
     assert again.equals(before)
     assert again.schema.metadata == before.schema.metadata
     assert Path("back_objects.parquet").read_bytes() == Path("objects.parquet").read_bytes()
 
 
-def test_one_layer(run_ok: RunOk) -> None:
+def test_single_layers_are_exported(run_ok: RunOk) -> None:
     run_ok("export city.parquet --out cells.csv")
     assert "chance_found" in pd.read_csv("cells.csv").columns
     run_ok("export city.parquet --geometry point --out p.parquet")
@@ -75,7 +77,7 @@ def raster_values(path: str) -> list[float]:
 
 
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
-def test_what_must_be_searched_after_a_query(method: str, run_ok: RunOk) -> None:
+def test_regions_to_search_are_written(method: str, run_ok: RunOk) -> None:
     types = small_city()[0].types(7)
     line = f"localize city.parquet --types {types} --method {method} --out answer.gpkg"
     out = run_ok(line, "--within", 15)
@@ -87,35 +89,37 @@ def test_what_must_be_searched_after_a_query(method: str, run_ok: RunOk) -> None
     assert regions.geometry.area.sum() == pytest.approx(searched["km2"] * 1e6)
 
 
-def test_the_chance_of_every_cell(run_ok: RunOk) -> None:
+def test_chances_of_all_cells_are_written(run_ok: RunOk) -> None:
     out = run_ok("localize city.parquet --types DD --method likelihood --out p.tif")
     assert out.splitlines()[-1] == "chances: p.tif"
     assert sum(raster_values("p.tif")) == pytest.approx(1.0, abs=1e-4)
 
 
-def test_what_is_required_may_be_drawn_and_searched(run: Run) -> None:
+def test_ties_with_the_last_candidate_are_searched(run: Run) -> None:
     query = "localize city.parquet --method edit+edit --types DD --require D --top 2"
     code, out, err = run(query, "--map", "m.html", "--out", "a.gpkg", "--json")
     assert (code, err) == (0, "")
     answer = json.loads(out)
     assert answer["tied_beyond"] > 0
-    # All that are as good as the last candidate are to be searched, and are in the file.
+    # All cells that tie with the last candidate are in the file.
     candidates = gpd.read_file("a.gpkg", layer="candidates")
     assert answer["searched"]["cells"] == len(candidates) == 2 + answer["tied_beyond"]
     assert len(set(candidates["distance"])) == 1
 
 
 @pytest.mark.parametrize(("tied", "words"), [(1, "1 further cell ties"), (1200, "1,200 further")])
-def test_the_number_of_cells_that_tie_is_printed(
+def test_number_of_ties_is_printed(
     tied: int, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = {"used": "types", "cells": 5000, "candidates": [], "tied_beyond": tied}
-    query = {"types": "D", "bearings": None, "length": 1}
-    print_answer({**found, "query": query, "notes": [], "north": {"name": "grid"}})
+    database, _ = small_city()
+    query = parse_view({"types": "D"}, taxonomy=database.taxonomy, radius=30.0)
+    answer = localize(database, query, method="types:edit", top=1)
+    assert isinstance(answer, Localization)
+    print_localization(dataclasses.replace(answer, tied_beyond=tied))
     assert f"\n{words}" in capsys.readouterr().out
 
 
-def test_formats_for_other_programs(run: Run, run_ok: RunOk) -> None:
+def test_formats_of_other_programs_are_exported(run: Run, run_ok: RunOk) -> None:
     hexagons = "--objects objects.parquet --evaluation evaluation --h3 10"
     run_ok(f"export city.parquet {hexagons} --out hexagons.geojson")
     table = gpd.read_file("hexagons.geojson")

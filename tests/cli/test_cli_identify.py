@@ -1,4 +1,4 @@
-"""Identifiability as its user meets it: identify, info, map, export and update."""
+"""Identifiability in the commands identify, info, map, export and update."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from semsig_gis.objects import save_objects
 if TYPE_CHECKING:
     from conftest import Run, RunOk
 
-# Each class is left out once, which takes its time.
+# Few classes, since each class is left out once.
 WORLD = random_town(codes=[1, 3, 10])
 IDENTIFY = "identify city.parquet --on-grid --noise medium --json"
 
@@ -42,7 +42,7 @@ def _city(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_with_store(WORLD.database, ObjectStore.of(WORLD.street_objects), "city.parquet")
 
 
-def test_the_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> None:
+def test_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> None:
     code, out, err = run("identify city.parquet --noise medium --check 40")
     assert code == 0
     for words in ("Identifiability, medium noise", "What each class adds", "by 1,000 objects",
@@ -54,7 +54,7 @@ def test_the_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> 
     assert len(open_store("city.parquet").objects) == len(WORLD.street_objects)
 
     code, out, err = run("identify city.parquet --noise medium --json")
-    assert (code, "has these columns already" in err) == (0, True)
+    assert (code, "already has these columns" in err) == (0, True)
     facts = json.loads(out)
     assert facts["chance_found"] == pytest.approx(cells["chance_found"].mean())
     assert facts["classes"][0]["objects"] > 0
@@ -68,7 +68,7 @@ def test_the_columns_are_printed_drawn_and_exported(run: Run, run_ok: RunOk) -> 
     assert exported["chance_found"].tolist() == cells["chance_found"].tolist()
 
 
-def test_another_noise_seed_or_radius_is_worked_out_anew(run: Run, run_ok: RunOk) -> None:
+def test_other_settings_are_computed_again(run: Run, run_ok: RunOk) -> None:
     options = "--threads 2 --check 20"
     first = json.loads(run_ok(IDENTIFY, *options.split()))
     assert (first["seed"], first["radius_m"], first["check"]["seed"]) == (0, 50.0, 1)
@@ -84,7 +84,7 @@ def test_another_noise_seed_or_radius_is_worked_out_anew(run: Run, run_ok: RunOk
         assert json.loads(out) != first
 
 
-def test_photos_are_told_where_they_are_shown(run_ok: RunOk) -> None:
+def test_view_of_photos_is_shown(run_ok: RunOk) -> None:
     assert "A photo of 70 degrees from the mean cell" in run_ok(
         "identify city.parquet --noise medium --view 70 --check 20 --out report"
     )
@@ -95,13 +95,13 @@ def test_photos_are_told_where_they_are_shown(run_ok: RunOk) -> None:
         assert "photo of 70 degrees" in Path(page).read_text(encoding="utf-8")
 
 
-def test_a_database_in_parts(run_ok: RunOk) -> None:
+def test_tiles_get_columns(run_ok: RunOk) -> None:
     build_tiles("objects.parquet", "city", tile=TileSpec(100.0))
     facts = json.loads(run_ok(IDENTIFY.replace("city.parquet", "city")))
     assert json.loads(run_ok("info city --json"))["identifiability"] == facts
 
 
-def test_an_update_takes_the_columns_away_and_says_so(run: Run, run_ok: RunOk) -> None:
+def test_update_removes_the_columns_with_a_remark(run: Run, run_ok: RunOk) -> None:
     run_ok(IDENTIFY)
     for first in (True, False):
         code, _, err = run("update city.parquet --objects objects.parquet")
@@ -109,7 +109,7 @@ def test_an_update_takes_the_columns_away_and_says_so(run: Run, run_ok: RunOk) -
         assert "Identifiability" not in run_ok("info city.parquet")
 
 
-def test_columns_that_do_not_fit_are_named_and_left_out(run: Run, run_ok: RunOk) -> None:
+def test_columns_of_another_database_are_ignored_with_a_remark(run: Run, run_ok: RunOk) -> None:
     run_ok(IDENTIFY)
     whole = open_database("city.parquet")
     save_database(whole.select(slice(9, None)), "other.parquet")

@@ -1,4 +1,4 @@
-"""Maps as their user asks for them: of objects and streets, of cells alike, of what has changed."""
+"""`semsig map`: maps of objects, streets, cells, answers and changes."""
 
 from __future__ import annotations
 
@@ -38,25 +38,25 @@ def save_city(**ground: gpd.GeoDataFrame) -> None:
     save_with_store(build_database(OBJECTS), store, "city.parquet")
 
 
-def drawn(run_ok: RunOk, options: str) -> str:
+def map_page(run_ok: RunOk, options: str) -> str:
     """Return the page of a map."""
     assert run_ok(f"map city.parquet {options} --out map.html") == "map: map.html\n"
     return Path("map.html").read_text(encoding="utf-8")
 
 
-def test_objects_alone_and_over_an_evaluation(run_ok: RunOk) -> None:
-    alone = drawn(run_ok, "--objects objects.parquet")
-    assert (alone.count(DRAWN_OBJECTS), alone.count(DRAWN_GROUND)) == (1, 0)
+def test_objects_with_and_without_an_evaluation(run_ok: RunOk) -> None:
+    page = map_page(run_ok, "--objects objects.parquet")
+    assert (page.count(DRAWN_OBJECTS), page.count(DRAWN_GROUND)) == (1, 0)
     run_ok("evaluate city.parquet --queries 5 --out evaluation")
-    both = drawn(run_ok, "--evaluation evaluation --objects objects.parquet")
+    both = map_page(run_ok, "--evaluation evaluation --objects objects.parquet")
     assert both.count(DRAWN_OBJECTS) == 1
     assert "Localization errors" in both
 
 
-def test_streets_and_buildings_of_the_store_or_of_files(run_ok: RunOk) -> None:
+def test_streets_and_buildings_from_the_store_or_files(run_ok: RunOk) -> None:
     objects = "--objects objects.parquet"
     save_city(footprints=HOUSE, streets=LANE)
-    page = drawn(run_ok, objects)
+    page = map_page(run_ok, objects)
     assert page.count(DRAWN_GROUND) == 1
     assert '{"buildings":' in page
     assert '"streets":' in page
@@ -64,16 +64,16 @@ def test_streets_and_buildings_of_the_store_or_of_files(run_ok: RunOk) -> None:
     assert DRAWN_GROUND in Path("query.html").read_text(encoding="utf-8")
 
     save_city(footprints=surroundings(shapely.box(X + 9000.0, Y, X + 9010.0, Y + 10.0)))
-    assert DRAWN_GROUND not in drawn(run_ok, objects)
+    assert DRAWN_GROUND not in map_page(run_ok, objects)
 
     save_city()
     save_surroundings(LANE, "streets.parquet")
-    page = drawn(run_ok, f"{objects} --streets streets.parquet")
+    page = map_page(run_ok, f"{objects} --streets streets.parquet")
     assert page.count(DRAWN_GROUND) == 1
     assert '{"buildings":' not in page
 
 
-def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, run_ok: RunOk) -> None:
+def test_licence_of_buildings_is_shown(tmp_path: Path, run_ok: RunOk) -> None:
     to_degrees = Transformer.from_crs("EPSG:2154", "EPSG:4326", always_xy=True)
     corners = np.array(to_degrees.transform([X, X + 50.0, X], [Y, Y, Y + 50.0])).T
     write_osm(
@@ -81,7 +81,7 @@ def test_openstreetmap_is_named_for_its_buildings(tmp_path: Path, run_ok: RunOk)
         *(node(at, lon, lat) for at, (lon, lat) in enumerate(corners.tolist(), start=1)),
         way(9, [1, 2, 3, 1], {"building": "yes"}),
     )
-    page = drawn(run_ok, "--objects objects.parquet --buildings town.osm")
+    page = map_page(run_ok, "--objects objects.parquet --buildings town.osm")
     assert "OpenStreetMap contributors (ODbL" in page
 
 
@@ -92,7 +92,7 @@ def test_everything_on_one_map(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch) -
     run_ok("identify city.parquet")
     run_ok("localize city.parquet --types DD --method likelihood --out answer.tif")
     options = "--evaluation evaluation --ambiguity --identifiability --drift city.parquet"
-    page = drawn(run_ok, f"{options} --location answer.tif --objects objects.parquet")
+    page = map_page(run_ok, f"{options} --location answer.tif --objects objects.parquet")
     for name in (
         *("Same types", "Chance to be found", "What has changed", "Chance within 50 m"),
         "Share of queries that fail",
@@ -102,7 +102,7 @@ def test_everything_on_one_map(run_ok: RunOk, monkeypatch: pytest.MonkeyPatch) -
     assert DRAWN_OBJECTS in page
 
 
-def test_a_raster_of_something_else_is_no_answer(run_ok: RunOk, run: Run) -> None:
+def test_raster_without_chances_is_refused(run_ok: RunOk, run: Run) -> None:
     run_ok("export city.parquet --out cells.tif")
     outcome = run("map city.parquet --location cells.tif --out map.html")
     sentence(outcome, "cells.tif does not contain the chances of the cells", "give a .tif file")
@@ -111,7 +111,7 @@ def test_a_raster_of_something_else_is_no_answer(run_ok: RunOk, run: Run) -> Non
 @pytest.mark.parametrize("suffix", ["gpkg", "geojson", "kml", "parquet", "csv", "fgb"])
 def test_answers_of_all_formats_are_drawn(run_ok: RunOk, suffix: str) -> None:
     run_ok(f"localize city.parquet --types DD --method likelihood --out answer.{suffix}")
-    page = drawn(run_ok, f"--location answer.{suffix}")
+    page = map_page(run_ok, f"--location answer.{suffix}")
     assert '"Regions to search (' in page
     assert '"Region 1"' in page
     assert ('"Candidates (10)"' in page) == (suffix in {"gpkg", "geojson", "kml"})
@@ -119,7 +119,7 @@ def test_answers_of_all_formats_are_drawn(run_ok: RunOk, suffix: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["objects.parquet", "words.geojson", "cells.gpkg"])
-def test_what_is_no_answer_is_not_drawn(run_ok: RunOk, run: Run, name: str) -> None:
+def test_file_without_an_answer_is_refused(run_ok: RunOk, run: Run, name: str) -> None:
     Path("words.geojson").write_text("words", encoding="utf-8")
     if name == "cells.gpkg":
         run_ok("export city.parquet --out cells.gpkg")
@@ -128,11 +128,11 @@ def test_what_is_no_answer_is_not_drawn(run_ok: RunOk, run: Run, name: str) -> N
     assert not Path("map.html").exists()
 
 
-def test_a_map_of_what_has_changed(run: Run) -> None:
+def test_changes_are_drawn(run: Run) -> None:
     save_with_store(build_database(FEWER), ObjectStore.of(FEWER), "new.parquet")
     line = "map city.parquet --drift new.parquet --out drift.html"
     code, out, err = run(line)
-    assert (code, out, "not at hand" in err) == (0, "map: drift.html\n", False)
+    assert (code, out, "drawing cells only" in err) == (0, "map: drift.html\n", False)
     assert "Objects removed (4)" in Path("drift.html").read_text(encoding="utf-8")
     # Without its store, a database has cells to compare, but no objects.
     Path("new.objects").rename("elsewhere")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from conftest import Run, RunOk
 
 
-def test_a_finished_run_is_reported_again(reproduced: Path, run_ok: RunOk) -> None:
+def test_finished_run_is_reported_again(reproduced: Path, run_ok: RunOk) -> None:
     database = reproduced.parent / "city.parquet"
     options = ("--out", reproduced, "--queries", QUERIES, "--json")
     rows = json.loads(run_ok("reproduce", database, *options))
@@ -32,7 +32,7 @@ def test_a_finished_run_is_reported_again(reproduced: Path, run_ok: RunOk) -> No
     assert any(row["paper"] == 0.3861 for row in rows)
 
 
-def test_a_small_run_with_workers(tmp_path: Path, run_ok: RunOk) -> None:
+def test_small_run_with_workers(tmp_path: Path, run_ok: RunOk) -> None:
     line = "reproduce --size small --queries 3 --workers 1"
     out = run_ok(line, save_town(tmp_path), "--out", tmp_path / "out")
     assert out.startswith("At medium distortion the method that the paper recommends places ")
@@ -40,7 +40,7 @@ def test_a_small_run_with_workers(tmp_path: Path, run_ok: RunOk) -> None:
     assert f"report: {tmp_path / 'out' / 'report.html'}" in out
 
 
-def test_what_is_refused(reproduced: Path, tmp_path: Path, run: Run) -> None:
+def test_folder_with_other_settings_is_refused(reproduced: Path, tmp_path: Path, run: Run) -> None:
     town, out = save_town(tmp_path), tmp_path / "out"
     sentence(run("reproduce", town, "--out", reproduced), "other settings", "another folder")
     assert not out.exists()

@@ -1,3 +1,5 @@
+"""`semsig serve`: start, stop and errors."""
+
 from __future__ import annotations
 
 import http.client
@@ -33,7 +35,7 @@ def town(tmp_path: Path) -> Path:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are sent in another way")
-def test_the_workbench_opens_and_ends_with_the_interrupt_key(town: Path, map_files: None) -> None:  # noqa: ARG001
+def test_workbench_opens_and_ends_with_the_interrupt_key(town: Path, map_files: None) -> None:  # noqa: ARG001
     command = [sys.executable, "-c", START, "serve", str(town), "--no-browser"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -47,14 +49,12 @@ def test_the_workbench_opens_and_ends_with_the_interrupt_key(town: Path, map_fil
         assert b"workbench" in server.getresponse().read()
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE_S)
-        server.close()  # which the browser keeps open
+        server.close()  # the browser keeps it open until then
     assert (process.returncode, out) == (130, "")
     assert err.splitlines() == ["semsig: it runs until you press Ctrl-C", "semsig: interrupted"]
 
 
-def test_without_its_libraries_it_says_what_to_install(
-    town: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_libraries_are_named(town: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "semsig_gis.serve.server", raising=False)
     monkeypatch.delattr("semsig_gis.serve.server", raising=False)
     monkeypatch.setitem(sys.modules, "uvicorn", None)
@@ -69,7 +69,7 @@ def test_without_its_libraries_it_says_what_to_install(
         (("--objects", "nowhere.parquet"), ("nowhere.parquet",)),
     ],
 )
-def test_what_cannot_be_served_gets_one_sentence(
+def test_invalid_options_are_refused(
     town: Path, run: Run, options: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
     sentence(run("serve", town, "--no-browser", *options), *words)

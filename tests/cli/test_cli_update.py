@@ -18,22 +18,22 @@ def test_tiles_are_updated_by_the_objects_in_their_folder(town: Path, run: Run) 
     assert (code, '"recomputed": 0' in printed) == (0, True)
     assert {path: path.read_bytes() for path in tiles.rglob("*.*")} == before
     assert run("build", objects, "--out", town / "city.parquet")[0] == 0
-    code, _, told = run("update", town / "city.parquet", "--objects", objects, "--workers", 2)
-    assert (code, "is a single file, not tiles" in told) == (2, True)
-    # What needs the objects finds them in the folder, until they are cleaned away.
-    code, _, told = run("localize", tiles, "bench at 40, tree at 90")
-    assert (code, "no street objects" in told) == (0, False)
+    code, _, err = run("update", town / "city.parquet", "--objects", objects, "--workers", 2)
+    assert (code, "is a single file, not tiles" in err) == (2, True)
+    # The objects are in the folder until `clean` removes them.
+    code, _, err = run("localize", tiles, "bench at 40, tree at 90")
+    assert (code, "no street objects" in err) == (0, False)
     assert run("clean", tiles, "--objects")[0] == 0
-    code, _, told = run("update", tiles, "--objects", objects)
-    assert (code, "has no street objects" in told) == (2, True)
+    code, _, err = run("update", tiles, "--objects", objects)
+    assert (code, "has no street objects" in err) == (2, True)
 
 
-def test_two_cities_become_a_region(town: Path, run: Run) -> None:
+def test_cities_are_merged(town: Path, run: Run) -> None:
     city, region = town / "city.parquet", town / "region.parquet"
     objects = town / "objects.parquet"
     assert run("build", objects, "--out", city)[0] == 0
     code, printed, _ = run("merge", city, city, "--out", region)
     assert (code, "were computed again" in printed) == (0, True)
     assert region.read_bytes() == city.read_bytes()
-    code, _, told = run("merge", city, city, "--out", city)
-    assert (code, "give another name" in told) == (2, True)
+    code, _, err = run("merge", city, city, "--out", city)
+    assert (code, "give another name" in err) == (2, True)

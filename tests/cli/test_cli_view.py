@@ -34,10 +34,10 @@ IDS = {"bench": 15, "fire hydrant": 11, "person": 1, "lion": 99}
 
 @pytest.fixture
 def coco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a file of boxes in a rendered photograph, among boxes that are of no use."""
+    """Return a file with boxes in a rendered photograph; some of them are not used."""
     monkeypatch.chdir(tmp_path)
     boxes = np.round(SCENE.boxes(CAMERA)).tolist()
-    found = [
+    detections = [
         *zip(NAMES, boxes, [0.9, 0.8, 1.0], strict=True),
         ("bench", [0, 0, 9, 9], 0.1),
         ("person", [0, 0, 9, 9], 1.0),
@@ -51,10 +51,10 @@ def coco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
                 "id": number,
                 "image_id": 1,
                 "category_id": IDS[name],
-                "bbox": [left, top, right - left, bottom - top],
+                "bbox": [x0, y0, x1 - x0, y1 - y0],
                 "score": score,
             }
-            for number, (name, (left, top, right, bottom), score) in enumerate(found)
+            for number, (name, (x0, y0, x1, y1), score) in enumerate(detections)
         ],
     }
     path = tmp_path / "coco.json"
@@ -63,7 +63,7 @@ def coco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def written(path: Path) -> tuple[str | int, View]:
-    """Return the one view of a file and its name, as other commands read them."""
+    """Return name and view of a file with one view, as other commands read them."""
     (line,) = read_queries(path, taxonomy=TAXONOMY)
     assert isinstance(line.query, View)
     return line.name, line.query
@@ -97,16 +97,16 @@ def test_boxes_become_views(coco: Path, run: Run) -> None:
     assert view.photos == (Photo(sectors=((55.0, 145.0),), north_sigma=5.0),)
 
 
-def test_what_is_counted_is_in_the_json(coco: Path, run: Run) -> None:
+def test_json_contains_the_counts(coco: Path, run: Run) -> None:
     code, out, _ = run(f"view {coco} --fov 90 --out v.jsonl --json --min-score 0")
-    told = json.loads(out)
+    report = json.loads(out)
     assert code == 0
-    assert (told["views"], told["objects"], told["unknown_heading"]) == (1, 4, 1)
-    assert told["left_out"]["unknown_labels"] == {"lion": 1}
+    assert (report["views"], report["objects"], report["unknown_heading"]) == (1, 4, 1)
+    assert report["left_out"]["unknown_labels"] == {"lion": 1}
     assert written(coco.with_name("v.jsonl"))[1].photos[0].north_sigma == math.inf
 
 
-def test_the_photograph_tells_its_focal_length(coco: Path, run: Run) -> None:
+def test_focal_length_is_read_from_exif(coco: Path, run: Run) -> None:
     exif = Image.Exif()
     exif.get_ifd(0x8769)[0xA405] = 26  # millimetres of film
     (coco.parent / "images").mkdir()
@@ -132,5 +132,5 @@ def test_the_photograph_tells_its_focal_length(coco: Path, run: Run) -> None:
         ("coco.json --fov 90 --out v.jsonl --camera phone", "phone"),
     ],
 )
-def test_what_cannot_be_used_is_refused(arguments: str, words: str, run: Run) -> None:
+def test_invalid_options_are_refused(arguments: str, words: str, run: Run) -> None:
     sentence(run(f"view {arguments}"), words)

@@ -1,7 +1,7 @@
-"""Commands that are killed on the way: what was there before stays, or the new is whole.
+"""Killed commands: the old files stay, or the new files are complete.
 
-And whoever runs next finds it, and removes what the killed one had no time to remove. Only some
-moments and commands are tried here, many more by `make soak`.
+The next command works, and removes the temporary files of the killed one. Only some moments and
+commands are tested here, many more by `make soak`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def save_city(objects: StreetObjects, path: Path) -> None:
 
 
 class Place(NamedTuple):
-    """Where a command was killed, with what it said it was about to do."""
+    """The folder of a killed command, and the change to files that it was about to make."""
 
     folder: Path
     change: str
@@ -44,7 +44,7 @@ class Place(NamedTuple):
 
 @pytest.fixture
 def prepared(tmp_path: Path) -> Path:
-    """Return a folder with a city, another that is to be replaced by it, and changed objects."""
+    """Return a folder with two cities and changed objects."""
     folder = tmp_path / "prepared"
     (folder / "temporary").mkdir(parents=True)
     save_objects(BEFORE, folder / "before.parquet")
@@ -55,7 +55,7 @@ def prepared(tmp_path: Path) -> Path:
 
 
 def kills(prepared: Path, line: str, *, every: int = 1) -> Iterator[Place]:
-    """Run a command in a copy of a folder, and kill it each time a change later."""
+    """Run a command in copies of a folder, and kill it at a later change each time."""
     for number in itertools.count(1, every):
         folder = prepared.with_name("killed")
         shutil.rmtree(folder, ignore_errors=True)
@@ -74,7 +74,7 @@ def names_in(folder: Path) -> set[str]:
 
 
 def assert_one_city(path: Path) -> int:
-    """Check that a database and its store are of one city, and return how many objects it has."""
+    """Check that a database and its store match, and return their number of objects."""
     city = open_city(path)
     assert len(city.store.objects) == CELLS[len(city.database)]
     assert_index_fits(city.store)
@@ -91,7 +91,7 @@ UPDATE = "--objects objects.parquet --json"
         (f"update other.parquet {UPDATE} --out city.parquet", 9),
     ],
 )
-def test_a_city_is_the_old_one_or_the_new(
+def test_killed_update_leaves_the_old_or_the_new_city(
     prepared: Path, line: str, every: int, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     outcomes = set()
@@ -109,7 +109,7 @@ def test_a_city_is_the_old_one_or_the_new(
 TILES = "build objects.parquet --out city --tile 100"
 
 
-def test_a_city_in_parts_is_the_old_one_or_the_new(
+def test_killed_build_leaves_the_old_or_the_new_tiles(
     prepared: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.chdir(prepared)
@@ -126,7 +126,7 @@ def test_a_city_in_parts_is_the_old_one_or_the_new(
     assert outcomes == {len(BEFORE), len(AFTER)}
 
 
-def test_an_export_is_the_old_file_or_the_new(prepared: Path) -> None:
+def test_killed_export_leaves_the_old_or_the_new_file(prepared: Path) -> None:
     (prepared / "cells.gpkg").write_text("old")
     line = "export city.parquet --out cells.gpkg"
     sizes = [(folder / "cells.gpkg").stat().st_size for folder, _ in kills(prepared, line)]

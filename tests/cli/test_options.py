@@ -1,4 +1,4 @@
-"""Options of numbers: each has a range, which its help tells and the parts below take."""
+"""Options with numbers: the range of each is in its help and accepted by the library."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def test_every_number_has_a_range(command: str, option: Any, run: Run) -> None: 
     assert math.isfinite(option.max)
     name = option.opts[-1]
     for value in ("nan", "1e999", "-1e308", "x"):
-        told = f"{name} was given as ", value, f"from {option.min:,} to {option.max:,}."
-        sentence(run(f"{command} {name}={value}"), *told)
+        words = f"{name} was given as ", value, f"from {option.min:,} to {option.max:,}."
+        sentence(run(f"{command} {name}={value}"), *words)
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])
-def test_every_line_of_the_help_fits_a_terminal(command: str, run: Run) -> None:
+def test_help_fits_a_terminal(command: str, run: Run) -> None:
     code, out, _ = run(f"{command} --help")
     assert code == 0
     assert [line for line in out.splitlines() if len(line) > 80] == []
@@ -58,11 +58,11 @@ def test_every_line_of_the_help_fits_a_terminal(command: str, run: Run) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_can_be_quiet_or_verbose(command: str) -> None:
-    options = {name for one in COMMANDS[command].params for name in one.opts}
+    options = {name for parameter in COMMANDS[command].params for name in parameter.opts}
     assert options >= {"--quiet", "--verbose"}
 
 
-TAKEN: dict[str, Callable[[Any], object]] = {
+ACCEPTED: dict[str, Callable[[Any], object]] = {
     "build-step": GridSpec,
     "build-radius": SignatureSpec,
     "build-levels": lambda levels: SignatureSpec(levels=levels),
@@ -76,11 +76,11 @@ TAKEN: dict[str, Callable[[Any], object]] = {
 }
 
 
-@pytest.mark.parametrize("name", TAKEN)
-def test_what_an_option_takes_the_parts_below_take(name: str) -> None:
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_limits_of_options_are_accepted_by_the_library(name: str) -> None:
     _, option = NUMBERS[IDS.index(name)]
-    TAKEN[name](option.min)
-    TAKEN[name](option.max)
+    ACCEPTED[name](option.min)
+    ACCEPTED[name](option.max)
 
 
 NOISE = named_noise("light")

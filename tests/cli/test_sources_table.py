@@ -1,6 +1,6 @@
-"""The table of sources in data_sources/README.md: every row is run, on the same three things.
+"""The table of sources in data_sources/README.md: each row is run with the same three objects.
 
-SEMSIG_SNAPSHOTS=1 writes the rows anew.
+SEMSIG_SNAPSHOTS=1 writes the rows again.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ import pyarrow.parquet as pq
 import pytest
 import shapely
 from open_cities import CITIES, serve
-from servers import Answer, Server
+from osm_xml import node, write_osm
+from servers import Answer
 from stand_ins import ArcGIS
 from stores import keep_in_bucket
 
@@ -28,7 +29,9 @@ from semsig_gis.sources import catalog as catalogs
 from semsig_gis.sources import data_folder, load_catalog
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
+
+    from servers import Server
 
     from conftest import Run, RunOk
 
@@ -54,16 +57,10 @@ files = ["lamps*"]
 
 
 @pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
+def redirect(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str, str], None]:
+    """Return a function that changes the address of a built-in catalogue."""
 
-
-@pytest.fixture
-def moved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str, str], None]:
-    """Have a built-in catalogue ask another address than that of its publisher."""
-
-    def move(name: str, address: str) -> None:
+    def change(name: str, address: str) -> None:
         copy = tmp_path / "data_sources"
         shutil.copytree(str(data_folder()), copy)
         path = copy / f"{name}.toml"
@@ -74,7 +71,7 @@ def moved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[str, str
         path.write_text(text, "utf-8")
         monkeypatch.setattr(catalogs, "data_folder", lambda: copy)
 
-    return move
+    return change
 
 
 def elements() -> dict[str, Any]:
@@ -87,13 +84,8 @@ def elements() -> dict[str, Any]:
 
 
 def extract(folder: Path, _: Server) -> None:
-    nodes = "".join(
-        f'<node id="{n}" lon="{x}" lat="{y}">'
-        + "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
-        + "</node>"
-        for n, ((x, y), tags) in enumerate(zip(PLACES, TAGS, strict=True), 1)
-    )
-    (folder / "city.osm").write_text(f'<osm version="0.6">{nodes}</osm>', "utf-8")
+    things = enumerate(zip(PLACES, TAGS, strict=True), 1)
+    write_osm(folder / "city.osm", *(node(n, x, y, tags) for n, ((x, y), tags) in things))
 
 
 def osmnx(folder: Path, _: Server) -> None:
@@ -178,7 +170,7 @@ def around(name: str) -> str:
     return f"{x - 0.01:.2f},{y - 0.01:.2f},{x + 0.01:.2f},{y + 0.01:.2f}"
 
 
-# The source or tool, the command without `--out objects.parquet`, and what has to be there for it.
+# The source or tool, the command without `--out objects.parquet`, and a function that prepares it.
 ROWS: list[tuple[str, str, Callable[[Path, Server], str | None]]] = [
     ("OpenStreetMap, an extract (`.osm`, `.osm.pbf`)", "load city.osm", extract),
     ("OpenStreetMap, live (Overpass)", f"fetch openstreetmap --area {AREA}", overpass),
@@ -206,7 +198,7 @@ ROWS: list[tuple[str, str, Callable[[Path, Server], str | None]]] = [
 
 
 def written(command: str, folder: Path) -> str:
-    """Say what a user had to write for a command: names, paths, areas, and lines of TOML."""
+    """Return what a user has to write for a command: names, paths, areas, and lines of TOML."""
     verb, first, *rest = command.split()
     files = [word for word in (first, *rest) if word.endswith(".toml")]
     parts = ["a path"] if verb == "load" else [] if files else ["a name"]
@@ -222,7 +214,7 @@ def written(command: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize(("source", "command", "make"), ROWS, ids=[row[0] for row in ROWS])
-def test_a_row_is_what_happens(
+def test_row_matches_the_command(
     *,
     source: str,
     command: str,
@@ -230,7 +222,7 @@ def test_a_row_is_what_happens(
     run_ok: RunOk,
     run: Run,
     server: Server,
-    moved: Callable[[str, str], None],
+    redirect: Callable[[str, str], None],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -240,14 +232,14 @@ def test_a_row_is_what_happens(
     verb, name, *_ = command.split()
     address = make(tmp_path, server)
     if verb == "fetch" and not name.endswith(".toml"):
-        moved(name, address or server.url)
+        redirect(name, address or server.url)
     if "draft.toml" in command:
         (tmp_path / "draft.toml").write_text(run_ok("draft trees.gpkg"), "utf-8")
-    code, out, told = run(f"{command} --out objects.parquet --json")
-    assert code == 0, told
+    code, out, err = run(f"{command} --out objects.parquet --json")
+    assert code == 0, err
     if verb == "fetch" and not name.endswith(".toml"):
         catalog = load_catalog(name)
-        assert any(spec.terms in told for spec in catalog.layers)  # the licence of what is sent
+        assert any(spec.terms in err for spec in catalog.layers)  # the licence of the objects
     report = json.loads(out)
     cells = (source, f"`semsig {command}`", f"{report['objects']}", written(command, tmp_path))
     row = f"| {' | '.join(cells)} |"
@@ -258,7 +250,7 @@ def test_a_row_is_what_happens(
     assert row in text.splitlines()
 
 
-def test_the_table_has_no_other_row() -> None:
+def test_table_has_no_other_rows() -> None:
     text = README.read_text("utf-8").partition("## Sources at a glance")[2].partition("\n## ")[0]
     first = [line.split(" | ")[0].removeprefix("| ") for line in text.splitlines() if "|" in line]
     assert first[2:] == [source for source, *_ in ROWS]

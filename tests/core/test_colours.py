@@ -32,13 +32,17 @@ from semsig_gis.core import (
     SAME_LEVELS,
     SAME_TYPES,
     SHADES,
+    SHAPES,
     VERDICTS,
     ClassSign,
+    ObjectClass,
+    Taxonomy,
+    class_signs,
     group_labels,
 )
 from semsig_gis.exports import AMBIGUITY, CLASS_MARKERS, IDENTIFIABILITY, by_outcome
 from semsig_gis.maps import OUTLINES, mark_svg
-from semsig_gis.reports import axes, plots, scenes
+from semsig_gis.reports import MARKERS, axes, plots, scenes
 
 SIGHTS = {
     "normal": None,
@@ -208,7 +212,7 @@ def test_no_colour_has_two_meanings() -> None:
 def test_colours_of_reports_have_no_other_meaning() -> None:
     # Their curves and the classes, which no picture has together, are both many things of a kind.
     inks = (plots.INK, plots.GROUND, plots.AXIS, plots.TICK, plots.GRID, plots.SOFT)
-    used = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.GROUND}
+    used = {*plots.COLOURS, *inks, *plots.DARK.values(), scenes.ANSWER, axes.CELL_GROUND}
     assert used & {*meanings()} == set()
 
 
@@ -226,3 +230,44 @@ def test_web_and_qgis_use_the_same_colours() -> None:
         assert f'd="{OUTLINES[mark.shape]}" fill="{mark.colour}"' in mark_svg(mark)
     assert [*AMBIGUITY.values()] == [*zip(group_labels(), GROUP_COLOURS.values(), strict=True)]
     assert [colour for _, colour in IDENTIFIABILITY.values()] == list(FOUND_RAMP)
+
+
+# --- Signs of classes ---------------------------------------------------------------------------
+
+MANY = Taxonomy(
+    tuple(ObjectClass(code, chr(64 + code), f"c{code}", f"C {code}") for code in range(1, 27))
+)
+
+
+def luminance(colour: str) -> float:
+    shares = np.array(list(bytes.fromhex(colour[1:]))) / 255.0
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_signs_do_not_depend_on_the_order_of_classes() -> None:
+    signs = class_signs(MANY)
+    assert class_signs(Taxonomy(MANY.classes[::-1])) == signs
+    for item in MANY.classes:
+        assert (signs[item.code].symbol, signs[item.code].title) == (item.symbol, item.title)
+
+
+def test_signs_differ_in_colour_or_shape() -> None:
+    signs = list(class_signs(MANY).values())
+    assert len({sign.colour for sign in signs[:18]}) == 18
+    assert len({(sign.colour, sign.shape) for sign in signs}) == 26
+    for sign, following in itertools.pairwise(signs):
+        assert sign.shape != following.shape
+        assert sign.colour != following.colour
+
+
+@pytest.mark.parametrize("colour", [*COLOURS, "#000000", "#ffffff", "#777777"])
+def test_letter_contrasts_with_its_shape(colour: str) -> None:
+    sign = ClassSign("A", "a class", "circle", colour)
+    assert sign.ink in {"#000000", "#ffffff"}
+    darker, lighter = sorted((luminance(sign.ink), luminance(colour)))
+    assert (lighter + 0.05) / (darker + 0.05) >= 4.5
+
+
+def test_every_output_format_draws_every_shape() -> None:
+    assert list(OUTLINES) == list(CLASS_MARKERS) == list(MARKERS) == list(SHAPES)

@@ -46,7 +46,6 @@ from semsig_gis.sources import CitySpec
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from semsig_gis.database import SignatureDatabase
 
 LONGEST_LINE = 250
 
@@ -137,7 +136,7 @@ def test_text_of_a_database_and_of_an_answer(results: dict[str, object]) -> None
     assert f"cells {len(database):,}; objects seen " in repr(database)
     assert "CRS EPSG:2154; bounds x 765,175 to " in repr(database)
     assert "answer " in repr(results["Location"])
-    assert "bounds none" in repr(nothing_of(database))
+    assert "bounds none" in repr(database.select(slice(0)))
 
 
 def test_objects_of_a_file_have_the_same_text(results: dict[str, object], tmp_path: Path) -> None:
@@ -145,10 +144,6 @@ def test_objects_of_a_file_have_the_same_text(results: dict[str, object], tmp_pa
     assert isinstance(objects, StreetObjects)
     save_objects(objects, tmp_path / "objects.parquet")
     assert repr(open_objects(tmp_path / "objects.parquet")) == repr(objects)
-
-
-def nothing_of(database: SignatureDatabase) -> SignatureDatabase:
-    return database.select(slice(0))
 
 
 @pytest.mark.parametrize("text", [HOSTILE, "two\nlines\0", "long " * 100])

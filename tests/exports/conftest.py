@@ -1,4 +1,4 @@
-"""Layers in several blocks, though the cities of tests are small."""
+"""Small blocks, so that the layers of the small test cities have several."""
 
 from __future__ import annotations
 

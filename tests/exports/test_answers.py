@@ -1,4 +1,4 @@
-"""An answer in degrees: GeoJSON and KML hold the regions, the candidates and the place."""
+"""GeoJSON and KML of an answer contain the regions, the candidates and the place."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ def layers_of(file: Path) -> dict[str, gpd.GeoDataFrame]:
 
 @pytest.mark.parametrize("suffix", [".geojson", ".kml"])
 @pytest.mark.parametrize("answer", [LOCATION, small_localization()])
-def test_all_of_an_answer(answer: Location | Localization, suffix: str, tmp_path: Path) -> None:
+def test_file_contains_all_layers_of_an_answer(
+    answer: Location | Localization, suffix: str, tmp_path: Path
+) -> None:
     file = tmp_path / f"a{suffix}"
     regions = export_answer(answer, CITY, file).table
     tables = layers_of(file)
@@ -47,8 +49,8 @@ def test_all_of_an_answer(answer: Location | Localization, suffix: str, tmp_path
         table = tables[kind]
         numbers = expected.iloc[:, 0]
         assert table["Name"].tolist() == [f"{kind} {number}" for number in numbers]
-        moved = table.to_crs(CITY.crs).geometry.reset_index(drop=True)
-        assert moved.hausdorff_distance(expected.geometry.reset_index(drop=True)).max() < 0.02
+        shapes = table.to_crs(CITY.crs).geometry.reset_index(drop=True)
+        assert shapes.hausdorff_distance(expected.geometry.reset_index(drop=True)).max() < 0.02
         for column in expected.select_dtypes("number"):
             assert np.allclose(pd.to_numeric(table[column]), expected[column])
     if places:
@@ -60,7 +62,7 @@ def test_all_of_an_answer(answer: Location | Localization, suffix: str, tmp_path
         assert bool(row.refined) is estimate.refined
 
 
-def test_both_name_the_licences_and_load_nothing(tmp_path: Path) -> None:
+def test_files_have_the_licences_and_load_no_other_files(tmp_path: Path) -> None:
     harmful = "<b>Town</b> & \x07co ]]> (CC0)"
     answer = dataclasses.replace(LOCATION, licenses=(harmful,))
     for name in ("a.kml", "a.geojson"):
@@ -68,12 +70,12 @@ def test_both_name_the_licences_and_load_nothing(tmp_path: Path) -> None:
     document = ET.parse(tmp_path / "a.kml").getroot().find(f"{KML}Document")  # noqa: S314 - ours
     assert document is not None
     assert document.findtext(f"{KML}description") == harmful.replace("\x07", "")
-    assert [one.text for one in document.iter(f"{KML}href")] == []
+    assert [*document.iter(f"{KML}href")] == []
     styles = {f"#{style.get('id')}" for style in document.iter(f"{KML}Style")}
-    assert {one.text for one in document.iter(f"{KML}styleUrl")} <= styles
-    told = json.loads((tmp_path / "a.geojson").read_text())
-    assert told["semsig"]["licenses"] == [harmful]
-    assert told["semsig"]["searched"]["cells"] > 0
-    first = told["features"][0]["properties"]
-    # Whole numbers stay whole, though other rows lack them.
+    assert {element.text for element in document.iter(f"{KML}styleUrl")} <= styles
+    collection = json.loads((tmp_path / "a.geojson").read_text())
+    assert collection["semsig"]["licenses"] == [harmful]
+    assert collection["semsig"]["searched"]["cells"] > 0
+    first = collection["features"][0]["properties"]
+    # Integers stay integers, although they are missing in other rows.
     assert (first["Name"], repr(first["rank"])) == ("region 1", "1")

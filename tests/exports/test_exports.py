@@ -1,4 +1,4 @@
-"""Picking a format by the suffix of the file: what each holds, and what is refused."""
+"""Formats by the suffix of the file: their contents, and the refusals."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 }
 
 
-def test_a_geopackage_holds_all_or_what_is_named(tmp_path: Path) -> None:
+def test_geopackage_contains_all_or_the_chosen_layers(tmp_path: Path) -> None:
     everything = {**OF_OBJECTS, **OF_QUERIES, "identifiability": CHANCES, "h3": 9}
     export_database(CITY, tmp_path / "CITY.GPKG", geometry="point", **everything)
     layers = dict(pyogrio.list_layers(tmp_path / "CITY.GPKG").tolist())
@@ -59,7 +59,7 @@ def test_a_geopackage_holds_all_or_what_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("layer", LAYERS)
-def test_other_files_hold_one(layer: str, tmp_path: Path) -> None:
+def test_other_formats_contain_one_layer(layer: str, tmp_path: Path) -> None:
     for suffix in TABLES:
         export_database(CITY, tmp_path / f"a{suffix}", layers=[layer], **GIVEN[layer])
     expected = gpd.read_file(tmp_path / "a.gpkg", layer=layer)
@@ -74,27 +74,29 @@ LOCATION = small_location()
 
 
 @pytest.mark.parametrize("answer", [LOCATION, small_localization()])
-def test_answers(answer: Location | Localization, tmp_path: Path) -> None:
+def test_exported_answer_contains_regions_and_candidates(
+    answer: Location | Localization, tmp_path: Path
+) -> None:
     file = tmp_path / "a.gpkg"
     for path in (file, tmp_path / "a.parquet", tmp_path / "a.csv"):
-        found = export_answer(answer, CITY, path, share=0.99, within=12.0)
+        regions = export_answer(answer, CITY, path, share=0.99, within=12.0)
     texts = pd.read_csv(tmp_path / "a.csv")
     for read in (
         gpd.read_file(file, layer="regions"),
         gpd.read_parquet(tmp_path / "a.parquet"),
         gpd.GeoDataFrame(texts, geometry=gpd.GeoSeries.from_wkt(texts["WKT"]), crs=CITY.crs),
     ):
-        assert read.geometry.geom_equals(found.table.geometry).all()
+        assert read.geometry.geom_equals(regions.table.geometry).all()
         for column in ("searched_km2", "searched_percent"):
-            assert read[column].tolist() == found.table[column].tolist()
+            assert read[column].tolist() == regions.table[column].tolist()
     assert pyogrio.list_layers(file)[:, 0].tolist() == [
         *("regions", "candidates"), *(["place"] if answer is LOCATION else []), "layer_styles",
     ]  # fmt: skip
-    listed = gpd.read_file(file, layer="candidates")
-    assert listed["cell_id"].tolist() == answer.candidates["cell_id"].tolist()
+    candidates = gpd.read_file(file, layer="candidates")
+    assert candidates["cell_id"].tolist() == answer.candidates["cell_id"].tolist()
     facts = pyogrio.read_info(file, layer="regions")["layer_metadata"]
     searched = search_regions(answer, CITY, share=0.99, within=12.0)
-    assert json.loads(facts["searched"]) == found.to_dict() == searched.to_dict()
+    assert json.loads(facts["searched"]) == regions.to_dict() == searched.to_dict()
 
 
 def city(rows: slice = slice(None), **options: Any) -> Callable[[Path], object]:  # noqa: ANN401
@@ -105,8 +107,8 @@ def objects(table: gpd.GeoDataFrame) -> Callable[[Path], object]:
     return city(layers="objects", objects=dataclasses.replace(OBJECTS, table=table))
 
 
-def answer(one: Location | Localization, share: float = 0.9) -> Callable[[Path], object]:
-    return lambda path: export_answer(one, CITY, path, share=share)
+def answer(result: Location | Localization, share: float = 0.9) -> Callable[[Path], object]:
+    return lambda path: export_answer(result, CITY, path, share=share)
 
 
 MADE_WITH = "give the database that it was made with"
@@ -130,6 +132,8 @@ REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
     (city(layers=["evaluation_lines"]), "city.parquet", ("no evaluation",)),
     (city(layers=["identifiability"]), "city.tif", ("no identifiability",)),
     (city(layers=["error"]), "city.tif", ("no evaluation",)),
+    (city(layers="field"), "city.tif", ("no evaluation",)),
+    (city(smooth=250.0), "city.tif", ("not the smoothing",)),
     (
         city(**OF_OBJECTS, **OF_QUERIES),
         "a.csv",
@@ -142,7 +146,7 @@ REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
     (answer(small_localization()), "a.tif", ("a.tif", "likelihood")),
     (answer(small_location()), "a.shp", ("a.shp", ".gpkg")),
     (answer(small_localization(), share=7), "a.gpkg", ("share of 7",)),
-    # What is of another city, or of none.
+    # Empty cities, and objects or evaluations of another city.
     *((city(slice(0)), f"city{suffix}", ("city.", "no cell")) for suffix in ALL),
     (city(slice(3, None), layers="error", **OF_QUERIES), "city.tif", (MADE_WITH,)),
     *(
@@ -160,7 +164,7 @@ REFUSALS: list[tuple[Callable[[Path], object], str, tuple[str, ...]]] = [
 
 
 @pytest.mark.parametrize(("export", "name", "words"), REFUSALS)
-def test_what_does_not_fit_is_refused(
+def test_wrong_arguments_are_refused_and_write_nothing(
     export: Callable[[Path], object], name: str, words: tuple[str, ...], tmp_path: Path
 ) -> None:
     with refused((InputError, UnknownNameError, EmptyResultError), *words):
@@ -169,7 +173,7 @@ def test_what_does_not_fit_is_refused(
 
 
 @pytest.mark.parametrize("suffix", ALL)
-def test_a_folder_that_cannot_be_written(suffix: str, tmp_path: Path) -> None:
+def test_folder_that_cannot_be_written_is_refused(suffix: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("here")
     with refused(SemsigError, f"city{suffix}", "folder"):
         export_database(CITY, tmp_path / "file" / f"city{suffix}")
@@ -179,14 +183,14 @@ def test_a_folder_that_cannot_be_written(suffix: str, tmp_path: Path) -> None:
     assert (tmp_path / "file").read_text() == "here"
 
 
-# A share just below 1 is too little for the spatial index of a GeoPackage, which comes last.
+# At a share just below 1, the spatial index of a GeoPackage fails, which is written last.
 @pytest.mark.parametrize("share", [0.0, 0.07, 0.4, 0.95])
 @pytest.mark.parametrize("suffix", ALL)
-def test_a_full_disk_leaves_the_old_file(suffix: str, share: float, tmp_path: Path) -> None:
+def test_full_disk_leaves_the_old_file(suffix: str, share: float, tmp_path: Path) -> None:
     file, layers = tmp_path / f"city{suffix}", OF_OBJECTS if suffix == ".gpkg" else {}
     export_database(CITY, file, **layers)
-    before, there = file.read_bytes(), {*tmp_path.iterdir()}
+    before, files = file.read_bytes(), {*tmp_path.iterdir()}
     with largest_file(round(share * len(before))), refused(InputError, file.name, "unchanged"):
         export_database(CITY, file, **layers)
     assert file.read_bytes() == before
-    assert {*tmp_path.iterdir()} == there
+    assert {*tmp_path.iterdir()} == files

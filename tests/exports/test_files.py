@@ -1,4 +1,4 @@
-"""One layer a file: what is read back is what was there, and no spreadsheet runs any of it."""
+"""Files of one layer are read back unchanged, and no spreadsheet executes their texts."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ TEXTS = st.text() | st.text(alphabet="=+-@'\t\r\n;,|\"a") | st.sampled_from(FORM
 
 @given(TEXTS)
 @example("=1")
-def test_text_is_safe_and_comes_back(text: str) -> None:
+def test_safe_text_has_no_formula_and_is_reversible(text: str) -> None:
     safe = formula_safe(text)
     assert as_written(safe) == text
     assert not re.search('(^|[;,|"\t\r\n])[=+@\uff1d\uff0b\uff0d\uff20-]', safe)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
-def test_no_spreadsheet_of_any_country_finds_a_formula(separator: str) -> None:
+def test_safe_text_has_no_formula_with_any_separator(separator: str) -> None:
     for text in FORMULAS:
         quoted = formula_safe(text).replace('"', '""')
         line = f'12,"{quoted}",3\n'
@@ -52,7 +52,7 @@ def test_no_spreadsheet_of_any_country_finds_a_formula(separator: str) -> None:
             assert not any(cell.startswith(tuple("=+-@\t\r")) for cell in row), (text, row)
 
 
-def test_cells_come_back_from_csv(tmp_path: Path) -> None:
+def test_cells_in_csv_are_read_back(tmp_path: Path) -> None:
     file = tmp_path / "cells.csv"
     export_database(CITY, file)
     cells = pd.read_csv(file, dtype={"types": str, "x": str, "y": str})
@@ -65,14 +65,14 @@ def test_cells_come_back_from_csv(tmp_path: Path) -> None:
     assert pd.read_csv(file)["WKT"].str.startswith("POLYGON").all()
 
 
-def test_hostile_texts_come_back_from_csv(tmp_path: Path) -> None:
+def test_hostile_texts_in_csv_are_safe_and_read_back(tmp_path: Path) -> None:
     texts = [*FORMULAS, "é" * 10_000, "\u202eright", "<script>"]
     ids = [texts[number % len(texts)] for number in range(len(OBJECTS))]
     hostile = dataclasses.replace(OBJECTS, table=OBJECTS.table.assign(source_id=ids))
     file = tmp_path / "objects.csv"
     export_database(CITY, file, layers=["objects"], objects=hostile)
-    with file.open(encoding="utf-8", newline="") as opened:
-        rows = list(csv.DictReader(opened))
+    with file.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
     assert [as_written(row["source_id"]) for row in rows] == ids
     assert not any(row["source_id"].startswith(tuple("=+-@\t\r\n")) for row in rows)
     assert [float(row["x"]) for row in rows] == OBJECTS.xy[:, 0].tolist()
@@ -83,32 +83,30 @@ def test_hostile_texts_come_back_from_csv(tmp_path: Path) -> None:
     assert set(pd.read_csv(file)["next_cell_ids"]) == {"'-5,'-4;'=cmd"}
 
 
-def test_cells_come_back_from_geoparquet(tmp_path: Path) -> None:
-    told, file = chances_of(CITY), tmp_path / "cells.parquet"
+def test_cells_in_geoparquet_are_read_back(tmp_path: Path) -> None:
+    chances, file = chances_of(CITY), tmp_path / "cells.parquet"
     steps: list[tuple[int, int]] = []
-    export_database(
-        CITY, file, identifiability=told, progress=lambda done, rows: steps.append((done, rows))
-    )
+    export_database(CITY, file, identifiability=chances, progress=lambda *step: steps.append(step))
     cells = gpd.read_parquet(file)
     assert cells.crs == CITY.crs
     assert cells["cell_id"].tolist() == CITY.cell_ids.tolist()
     assert cells["types"].tolist() == [CITY.types(cell) for cell in range(len(CITY))]
-    assert cells["chance_found"].tolist() == told.found.tolist()
+    assert cells["chance_found"].tolist() == chances.found.tolist()
     assert np.array_equal(cells.geometry.area, np.full(len(CITY), 100.0))
     assert (steps[0], steps[-1]) == ((100, len(CITY)), (len(CITY), len(CITY)))
     west, south = CITY.xy.mean(axis=0)
     box = (west, south, west + 35, south + 35)
-    some = gpd.read_parquet(file, bbox=box)
-    # The bounds are rounded outwards to float32: a neighbour that is a hair away may come along.
-    wanted = cells.cx[box[0] : box[2], box[1] : box[3]]
-    assert set(wanted["cell_id"]) <= set(some["cell_id"])
-    assert 9 <= len(some) < len(cells) / 4
+    selection = gpd.read_parquet(file, bbox=box)
+    # The bounds are rounded outwards to float32, so that the selection may have more neighbours.
+    expected = cells.cx[box[0] : box[2], box[1] : box[3]]
+    assert set(expected["cell_id"]) <= set(selection["cell_id"])
+    assert 9 <= len(selection) < len(cells) / 4
     with refused(DatabaseError, "signature cells export", "signature database"):
         open_database(file)
 
 
 @pytest.mark.parametrize(("layer", "kind"), [("cells", "Polygon"), ("objects", "Point")])
-def test_the_metadata_of_geoparquet_say_what_it_is(layer: str, kind: str, tmp_path: Path) -> None:
+def test_metadata_of_geoparquet(layer: str, kind: str, tmp_path: Path) -> None:
     file = tmp_path / "a.parquet"
     export_database(CITY, file, layers=layer, objects=OBJECTS if layer == "objects" else None)
     metadata = pq.read_schema(file).metadata
@@ -121,11 +119,11 @@ def test_the_metadata_of_geoparquet_say_what_it_is(layer: str, kind: str, tmp_pa
     assert specs["taxonomy"] == OBJECTS.taxonomy.to_list()
 
 
-def test_layers_come_back_from_flatgeobuf_and_geojson(tmp_path: Path) -> None:
-    told = chances_of(CITY)
+def test_cells_in_flatgeobuf_and_geojson_are_read_back(tmp_path: Path) -> None:
+    chances = chances_of(CITY)
     for name in ("a.fgb", "a.geojson"):
-        export_database(CITY, tmp_path / name, identifiability=told)
-    # The rows of a FlatGeobuf stand along a curve.
+        export_database(CITY, tmp_path / name, identifiability=chances)
+    # The rows of a FlatGeobuf are in the order of a Hilbert curve.
     exact, degrees = (
         gpd.read_file(tmp_path / name).sort_values("cell_id", ignore_index=True)
         for name in ("a.fgb", "a.geojson")
@@ -135,7 +133,7 @@ def test_layers_come_back_from_flatgeobuf_and_geojson(tmp_path: Path) -> None:
     for cells in (exact, degrees):
         assert cells["cell_id"].tolist() == CITY.cell_ids.tolist()
         assert cells["types"].tolist() == [CITY.types(cell) for cell in range(len(CITY))]
-        assert cells["chance_found"].tolist() == told.found.tolist()
+        assert cells["chance_found"].tolist() == chances.found.tolist()
     assert np.array_equal(exact.geometry.area, np.full(len(CITY), 100.0))
     middles = degrees.geometry.centroid
     assert np.abs(np.stack([middles.x, middles.y], axis=1) - CITY.xy).max() < 0.02

@@ -1,4 +1,4 @@
-"""GeoPackages: other programs, and we, read from them what the database holds."""
+"""GeoPackages are read back unchanged, by this package and by other programs."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ if TYPE_CHECKING:
 
 LOCAL = CRS("+proj=tmerc +lat_0=43.6123456789 +lon_0=3.88 +k=0.99987 +ellps=GRS80 +units=m")
 LICENSE = "Town: é <b>\"quoted\"</b> & 'single' ]]> (CC0): trees, lamps"
-PROGRAM = Path(__file__).parents[1] / "qgis_draw.py"
+PROGRAM = Path(__file__).parents[1] / "qgis_programs.py"
 FEATURES = ["cells", "objects", "evaluation", "evaluation_lines"]
 LAYERS = [*FEATURES, "evaluation_figures", "layer_styles"]
 FORMULA = '=cmd|"/C calc"!A0 <script>'
 
-# A city on a grid of its own, with texts that are hard to write.
+# A city on an unusual grid, with hostile texts.
 CLASSES = [
     dataclasses.replace(item, title=f"{FORMULA} {item.title}") for item in paper_taxonomy().classes
 ]
@@ -83,20 +83,20 @@ EVALUATION = evaluate(DATABASE, queries=60, distortion="strong", method=Method()
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a GeoPackage with all that there is of the city."""
+    """Return a GeoPackage with all layers of the city."""
     path = tmp_path_factory.mktemp("exported") / "city.gpkg"
     export_database(DATABASE, path, objects=OBJECTS, identifiability=CHANCES, evaluation=EVALUATION)
     return path
 
 
 def run(*command: str | Path, environment: dict[str, str]) -> str:
-    """Run a program that must not fail; return what it printed."""
-    done = subprocess.run(
+    """Run a program that must not fail; return its output."""
+    result = subprocess.run(
         command, check=False, capture_output=True, text=True, timeout=PATIENCE_S, env=environment
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "GPKG: unrecognized user_version" not in done.stdout + done.stderr
-    return done.stdout
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "GPKG: unrecognized user_version" not in result.stdout + result.stderr
+    return result.stdout
 
 
 def query(file: Path, sql: str) -> list[Any]:
@@ -104,7 +104,7 @@ def query(file: Path, sql: str) -> list[Any]:
         return connection.execute(sql).fetchall()
 
 
-def test_cells_read_back_as_they_are(file: Path) -> None:
+def test_cells_are_read_back_unchanged(file: Path) -> None:
     database, cells = DATABASE, gpd.read_file(file, layer="cells")
     assert cells.crs == database.crs
     assert len(cells) == len(database) > 300
@@ -112,16 +112,16 @@ def test_cells_read_back_as_they_are(file: Path) -> None:
         assert np.array_equal(cells[name], getattr(database, f"{name}s")), name
     assert np.array_equal(cells[["x", "y"]], database.xy)
     for number, cell in enumerate(cells.itertuples()):
-        seen = slice(database.offsets[number], database.offsets[number + 1])
+        rows = slice(database.offsets[number], database.offsets[number + 1])
         assert cell.types == database.types(number)
-        degrees = database.bearings[seen]
-        written = [float(text) for text in cell.bearings.split(" ")]
-        assert cell.bearings == " ".join(f"{one:.2f}" for one in degrees)
-        assert np.abs(np.array(written) - degrees).max() <= 0.005 + 1e-9
-        assert max(written) < 360
+        degrees = database.bearings[rows]
+        bearings = [float(text) for text in cell.bearings.split(" ")]
+        assert cell.bearings == " ".join(f"{bearing:.2f}" for bearing in degrees)
+        assert np.abs(np.array(bearings) - degrees).max() <= 0.005 + 1e-9
+        assert max(bearings) < 360
         assert [int(text) for text in cell.levels.split(" ")] == quantize(degrees, 12).tolist()
         metres = [float(text) for text in cell.distances.split(" ")]
-        assert np.abs(np.array(metres) - database.distances[seen]).max() <= 0.005 + 1e-9
+        assert np.abs(np.array(metres) - database.distances[rows]).max() <= 0.005 + 1e-9
     table = CHANCES.table()
     assert cells["lookalike_3"].isna().tolist() == (CHANCES.lookalikes[:, 2] < 0).tolist()
     for name in table.column_names:
@@ -129,7 +129,7 @@ def test_cells_read_back_as_they_are(file: Path) -> None:
         assert np.array_equal(cells[name].to_numpy(float), expected, equal_nan=True)
 
 
-def test_a_square_is_the_cell_and_a_point_its_middle(file: Path, tmp_path: Path) -> None:
+def test_cells_are_squares_or_points_at_viewpoints(file: Path, tmp_path: Path) -> None:
     squares = gpd.read_file(file, layer="cells").geometry
     assert (squares.geom_type == "Polygon").all()
     assert np.allclose(squares.area, 12.5**2, rtol=1e-12)
@@ -137,7 +137,7 @@ def test_a_square_is_the_cell_and_a_point_its_middle(file: Path, tmp_path: Path)
     assert np.allclose(centres, DATABASE.xy, atol=1e-6)
     bounds = squares.bounds.to_numpy()
     assert np.allclose(bounds[:, 2:] - bounds[:, :2], 12.5, atol=1e-9)
-    # Neighbours share their corners to the last bit: nothing between them, nothing twice.
+    # Neighbours share their corners exactly, without gaps and overlaps.
     corners = np.unique(bounds[:, [0, 2]])
     assert np.diff(corners).min() > 12
     assert np.array_equal(shapely.get_num_coordinates(squares.array), np.full(len(squares), 5))
@@ -148,7 +148,7 @@ def test_a_square_is_the_cell_and_a_point_its_middle(file: Path, tmp_path: Path)
     assert np.array_equal(shapely.get_coordinates(cells.geometry.array), DATABASE.xy)
 
 
-def test_objects_read_back_as_they_are(file: Path) -> None:
+def test_objects_are_read_by_fiona_unchanged(file: Path) -> None:
     fiona = pytest.importorskip("fiona", reason="there is no fiona for this Python")
     assert fiona.listlayers(file) == LAYERS
     with fiona.open(file, layer="objects") as layer:
@@ -168,15 +168,15 @@ def test_objects_read_back_as_they_are(file: Path) -> None:
         assert feature.geometry.coordinates == (row.geometry.x, row.geometry.y)
 
 
-def test_specs_and_licences_travel_along(file: Path) -> None:
-    cells, things = (pyogrio.read_info(file, layer=name) for name in ("cells", "objects"))
+def test_metadata_have_specs_and_licences(file: Path) -> None:
+    cells, objects = (pyogrio.read_info(file, layer=name) for name in ("cells", "objects"))
     facts = cells["layer_metadata"]
     assert json.loads(facts["grid"]) == {"step": 12.5, "origin": [3.0, -4.0]}
     assert json.loads(facts["signature"]) == {"radius": 25.0, "levels": 12}
     assert Taxonomy.from_list(json.loads(facts["taxonomy"])) == DATABASE.taxonomy
     assert json.loads(facts["licenses"]) == [LICENSE]
     assert json.loads(facts["written_by"]).startswith("semsig_gis ")
-    assert json.loads(things["layer_metadata"]["licenses"]) == [LICENSE]
+    assert json.loads(objects["layer_metadata"]["licenses"]) == [LICENSE]
     contents = query(file, "SELECT table_name, identifier, description FROM gpkg_contents")
     assert {name: title for name, title, _ in contents} == {
         "cells": "Signature cells",
@@ -190,7 +190,7 @@ def test_specs_and_licences_travel_along(file: Path) -> None:
     assert "12.5 m" in contents[0][2]
 
 
-def test_it_is_a_sound_geopackage_1_2(file: Path) -> None:
+def test_file_is_a_valid_geopackage_1_2(file: Path) -> None:
     assert query(file, "PRAGMA user_version") == [(10200,)]
     assert query(file, "PRAGMA application_id") == [(0x47504B47,)]
     assert query(file, "PRAGMA integrity_check") == [("ok",)]
@@ -210,7 +210,7 @@ def test_it_is_a_sound_geopackage_1_2(file: Path) -> None:
     assert list(file.parent.iterdir()) == [file]
 
 
-def test_progress_is_told_and_an_interruption_leaves_the_old_file(tmp_path: Path) -> None:
+def test_progress_is_reported_and_an_interruption_leaves_the_old_file(tmp_path: Path) -> None:
     steps: list[tuple[int, int]] = []
     file, rows = tmp_path / "city.gpkg", len(DATABASE) + len(OBJECTS)
     export_database(DATABASE, file, objects=OBJECTS, progress=lambda *step: steps.append(step))
@@ -218,8 +218,8 @@ def test_progress_is_told_and_an_interruption_leaves_the_old_file(tmp_path: Path
     assert steps == sorted(set(steps))
     before = file.read_bytes()
 
-    def stop(done: int, total: int) -> None:
-        if done > total // 2:
+    def stop(written: int, total: int) -> None:
+        if written > total // 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -241,11 +241,11 @@ def test_qgis_counts_the_objects_in_the_cells(
     columns, rows = DATABASE.grid.cells_at(OBJECTS.xy)
     expected = {int(cell): 0 for cell in DATABASE.cell_ids}
     for cell in (columns * 10**8 + rows).tolist():
-        expected[cell] += 1  # each object's own cell sees it, so it is in the database
+        expected[cell] += 1  # the cell of each object sees it, so it is in the database
     assert numbers.astype(int).to_dict() == expected
 
 
-def test_every_layer_has_a_style_of_its_own(file: Path, tmp_path: Path) -> None:
+def test_every_layer_has_a_style(file: Path, tmp_path: Path) -> None:
     answer = tmp_path / "answer.gpkg"
     export_answer(small_location(), small_city()[0], answer)
     styles = [
@@ -275,12 +275,11 @@ def test_every_layer_has_a_style_of_its_own(file: Path, tmp_path: Path) -> None:
         assert {item.attrib["attr"] for item in root.findall("renderer-v2")} <= fields
         assert (root.find("renderer-v2") is None) == (layer == "evaluation_figures")
         used = {item.attrib["symbol"] for item in root.iter() if "symbol" in item.attrib}
-        drawn = {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}
-        assert used == drawn
+        assert used == {item.attrib["name"] for item in root.findall("renderer-v2/symbols/symbol")}
         assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", updated)
 
 
-def test_queries_and_lines(file: Path, tmp_path: Path) -> None:
+def test_layers_of_an_evaluation(file: Path, tmp_path: Path) -> None:
     results = EVALUATION
     points, lines = (gpd.read_file(file, layer=name) for name in LAYERS[2:4])
     assert points.geometry.geom_equals(results.queries.geometry.reset_index(drop=True)).all()
@@ -301,17 +300,17 @@ def test_queries_and_lines(file: Path, tmp_path: Path) -> None:
     assert set(gpd.read_file(file, layer="evaluation")["outcome"]) == {"failed"}
 
 
-def test_a_debian_gdal_reads_it(file: Path) -> None:
+def test_ogrinfo_of_the_system_reads_the_layers(file: Path) -> None:
     ogrinfo = shutil.which("ogrinfo", path=os.defpath)
     if ogrinfo is None:
         pytest.skip("ogrinfo is not on this machine")
-    said = run(ogrinfo, "-ro", "-al", "-so", file, environment={"LANG": "C.UTF-8"})
-    assert re.findall("^Layer name: (.*)$", said, re.MULTILINE) == LAYERS
-    counts = re.findall("^Feature Count: (.*)$", said, re.MULTILINE)
+    output = run(ogrinfo, "-ro", "-al", "-so", file, environment={"LANG": "C.UTF-8"})
+    assert re.findall("^Layer name: (.*)$", output, re.MULTILINE) == LAYERS
+    counts = re.findall("^Feature Count: (.*)$", output, re.MULTILINE)
     assert counts[:3] == [str(len(DATABASE)), str(len(OBJECTS)), "60"]
 
 
-# What another program does with the file, until a line comes from standard input.
+# Uses of the file by another program, until it reads a line from standard input.
 HOLDERS = {
     "reads": "BEGIN; SELECT count(*) FROM cells",
     "writes": "BEGIN IMMEDIATE; UPDATE cells SET length = 0",
@@ -328,12 +327,12 @@ sys.stdin.readline()
 """
 
 
-@pytest.mark.parametrize("does", HOLDERS)
-def test_a_file_that_is_open_elsewhere_is_left_alone(does: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("use", HOLDERS)
+def test_file_that_is_open_in_another_program_is_unchanged(use: str, tmp_path: Path) -> None:
     file, link = tmp_path / "city.gpkg", tmp_path / "link.gpkg"
     export_database(DATABASE, file)
     link.symlink_to(file)
-    command = [sys.executable, "-c", HOLDER, str(file), HOLDERS[does]]
+    command = [sys.executable, "-c", HOLDER, str(file), HOLDERS[use]]
     with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, text=True) as other:
         assert other.stdin is not None
         assert other.stdout is not None
@@ -348,14 +347,14 @@ def test_a_file_that_is_open_elsewhere_is_left_alone(does: str, tmp_path: Path) 
     assert pyogrio.read_info(file, layer="cells")["geometry_type"] == "Point"
 
 
-def test_a_file_that_is_opened_meanwhile_is_left_alone(tmp_path: Path) -> None:
+def test_file_that_is_opened_during_the_export_is_unchanged(tmp_path: Path) -> None:
     file = tmp_path / "city.gpkg"
     export_database(DATABASE, file)
     before = file.read_bytes()
     with closing(sqlite3.connect(file)) as other:
 
-        def lock(done: int, total: int) -> None:
-            if done == total:
+        def lock(written: int, total: int) -> None:
+            if written == total:
                 other.execute("BEGIN IMMEDIATE")
 
         with refused(InputError, "open in another program"):
@@ -381,7 +380,7 @@ def test_objects_have_the_signs_of_their_classes() -> None:
             assert options["color"] == ",".join(map(str, (*bytes.fromhex(colour[1:]), 255)))
 
 
-KNOWN = """
+UNKNOWN_SHAPES = """
 import sys
 from qgis.core import QgsSimpleMarkerSymbolLayerBase as Markers
 print([name for name in sys.argv[1:] if not Markers.decodeShape(name)[1]])
@@ -390,7 +389,7 @@ print([name for name in sys.argv[1:] if not Markers.decodeShape(name)[1]])
 
 def test_qgis_knows_every_shape(qgis_python: str, qgis_environment: dict[str, str]) -> None:
     names = [name for name, *_ in CLASS_MARKERS.values()]
-    assert run(qgis_python, "-c", KNOWN, *names, environment=qgis_environment) == "[]\n"
+    assert run(qgis_python, "-c", UNKNOWN_SHAPES, *names, environment=qgis_environment) == "[]\n"
 
 
 def colours_of(picture: Path) -> set[tuple[int, int, int]]:
@@ -399,51 +398,49 @@ def colours_of(picture: Path) -> set[tuple[int, int, int]]:
         warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
         with rasterio.open(picture) as read:
             pixels = read.read()[:3].reshape(3, -1).T
-    found, counts = np.unique(pixels, axis=0, return_counts=True)
-    return {
-        tuple(colour) for colour, count in zip(found.tolist(), counts, strict=True) if count > 9
-    }
+    colours, counts = np.unique(pixels, axis=0, return_counts=True)
+    return {*map(tuple, colours[counts > 9].tolist())}
 
 
-def test_qgis_colours_the_layers_at_once(
+def test_qgis_draws_the_layers_with_their_styles(
     qgis_python: str, qgis_environment: dict[str, str], tmp_path: Path
 ) -> None:
     extent = ",".join(map(repr, OBJECTS.table.total_bounds.tolist()))
 
     def draw(picture: str, *layers: str) -> list[dict[str, Any]]:
-        """Draw layers, the uppermost first; return what QGIS says of each."""
-        program = (qgis_python, PROGRAM, tmp_path / picture, "400x400", extent)
-        said = run(*program, *layers, environment=qgis_environment)
-        return [json.loads(line) for line in said.splitlines()]
+        """Draw layers, the uppermost first; return the facts that QGIS reports of each."""
+        program = (qgis_python, PROGRAM, "draw", tmp_path / picture, "400x400", extent)
+        output = run(*program, *layers, environment=qgis_environment)
+        return [json.loads(line) for line in output.splitlines()]
 
     nasty = HOSTILE + "[% env('HOME') %]" + "é" * 10_000
-    taxonomy = Taxonomy(tuple(dataclasses.replace(one, title=nasty) for one in CLASSES))
+    taxonomy = Taxonomy(tuple(dataclasses.replace(item, title=nasty) for item in CLASSES))
     harmful = dataclasses.replace(DATABASE, taxonomy=taxonomy, licenses=(nasty,))
-    seen = dataclasses.replace(OBJECTS, taxonomy=taxonomy, licenses=(Licence(nasty),))
+    objects = dataclasses.replace(OBJECTS, taxonomy=taxonomy, licenses=(Licence(nasty),))
     file, answer = tmp_path / "city.gpkg", tmp_path / "answer.gpkg"
-    export_database(harmful, file, objects=seen, identifiability=CHANCES, evaluation=EVALUATION)
+    export_database(harmful, file, objects=objects, identifiability=CHANCES, evaluation=EVALUATION)
     export_answer(small_localization(), small_city()[0], answer)
     sources = [
         *(f"{file}|layername={name}" for name in ("objects", "evaluation", "evaluation_lines")),
         *(f"{answer}|layername={name}" for name in ("candidates", "regions")),
         f"{file}|layername=cells",
     ]
-    drawn = draw("a.png", *sources)
-    assert all(layer["valid"] for layer in drawn)
+    layers = draw("a.png", *sources)
+    assert all(layer["valid"] for layer in layers)
     renderers = [*["categorizedSymbol"] * 3, *["graduatedSymbol"] * 3]
-    assert [layer["renderer"] for layer in drawn] == renderers
-    labels = drawn[0]["labels"]
-    assert len(labels) == len(seen.class_counts)
+    assert [layer["renderer"] for layer in layers] == renderers
+    labels = layers[0]["labels"]
+    assert len(labels) == len(objects.class_counts)
     assert all("<script>" in label for label in labels)  # QGIS shows a legend as plain text
     assert all(label.isprintable() and "[%" not in label for label in labels)
     assert max(map(len, labels)) <= 60
-    assert [layer["labels"] for layer in drawn[1:3]] == [list(OUTCOMES)] * 2
-    assert drawn[-1]["labels"][-1] == "found: 90 to 100 %"
-    assert drawn[-1]["features"] == len(DATABASE)
+    assert [layer["labels"] for layer in layers[1:3]] == [list(OUTCOMES)] * 2
+    assert layers[-1]["labels"][-1] == "found: 90 to 100 %"
+    assert layers[-1]["features"] == len(DATABASE)
     signs = class_signs(taxonomy)
-    colours = {tuple(bytes.fromhex(signs[code].colour[1:])) for code in seen.class_counts}
+    colours = {tuple(bytes.fromhex(signs[code].colour[1:])) for code in objects.class_counts}
     assert colours <= colours_of(tmp_path / "a.png")
-    # Cells by tenths of their chance, and the file is whole and free when QGIS has left it.
+    # Cells have the colours of their chance; QGIS leaves no lock on the file.
     draw("b.png", f"{file}|layername=cells")
     assert len(colours_of(tmp_path / "b.png")) >= 10
     export_database(DATABASE, file)
@@ -479,7 +476,7 @@ FACTS = st.fixed_dictionaries(
 
 @settings(max_examples=25)
 @given(WORLDS, FACTS, st.sampled_from(["polygon", "point"]))
-def test_a_database_comes_back_as_it_was(
+def test_database_is_read_back_unchanged(
     world: World, facts: dict[str, Any], geometry: CellGeometry
 ) -> None:
     try:
@@ -494,53 +491,52 @@ def test_a_database_comes_back_as_it_was(
     assert (contents.objects, contents.identifiability, contents.notes) == (None, None, ())
 
 
-def test_all_else_comes_back_too_whatever_the_texts_say(tmp_path: Path) -> None:
-    database, (_, seen) = hostile_database(small_city()[0]), small_city()
+def test_objects_and_identifiability_with_hostile_texts_are_read_back(tmp_path: Path) -> None:
+    database, (_, objects) = hostile_database(small_city()[0]), small_city()
     texts = [HOSTILE, "", "\u202eright\u0001'\"); DROP TABLE cells; --" + "é" * 10_000]
-    table = seen.table.assign(merged=[texts[row % 3] for row in range(len(seen))])
-    seen = StreetObjects(table, database.taxonomy, (*seen.licenses, Licence(HOSTILE)))
-    told, file = chances_of(database), tmp_path / "city.gpkg"
-    export_database(database, file, objects=seen, identifiability=told)
-    found = read_geopackage(file)
-    assert_same(database, found.database)
-    assert found.notes == ()
-    assert found.identifiability is not None
-    for field in dataclasses.fields(Identifiability):
-        ours, theirs = (getattr(one, field.name) for one in (told, found.identifiability))
-        assert field.name == "database" or np.array_equal(ours, theirs)
-    assert found.objects is not None
-    columns = list(found.objects.table.columns)
-    assert found.objects.table.equals(table[columns])
-    assert set(columns) == set(table.columns)
-    assert (found.objects.crs, found.objects.taxonomy) == (seen.crs, seen.taxonomy)
-    assert found.objects.licenses == seen.licenses
+    table = objects.table.assign(merged=[texts[row % 3] for row in range(len(objects))])
+    objects = StreetObjects(table, database.taxonomy, (*objects.licenses, Licence(HOSTILE)))
+    chances, file = chances_of(database), tmp_path / "city.gpkg"
+    export_database(database, file, objects=objects, identifiability=chances)
+    contents = read_geopackage(file)
+    assert_same(database, contents.database)
+    assert contents.notes == ()
+    assert contents.identifiability is not None
+    for name in {field.name for field in dataclasses.fields(Identifiability)} - {"database"}:
+        assert np.array_equal(getattr(chances, name), getattr(contents.identifiability, name))
+    result = contents.objects
+    assert result is not None
+    assert result.table.equals(table[[*result.table.columns]])
+    assert set(result.table.columns) == set(table.columns)
+    assert (result.crs, result.taxonomy) == (objects.crs, objects.taxonomy)
+    assert result.licenses == objects.licenses
 
 
-def changed(file: Path, sql: str) -> None:
+def execute(file: Path, sql: str) -> None:
     with closing(sqlite3.connect(file)) as connection, connection:
         for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'"):
             connection.execute(f'DROP TRIGGER "{name}"')  # they need functions of GDAL
         connection.execute(sql)
 
 
-def test_what_was_deleted_is_gone_and_what_was_drawn_is_read(tmp_path: Path) -> None:
+def test_cells_deleted_and_objects_added_in_qgis_are_read(tmp_path: Path) -> None:
     (database, objects), file = small_city(), tmp_path / "city.gpkg"
     export_database(database, file, objects=objects, identifiability=chances_of(database))
-    changed(file, "DELETE FROM cells WHERE length < 3")
-    # As QGIS adds a point of which the class alone was told.
-    changed(file, "INSERT INTO objects (geom, class_code) SELECT geom, 3 FROM objects LIMIT 1")
-    found = read_geopackage(file)
-    assert_same(database.select(database.lengths >= 3), found.database)
-    assert found.identifiability is None
-    assert "other signatures" in found.notes[0]
-    assert found.objects is not None
-    added = found.objects.table.iloc[-1]
-    assert (added["source"], added["source_id"], added["count"]) == ("", "", 1)
-    save_objects(found.objects, tmp_path / "objects.parquet")
+    execute(file, "DELETE FROM cells WHERE length < 3")
+    # As QGIS adds a point with only its class.
+    execute(file, "INSERT INTO objects (geom, class_code) SELECT geom, 3 FROM objects LIMIT 1")
+    contents = read_geopackage(file)
+    assert_same(database.select(database.lengths >= 3), contents.database)
+    assert contents.identifiability is None
+    assert "other signatures" in contents.notes[0]
+    assert contents.objects is not None
+    row = contents.objects.table.iloc[-1]
+    assert (row["source"], row["source_id"], row["count"]) == ("", "", 1)
+    save_objects(contents.objects, tmp_path / "objects.parquet")
     assert len(open_objects(tmp_path / "objects.parquet")) == len(objects) + 1
 
 
-def emptied(file: Path, start: int) -> None:
+def zero_pages(file: Path, start: int) -> None:
     """Write zeros over every third page."""
     content = bytearray(file.read_bytes())
     for page in range(4096 * (12 + start), len(content), 3 * 4096):
@@ -567,18 +563,18 @@ def emptied(file: Path, start: int) -> None:
         "UPDATE objects SET class_code = NULL WHERE fid = 2",
     ],
 )
-def test_a_damaged_file_is_refused(damage: int | str, tmp_path: Path) -> None:
+def test_damaged_file_is_refused(damage: int | str, tmp_path: Path) -> None:
     (database, objects), file = small_city(), tmp_path / "city.gpkg"
     export_database(database, file, objects=objects)
     if isinstance(damage, int):
-        emptied(file, damage)
+        zero_pages(file, damage)
     else:
-        changed(file, damage)
+        execute(file, damage)
     with refused(DatabaseError, "city.gpkg", "damaged"):
         read_geopackage(file)
 
 
-def test_what_is_no_exported_database_is_refused(tmp_path: Path) -> None:
+def test_file_without_a_database_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.gpkg").write_bytes(b"SQLite format 3\0 but not really")
     export_database(DATABASE, tmp_path / "b.gpkg", layers=["objects"], objects=OBJECTS)
     for name, words in (

@@ -1,4 +1,4 @@
-"""GeoTIFFs: every pixel is its cell's number, and the file is cloud-optimised."""
+"""GeoTIFFs: every pixel has the number of its cell, and the file is cloud-optimised."""
 
 from __future__ import annotations
 
@@ -36,19 +36,21 @@ if TYPE_CHECKING:
 
 
 def assert_holds(file: Path, database: SignatureDatabase, values: np.ndarray) -> None:
-    """Look every cell up by its coordinates, and ask what ``rio cogeo validate --strict`` asks."""
+    """Check the value at every cell, and the file as ``rio cogeo validate --strict`` does."""
     assert cog_validate(file, strict=True) == (True, [], [])
     with rasterio.open(file) as read:
         assert read.crs == rasterio.CRS.from_wkt(database.crs.to_wkt())
         assert (read.count, read.dtypes[0]) == (1, "float32")
         assert np.isnan(read.nodata)
-        found = np.array([value[0] for value in read.sample(database.xy)])
-        assert np.array_equal(found, values.astype(np.float32), equal_nan=True)
+        pixels = np.array([value[0] for value in read.sample(database.xy)])
+        assert np.array_equal(pixels, values.astype(np.float32), equal_nan=True)
         assert np.isfinite(read.read(1)).sum() == np.isfinite(values).sum()
 
 
 @pytest.mark.parametrize("grid", [GridSpec(), GridSpec(7.5, (3.0, -1e6))])
-def test_pixels_are_cells(grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_pixels_have_the_values_of_cells(
+    grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(raster, "TILE", 16)
     database = dataclasses.replace(small_city()[0], grid=grid)
     values = np.where(database.lengths > 3, database.lengths, np.nan)
@@ -63,16 +65,17 @@ def test_pixels_are_cells(grid: GridSpec, monkeypatch: pytest.MonkeyPatch, tmp_p
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_layers_of_a_city(tmp_path: Path) -> None:
+def test_rasters_of_a_city_and_an_answer(tmp_path: Path) -> None:
     database, _ = small_city()
-    told, evaluation, location = chances_of(database), small_evaluation(), small_location()
-    export_database(database, tmp_path / "a.tif", identifiability=told)
-    export_database(database, tmp_path / "i.tiff", layers=["identifiability"], identifiability=told)
+    chances, evaluation, location = chances_of(database), small_evaluation(), small_location()
+    export_database(database, tmp_path / "a.tif", identifiability=chances)
+    file = tmp_path / "i.tiff"
+    export_database(database, file, layers=["identifiability"], identifiability=chances)
     export_database(database, tmp_path / "e.tif", layers=["error"], evaluation=evaluation)
     export_answer(location, database, tmp_path / "p.tif")
     for name, values in {
         "a.tif": database.type_group_sizes,
-        "i.tiff": told.found,
+        "i.tiff": chances.found,
         "e.tif": cell_errors(evaluation, database),
         "p.tif": location.posterior.chances,
     }.items():
@@ -83,7 +86,7 @@ def test_layers_of_a_city(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("radius", [None, 40.0])
-def test_the_field_of_a_map(radius: float | None, tmp_path: Path) -> None:
+def test_raster_of_the_error_field(radius: float | None, tmp_path: Path) -> None:
     database, evaluation, file = small_city()[0], small_evaluation(), tmp_path / "field.tif"
     export_database(database, file, layers="field", evaluation=evaluation, smooth=radius)
     field = error_field(evaluation, database, radius=radius)
@@ -93,12 +96,12 @@ def test_the_field_of_a_map(radius: float | None, tmp_path: Path) -> None:
         assert read.units == (None, "m", "queries")
         assert json.loads(read.tags()["radius_m"]) == field.radius
         places = [(query.x, query.y) for query in evaluation.queries.geometry]
-        told = np.array(list(read.sample(places)))
+        samples = np.array(list(read.sample(places)))
         assert read.res == (field.grid.step, field.grid.step)
         whole = read.read(1)
     columns, rows = field.grid.cells_at(np.array(places))
     for band, values in enumerate((field.failed, field.errors, field.speaking)):
-        assert np.array_equal(told[:, band], values[rows, columns].astype(np.float32))
+        assert np.array_equal(samples[:, band], values[rows, columns].astype(np.float32))
     assert np.isfinite(whole).sum() == np.isfinite(field.failed).sum()
 
 
@@ -113,46 +116,40 @@ def test_qgis_draws_rasters_as_the_maps_do(
     field = tmp_path / "field.tif"
     export_database(database, field, layers="field", evaluation=evaluation, smooth=60.0)
     export_answer(small_location(), database, tmp_path / "posterior.tif")
-    program = Path(__file__).parents[1] / "qgis_pixels.py"
-    said = subprocess.run(
-        [qgis_python, program, *(tmp_path / f"{name}.tif" for name in STYLES)],
+    program = Path(__file__).parents[1] / "qgis_programs.py"
+    result = subprocess.run(
+        [qgis_python, program, "pixels", *(tmp_path / f"{name}.tif" for name in STYLES)],
         check=True, capture_output=True, timeout=PATIENCE_S, env=qgis_environment,
     )  # fmt: skip
-    for (name, classes), told in zip(STYLES.items(), json.loads(said.stdout), strict=True):
-        assert told["labels"] == [label for label, _ in classes.values()]
+    drawings = map(json.loads, result.stdout.splitlines())
+    for (name, classes), drawing in zip(STYLES.items(), drawings, strict=True):
+        assert drawing["labels"] == [label for label, _ in classes.values()]
         with rasterio.open(tmp_path / f"{name}.tif") as read:
             values = read.read(1).astype(np.float64)
         colours = [None if colour == CLEAR else colour for _, colour in classes.values()]
         lows = np.array([low for low, _ in classes])
         levels = np.searchsorted(lows, values, side="right") - 1
+        # A value at the border of two classes has the colour of either.
         sure = np.isfinite(values) & ~np.isin(values, lows[1:].astype(np.float32))
-        sure |= np.isfinite(values) & (name == "ambiguity")  # whose classes have no common border
-        drawn = np.array(told["pixels"])
-        assert (drawn[sure] == np.array(colours, dtype=object)[levels[sure]]).all()
-        assert (drawn[np.isnan(values)] == None).all()  # noqa: E711 - element by element
+        sure |= np.isfinite(values) & (name == "ambiguity")  # its classes have no common border
+        pixels = np.array(drawing["pixels"])
+        assert (pixels[sure] == np.array(colours, dtype=object)[levels[sure]]).all()
+        assert (pixels[np.isnan(values)] == None).all()  # noqa: E711 - element by element
         assert len({*levels[sure].tolist()}) > 2
 
 
-def test_the_style_is_that_of_the_numbers_beside_it(tmp_path: Path) -> None:
+def test_style_file_is_replaced_with_the_raster(tmp_path: Path) -> None:
     database, file = small_city()[0], tmp_path / "a.tif"
     export_database(database, file, layers="field", evaluation=small_evaluation())
     failed = file.with_suffix(".qml").read_text()
     export_database(database, file)
     assert file.with_suffix(".qml").read_text() == by_pixel(AMBIGUITY) != failed
-    # What is told of errors is told in the colours of what failed, the worse the darker.
+    # Mean errors have the colours of shares that failed, the larger the darker.
     assert [colour for _, colour in ERRORS.values()] == [*FAILURES.values()]
     assert [high for _, high in ERRORS] == [*ERROR_BREAKS, np.inf]
 
 
-def test_what_is_not_of_the_field_is_refused(tmp_path: Path) -> None:
-    database, _ = small_city()
-    with refused(InputError, "no evaluation"):
-        export_database(database, tmp_path / "a.tif", layers="field")
-    with refused(InputError, "not the smoothing"):
-        export_database(database, tmp_path / "a.tif", smooth=250.0)
-
-
-def test_a_large_one_is_cloud_optimised_too(tmp_path: Path) -> None:
+def test_large_raster_is_cloud_optimised(tmp_path: Path) -> None:
     database, _ = small_city()
     columns = database.columns + np.where(np.arange(len(database)) < len(database) // 2, 0, 1500)
     wide = dataclasses.replace(database, columns=columns.astype(np.int32))
@@ -160,7 +157,7 @@ def test_a_large_one_is_cloud_optimised_too(tmp_path: Path) -> None:
     assert_holds(tmp_path / "a.tif", wide, wide.lengths)
 
 
-def test_errors_of_a_cell_are_means() -> None:
+def test_error_of_a_cell_is_the_mean_of_its_queries() -> None:
     database, evaluation = small_city()[0], small_evaluation()
     expected = np.full(len(database), np.nan)
     for row, cell in enumerate(database.cell_ids.tolist()):
@@ -176,7 +173,7 @@ def test_errors_of_a_cell_are_means() -> None:
     assert np.isnan(none).all()
 
 
-def test_what_cannot_be_a_raster_is_refused(tmp_path: Path) -> None:
+def test_wrong_number_of_values_and_too_wide_raster_are_refused(tmp_path: Path) -> None:
     database, _ = small_city()
     with refused(InputError, "2 numbers", f"{len(database)} cells"):
         export_geotiff(database, [1.0, 2.0], tmp_path / "a.tif", name="a")

@@ -1,4 +1,4 @@
-"""Cells together, in hexagons of H3: their numbers add up to those of the city."""
+"""Hexagons of H3: their statistics agree with the cells of the city."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EVALUATION, CHANCES = small_evaluation(), chances_of(CITY)
 
 
 @pytest.mark.parametrize("resolution", [8, 11])
-def test_hexagons_hold_what_is_in_them(resolution: int, tmp_path: Path) -> None:
+def test_statistics_of_hexagons(resolution: int, tmp_path: Path) -> None:
     file = tmp_path / "a.fgb"
     export_database(
         CITY, file, h3=resolution, identifiability=CHANCES, objects=OBJECTS, evaluation=EVALUATION
@@ -33,24 +33,20 @@ def test_hexagons_hold_what_is_in_them(resolution: int, tmp_path: Path) -> None:
         len(CITY), len(OBJECTS), len(EVALUATION.queries),
     ]  # fmt: skip
     viewpoints = gpd.GeoSeries.from_xy(*CITY.xy.T, crs=CITY.crs).to_crs("EPSG:4326")
-    homes = [h3.latlng_to_cell(one.y, one.x, resolution) for one in viewpoints]
-    for index in (homes[0], homes[len(CITY) // 2]):
-        inside, told = np.array(homes) == index, table.loc[index]
+    ids = [h3.latlng_to_cell(point.y, point.x, resolution) for point in viewpoints]
+    for index in (ids[0], ids[len(CITY) // 2]):
+        inside, row = np.array(ids) == index, table.loc[index]
         sizes = np.sort(CITY.type_group_sizes[inside])
-        assert told["cells"] == len(sizes)
-        assert told["type_group_size"] == sizes[(len(sizes) - 1) // 2]
-        assert told["ambiguous"] == pytest.approx((sizes > 1).mean())
-        assert told["mean_length"] == pytest.approx(CITY.lengths[inside].mean())
-        assert told["chance_found"] == pytest.approx(CHANCES.found[inside].mean())
-        ring = gpd.GeoSeries([told.geometry], crs=CITY.crs).to_crs("EPSG:4326")[0].exterior.coords
+        assert row["cells"] == len(sizes)
+        assert row["type_group_size"] == sizes[(len(sizes) - 1) // 2]
+        assert row["ambiguous"] == pytest.approx((sizes > 1).mean())
+        assert row["mean_length"] == pytest.approx(CITY.lengths[inside].mean())
+        assert row["chance_found"] == pytest.approx(CHANCES.found[inside].mean())
+        ring = gpd.GeoSeries([row.geometry], crs=CITY.crs).to_crs("EPSG:4326")[0].exterior.coords
         corners = [(lat, lon) for lon, lat in ring[:-1]]
         assert np.allclose(sorted(corners), sorted(h3.cell_to_boundary(index)), atol=1e-9)
-    found = np.average(table["found"].fillna(0), weights=table["queries"])
-    assert found == pytest.approx(EVALUATION.successful.mean())
-
-
-def test_the_file_says_what_the_hexagons_are(tmp_path: Path) -> None:
-    export_database(CITY, tmp_path / "a.fgb", h3=9)
-    told = pyogrio.read_info(tmp_path / "a.fgb")["layer_metadata"]
-    assert json.loads(told["h3_resolution"]) == 9
-    assert json.loads(told["licenses"]) == list(CITY.licenses)
+    share = np.average(table["found"].fillna(0), weights=table["queries"])
+    assert share == pytest.approx(EVALUATION.successful.mean())
+    metadata = pyogrio.read_info(file)["layer_metadata"]
+    assert json.loads(metadata["h3_resolution"]) == resolution
+    assert json.loads(metadata["licenses"]) == list(CITY.licenses)

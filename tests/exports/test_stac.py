@@ -1,4 +1,4 @@
-"""STAC items: pystac finds nothing wrong with them, and they say where, whose and which file."""
+"""STAC items are valid, and have the extent, the licences and the files of the database."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 CITY, OBJECTS = small_city()
 NUMBERS = {"type": "array", "items": {"type": "number"}}
-# What the two extensions ask of their fields, since their own schemas are on a server.
+# The fields of the two extensions, because their schemas are on a server.
 FIELDS: dict[str, dict[str, Any]] = {
     "projection/v2.0.0": {
         "proj:code": {"type": ["string", "null"], "pattern": "^[A-Z]+:[0-9]+$"},
@@ -47,8 +47,8 @@ FIELDS: dict[str, dict[str, Any]] = {
 
 @pytest.fixture(autouse=True)
 def _schemas() -> Iterator[None]:
-    """Have pystac validate without a network."""
-    # Here, because jsonschema takes more than a second.
+    """Make pystac validate without a network."""
+    # Imported here, because jsonschema takes more than a second.
     from pystac.validation import RegisteredValidator
     from pystac.validation.stac_validator import JsonSchemaSTACValidator
 
@@ -72,7 +72,7 @@ def _schemas() -> Iterator[None]:
     RegisteredValidator.set_validator(before)
 
 
-def test_an_item_is_valid_and_says_what_the_database_is(tmp_path: Path) -> None:
+def test_item_is_valid_and_describes_the_database(tmp_path: Path) -> None:
     save_database(CITY, tmp_path / "data" / "city.parquet")
     save_objects(OBJECTS, tmp_path / "objects.parquet")
     file = tmp_path / "items" / "city.json"
@@ -100,10 +100,10 @@ def test_an_item_is_valid_and_says_what_the_database_is(tmp_path: Path) -> None:
     hrefs = {"database": "../data/city.parquet", "objects": "../objects.parquet"}
     assert {name: asset.href for name, asset in item.assets.items()} == hrefs
     for name, path in {"database": city, "objects": objects}.items():
-        told = FileExtension.ext(item.assets[name])
+        asset = FileExtension.ext(item.assets[name])
         assert item.assets[name].media_type == pystac.MediaType.VND_APACHE_PARQUET
-        assert told.size == path.stat().st_size
-        assert told.checksum == "1220" + hashlib.sha256(path.read_bytes()).hexdigest()
+        assert asset.size == path.stat().st_size
+        assert asset.checksum == "1220" + hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_an_item_is_valid_and_says_what_the_database_is(tmp_path: Path) -> None:
         (("A (CC0-1.0)", "no brackets"), "other", ["A", "no brackets"]),
     ],
 )
-def test_the_licence_of_all(
+def test_licence_and_providers_of_an_item(
     licenses: tuple[str, ...], licence: str, owners: list[str], tmp_path: Path
 ) -> None:
     save_database(dataclasses.replace(CITY, licenses=licenses), tmp_path / "a.parquet")
@@ -125,23 +125,24 @@ def test_the_licence_of_all(
     item = pystac.Item.from_dict(json.loads((tmp_path / "a.json").read_text()))
     item.validate()
     assert item.properties["license"] == licence
-    told = [provider["name"] for provider in item.properties["providers"]]
-    assert told == owners
+    assert [provider["name"] for provider in item.properties["providers"]] == owners
 
 
-def test_a_crs_of_its_own_is_told_whole(tmp_path: Path) -> None:
+def test_crs_without_a_code_is_stored_as_projjson(tmp_path: Path) -> None:
     local = CRS("+proj=tmerc +lat_0=48 +lon_0=3.1 +x_0=500000 +y_0=5400000 +ellps=GRS80 +units=m")
     save_database(dataclasses.replace(CITY, crs=local), tmp_path / "a.parquet")
     export_item(tmp_path / "a.parquet", tmp_path / "a.json")
     item = pystac.Item.from_file(str(tmp_path / "a.json"))
     item.validate()
-    told = ProjectionExtension.ext(item)
-    assert told.code is None
-    assert told.projjson is not None
-    assert CRS.from_json_dict(told.projjson) == local
+    projection = ProjectionExtension.ext(item)
+    assert projection.code is None
+    assert projection.projjson is not None
+    assert CRS.from_json_dict(projection.projjson) == local
 
 
-def test_what_cannot_be_an_item_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_suffix_missing_file_and_missing_pystac_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     save_database(CITY, tmp_path / "a.parquet")
     with refused(InputError, "a.yaml does not end in .json"):
         export_item(tmp_path / "a.parquet", tmp_path / "a.yaml")

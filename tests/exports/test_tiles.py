@@ -1,4 +1,4 @@
-"""PMTiles: every cell is in its tiles, squares add up to the city, and MapLibre draws both."""
+"""PMTiles: tiles contain every cell, squares add up to the city, and MapLibre draws both."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def bytes_of(file: Path) -> Callable[[int, int], bytes]:
 
 
 def tiles_of(file: Path, zoom: int, layer: str) -> gpd.GeoDataFrame:
-    """Return the features of a zoom as GDAL reads them, cut by the borders of tiles."""
+    """Return the features of a zoom as GDAL reads them, cut at the edges of tiles."""
     return gpd.read_file(file, layer=layer, ZOOM_LEVEL=zoom).to_crs(CITY.crs)
 
 
-def test_every_cell_is_in_the_tiles(file: Path) -> None:
+def test_tiles_contain_every_cell(file: Path) -> None:
     cells = tiles_of(file, DETAIL, "cells").dissolve("cell_id")
     assert cells.index.tolist() == sorted(CITY.cell_ids.tolist())
     cells = cells.loc[CITY.cell_ids]
@@ -57,7 +57,7 @@ def test_every_cell_is_in_the_tiles(file: Path) -> None:
     assert cells.geometry.centroid.distance(middles).max() < 0.5
 
 
-def test_squares_from_afar_add_up_to_the_city(file: Path) -> None:
+def test_squares_at_low_zooms_add_up_to_the_city(file: Path) -> None:
     reader = pmtiles.reader.Reader(bytes_of(file))
     header, metadata = reader.header(), reader.metadata()
     squares, cells = metadata["vector_layers"]
@@ -65,22 +65,21 @@ def test_squares_from_afar_add_up_to_the_city(file: Path) -> None:
     cells_at = np.stack([CITY.columns, CITY.rows], axis=1)
     assert (squares["minzoom"], squares["maxzoom"]) == (header["min_zoom"], DETAIL - 1)
     for zoom in range(header["min_zoom"], DETAIL):
-        wide = 2 ** (DETAIL - zoom)
-        homes = {(column // wide, row // wide) for column, row in cells_at.tolist()}
-        found = tiles_of(file, zoom, "squares")
-        middles = found.geometry.representative_point()
-        at = np.floor_divide(np.stack([middles.x, middles.y], axis=1), 10.0 * wide).astype(int)
-        assert {*map(tuple, at.tolist())} == homes
-        counts = {
-            tuple(place): cells for place, cells in zip(at.tolist(), found["cells"], strict=True)
-        }
+        side = 2 ** (DETAIL - zoom)
+        expected = {*map(tuple, (cells_at // side).tolist())}
+        table = tiles_of(file, zoom, "squares")
+        points = table.geometry.representative_point()
+        places = np.floor_divide(np.stack([points.x, points.y], axis=1), 10.0 * side).astype(int)
+        # A square that is cut at the edges of tiles occurs more than once.
+        counts = dict(zip(map(tuple, places.tolist()), table["cells"], strict=True))
+        assert {*counts} == expected
         assert sum(counts.values()) == len(CITY)
     assert metadata["semsig"]["taxonomy"] == CITY.taxonomy.to_list()
     assert metadata["semsig"]["crs"] == CITY.crs.to_json_dict()
     assert metadata["attribution"] == "&lt;script&gt;alert(1)&lt;/script&gt; (CC0)"
 
 
-def test_maplibre_draws_them(file: Path, browser: Chrome) -> None:
+def test_maplibre_draws_cells_and_squares(file: Path, browser: Chrome) -> None:
     names = ("maplibre-gl.js", "maplibre-gl.css", "pmtiles.js")
     if not all((ASSETS / name).is_file() for name in names):
         unavailable("browser", "the package was installed without npm, so MapLibre is not there")
@@ -99,22 +98,19 @@ def test_maplibre_draws_them(file: Path, browser: Chrome) -> None:
             browser.execute_async_script("look(...arguments)", lon, lat, zoom)
             for zoom in (DETAIL + 2, DETAIL - 1.5)
         )
-        asked = [
-            seen.headers.get("range") for seen in server.requests if seen.path == "/city.pmtiles"
-        ]
+        requests = [request for request in server.requests if request.path == "/city.pmtiles"]
         assert {*server.paths()} == {
             "/tiles_page.html", "/city.pmtiles", *(f"/{name}" for name in names)
         }  # fmt: skip
     assert (near["failures"], far["failures"]) == ([], [])
     assert near["layers"] == ["cells"]
     assert far["layers"] == ["squares"]
-    (told,) = near["at"]
-    assert told["cell_id"] == CITY.cell_ids[cell]
-    assert told["types"] == CITY.types(cell)
-    assert told["type_group_size"] == CITY.type_group_sizes[cell]
+    (feature,) = near["at"]
+    assert feature["cell_id"] == CITY.cell_ids[cell]
+    assert feature["types"] == CITY.types(cell)
+    assert feature["type_group_size"] == CITY.type_group_sizes[cell]
     assert far["at"][0]["cells"] >= 1
     assert "<script>alert(1)</script> (CC0)" in near["credit"]
-    # Parts of the file, never all of it.
-    assert all(asked)
+    assert all("range" in request.headers for request in requests)  # never the whole file
     log = [entry["message"] for entry in browser.get_log("browser")]
     assert [message for message in log if "GPU stall" not in message] == []

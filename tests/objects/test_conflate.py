@@ -50,28 +50,6 @@ def bench(source: str, name: str, x: float, y: float = 0.0) -> Thing:
     return ("bench", source, name, 1, x, y)
 
 
-def test_same_object_in_two_sources_is_merged() -> None:
-    things = [bench("city", "1", 0), bench("osm", "node/7", 3, 4), bench("osm", "node/8", 50)]
-    objects, report = conflate(world(things), {"bench": 5.0})
-    expected = objects_of(
-        (0.0, 0.0, 10, "city", "1"),
-        (50.0, 0.0, 10, "osm", "node/8"),
-        licenses=LICENCES,
-        count=[2, 1],
-        merged=["osm:node/7", ""],
-    )
-    assert_geodataframe_equal(objects.table, expected.table)
-    # The identifier and the count of the merged row come from its source, so its licence holds.
-    assert objects.licenses == LICENCES
-    assert report.count == 1
-
-
-@pytest.mark.parametrize("radii", [{}, {"automatic_wc": 5.0}, {"bench": 5.0}])
-def test_nothing_to_merge_returns_the_objects(radii: dict[str, float]) -> None:
-    objects, report = conflate(world([bench("a", "1", 0)]), radii)
-    assert (content(objects), report.count) == ([(10, "a", "1", 1, "", 0.0, 0.0)], 0)
-
-
 THINGS = st.lists(
     st.tuples(
         st.sampled_from(["bench", "bus_stop", "street_light"]),
@@ -136,6 +114,10 @@ def check(things: Sequence[Thing], radii: Mapping[str, float]) -> ConflationRepo
     objects, report = conflate(before, radii)
     assert_geodataframe_equal(before.table, table)
     rows, pairs = by_hand(things, radii)
+    # The identifier and the count of a merged row come from its source, so its licence holds.
+    assert objects.licenses == before.licenses
+    assert objects.table.drop(columns="merged").dtypes.equals(before.table.dtypes)
+    assert report.count == sum(pair.count for pair in report.pairs)
     # Rows with equal values are interchangeable.
     assert sorted(content(objects)) == sorted(rows)
     for pair, expected in zip(report.pairs, pairs, strict=True):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from pyproj import CRS, Geod, Proj, Transformer
-from raw_layers import raw_layer
+from raw_layers import catalog_of, raw_layer
 from sentences import refused
 
 from semsig_gis.core import (
@@ -19,7 +19,6 @@ from semsig_gis.core import (
 )
 from semsig_gis.database import build_database
 from semsig_gis.objects import assemble, settle_extent
-from semsig_gis.sources import Catalog, LayerSpec, paper_taxonomy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,9 +61,7 @@ def lambert(places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def loaded(*layers: RawLayer, **options: object) -> Loaded:
-    layer = LayerSpec(name="a", class_name="bench")
-    catalog = Catalog(name="t", title="T", taxonomy=paper_taxonomy(), layers=(layer,))
-    return assemble(layers, catalog, collapse=False, **options)  # type: ignore[arg-type]
+    return assemble(layers, catalog_of(), collapse=False, **options)  # type: ignore[arg-type]
 
 
 ZERO = [(0.0, 0.0)]

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import shapely
 from osm_xml import node, relation, way, write_osm
-from raw_layers import raw_layer
+from raw_layers import BENCHES, catalog_of, raw_layer
 from sentences import refused
-from servers import Answer, Server
+from servers import Answer
 
 from semsig_gis.core import MERGED, InputError, SourceError, UnknownNameError
 from semsig_gis.database import build_database, open_database, save_database
@@ -26,7 +26,6 @@ from semsig_gis.objects import (
 )
 from semsig_gis.reports import quality_tables
 from semsig_gis.sources import (
-    Catalog,
     ClassBy,
     LayerSpec,
     RowCounts,
@@ -41,23 +40,18 @@ from semsig_gis.sources import (
 from semsig_gis.sources.osm import file as osm_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from semsig_gis.sources import RawLayer
+    from servers import Server
 
-BENCH = LayerSpec(name="benches", class_name="bench")
+    from semsig_gis.sources import RawLayer
 
 
 def raw(name: str, *places: tuple[float, float], crs: str | None = "EPSG:2154") -> RawLayer:
     return raw_layer(
         [shapely.Point(place) for place in places], name=name, classes="bench", crs=crs
     )
-
-
-def catalog_of(**values: object) -> Catalog:
-    plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (BENCH,)}
-    return Catalog(**{**plain, **values})  # type: ignore[arg-type]
 
 
 def test_layers_are_selected_by_name_and_selection() -> None:
@@ -138,9 +132,9 @@ def test_layers_of_small_files_are_counted(tmp_path: Path, monkeypatch: pytest.M
         )
     ]
     specs[0] = replace(specs[0], where=(("n", (">=3",)),))
-    catalog = catalog_of(layers=(BENCH, *specs))
+    catalog = catalog_of(layers=(BENCHES, *specs))
     monkeypatch.setattr("semsig_gis.objects.skipped_layers.SMALL_BYTES", 1000)
-    (bins,) = read_small_layers(catalog, [BENCH], [tmp_path, tmp_path / "bins.csv"])
+    (bins,) = read_small_layers(catalog, [BENCHES], [tmp_path, tmp_path / "bins.csv"])
     assert (bins.spec.name, bins.counts.kept) == ("bins", 2)
     assert read_small_layers(catalog, specs, [tmp_path]) == ()
 
@@ -251,12 +245,6 @@ def test_visibility_ranges_of_the_catalogue_are_stored_in_the_database(tmp_path:
     assert len(database) == 5  # a cell and its neighbours, of the 29 within 30 m
 
 
-@pytest.fixture
-def server() -> Iterator[Server]:
-    with Server() as running:
-        yield running
-
-
 def test_openstreetmap_is_fetched_clipped_and_cached(server: Server, tmp_path: Path) -> None:
     elements = [
         {"type": "node", "id": i, "lon": x, "lat": 43.73, "tags": {"amenity": "bench"}}
@@ -292,5 +280,5 @@ def test_place_name_needs_a_geocoder_in_the_catalogue(server: Server, tmp_path: 
         find_area("Monaco", catalog_of(), cache=cache, http=http)
     area = find_area("1,2,3,4", catalog_of(), cache=cache, http=http)
     with refused(InputError, "'town'", "semsig load"):
-        fetch_layers([BENCH], catalog_of(), area=area, cache=cache, http=http)
+        fetch_layers([BENCHES], catalog_of(), area=area, cache=cache, http=http)
     assert server.requests == []

@@ -103,17 +103,12 @@ def test_crs_without_a_code_is_reported_by_name() -> None:
     assert quality_report(objects, load).crs == "Our town"
 
 
-@given(
-    st.lists(
-        st.tuples(st.integers(0, 9), st.integers(0, 9)).map(lambda at: (X + at[0], Y + at[1])),
-        min_size=1,
-        max_size=20,
-    ),
-    st.booleans(),
-)
+PLACES = st.tuples(st.integers(0, 9), st.integers(0, 9)).map(lambda at: (X + at[0], Y + at[1]))
+
+
+@given(places=st.lists(PLACES, min_size=1, max_size=20), collapse=st.booleans())
 def test_nearest_distance_equals_a_simple_loop(
-    places: list[tuple[float, float]],
-    collapse: bool,  # noqa: FBT001
+    *, places: list[tuple[float, float]], collapse: bool
 ) -> None:
     objects, load = built(layer(places), collapse=collapse)
     (benches,) = quality_report(objects, load).classes

@@ -1,4 +1,4 @@
-"""The check of pinned versions, with a service of known vulnerabilities of our own."""
+"""Test the check of pinned versions, with a local service of known vulnerabilities."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 AUDIT = Path(__file__).parents[2] / ".ci" / "audit"
 PROBE = ("jinja2", "2.11.2")
-NOT_ASKED = (
+NOT_CHECKED = (
     "No service of known vulnerabilities could be asked, so the pinned versions were not checked.\n"
 )
 
@@ -36,17 +36,17 @@ def audit(
     *,
     status: int = 200,
 ) -> subprocess.CompletedProcess[str]:
-    """Check two pins with a service that knows of vulnerabilities in some versions of packages."""
+    """Check two pins with a service that reports vulnerabilities in some versions of packages."""
     pins = folder / "constraints.txt"
     pins.write_text("jinja2==3.1.6\nnumpy==2.4.0\n")
 
     def answer(request: Request) -> Answer:
-        asked = json.loads(request.body)
-        name = asked["package"]["name"]
+        query = json.loads(request.body)
+        name = query["package"]["name"]
         package = {"name": name, "ecosystem": "PyPI"}
         ranges = [{"type": "ECOSYSTEM", "events": [{"introduced": "0"}, {"fixed": "999"}]}]
-        found = {"id": f"X-{name}", "affected": [{"package": package, "ranges": ranges}]}
-        body = {"vulns": [found]} if (name, asked["version"]) in vulnerable else {}
+        finding = {"id": f"X-{name}", "affected": [{"package": package, "ranges": ranges}]}
+        body = {"vulns": [finding]} if (name, query["version"]) in vulnerable else {}
         return Answer(json.dumps(body).encode(), status=status)
 
     with Server() as server:
@@ -63,18 +63,18 @@ def audit(
 
 
 @pytest.mark.parametrize("status", [200, 503], ids=["mirror", "down"])
-def test_a_service_that_knows_nothing_is_told(
+def test_a_service_without_data_or_answer_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int
 ) -> None:
-    told = audit(tmp_path, monkeypatch, vulnerable=(), status=status)
-    assert (told.returncode, told.stdout) == (0, NOT_ASKED)
+    result = audit(tmp_path, monkeypatch, vulnerable=(), status=status)
+    assert (result.returncode, result.stdout) == (0, NOT_CHECKED)
 
 
 def test_a_finding_in_a_pinned_version_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert audit(tmp_path, monkeypatch, [PROBE]).returncode == 0
-    told = audit(tmp_path, monkeypatch, [PROBE, ("numpy", "2.4.0")])
-    assert told.returncode == 1
-    assert "X-numpy" in told.stdout
-    assert "jinja2" not in told.stdout
+    result = audit(tmp_path, monkeypatch, [PROBE, ("numpy", "2.4.0")])
+    assert result.returncode == 1
+    assert "X-numpy" in result.stdout
+    assert "jinja2" not in result.stdout

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from noisy_cells import every_association, random_database
 from view_oracle import cell_loglik, random_view
 
 from benchmarks import bayes, chances, history, stranger, tables, views
+from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
 from benchmarks.views import NOISE
 from semsig_gis.maps import page
 from semsig_gis.observation import Photo, View
@@ -27,7 +29,7 @@ SINGLES = {
     for measure in MEASURES
     for part in ("types", "angles")
 }
-# Words of the name of what is measured, and whether it has a bar.
+# Parts of the names of benchmarks, and whether these have a bar.
 PARTS = {
     **SINGLES,
     "one edit+edit query": False,
@@ -57,7 +59,7 @@ PARTS = {
     "reading every layer of a pbf file": True,
     "peak memory of reading": True,
 }
-# The same where there are a browser and map files.
+# The same, if there are a browser and map files.
 OF_MAPS = {
     "map of which": True,
     "in Chromium": True,
@@ -74,7 +76,7 @@ SHARES = [
     *("p5", "p25", "p50", "p50_low", "p50_high", "recall10pct", "chance"),
     *("in_exact_region", "in_region", "region_mass", "coverage", "precision"),
 ]
-# Words of the method and of the setting of a figure, and how many rows have both.
+# Parts of the method and the setting of a row, and the number of rows with both.
 ROWS = {
     ("edit+edit:5%, order kept", "on the grid"): 3,
     ("edit+edit:5%, sorted after the noise", "on the grid"): 3,
@@ -93,8 +95,8 @@ ROWS = {
 
 
 def run(module: str, out: Path) -> tuple[list[dict[str, Any]], str]:
-    """Run the benchmarks of a module on small cities; return what it wrote and printed."""
-    done = subprocess.run(
+    """Run the benchmarks of a module on small cities; return its rows and its output."""
+    result = subprocess.run(
         f"{sys.executable} -W error -m {module} --size small --out {out}".split(),
         cwd=Path(__file__).parents[2],
         check=True,
@@ -102,91 +104,83 @@ def run(module: str, out: Path) -> tuple[list[dict[str, Any]], str]:
         text=True,
         timeout=6 * PATIENCE_S,
     )
-    return json.loads(out.read_text(encoding="utf-8")), done.stdout
+    return json.loads(out.read_text(encoding="utf-8")), result.stdout
 
 
 def test_every_benchmark_runs_and_is_written(tmp_path: Path) -> None:
     results, _ = run("benchmarks", tmp_path / "results.json")
-    names = [one["name"] for one in results]
+    names = [row["name"] for row in results]
     assert len(set(names)) == len(names)
-    drawn = shutil.which("chromedriver") and shutil.which("chromium") and page.available()
-    for part, bar in {**PARTS, **(OF_MAPS if drawn else {})}.items():
-        bars = {one["bar"] is not None for one in results if part in one["name"]}
+    has_maps = shutil.which("chromedriver") and shutil.which("chromium") and page.available()
+    for part, bar in {**PARTS, **(OF_MAPS if has_maps else {})}.items():
+        bars = {row["bar"] is not None for row in results if part in row["name"]}
         assert bars == {bar}, part
-    for one in results:
-        assert " ".join(one) == "name unit ours peer peer_name ratio bar met paper"
-        assert one["ratio"] == pytest.approx(one["peer"] / one["ours"], rel=0.01)
-        assert one["met"] == (None if one["bar"] is None else one["ratio"] >= one["bar"])
-        assert (one["paper"] is None) == (one["name"].split(",")[0] not in FUSIONS | SINGLES.keys())
+    for row in results:
+        assert " ".join(row) == "name unit ours peer peer_name ratio bar met paper"
+        assert row["ratio"] == pytest.approx(row["peer"] / row["ours"], rel=0.01)
+        assert row["met"] == (None if row["bar"] is None else row["ratio"] >= row["bar"])
+        assert (row["paper"] is None) == (row["name"].split(",")[0] not in FUSIONS | SINGLES.keys())
 
 
 @pytest.mark.usefixtures("browser", "map_files")
-def test_pictures_of_pages_are_taken(tmp_path: Path) -> None:
+def test_screenshots_of_pages_are_written(tmp_path: Path) -> None:
     subprocess.run(
         f"{sys.executable} -m benchmarks.pictures --size small --map drift workbench "
         f"--out {tmp_path}".split(),
         cwd=Path(__file__).parents[2],
-        check=False,  # it fails on frames that take long
+        check=False,  # slow frames are a failure
         timeout=6 * PATIENCE_S,
     )
     rows = json.loads((tmp_path / "pictures.json").read_text(encoding="utf-8"))
     assert Counter(row["map"] for row in rows) == {"drift": 2, "workbench": 2}
-    drawn = Counter(path.name.partition("-")[0] for path in tmp_path.glob("*.png"))
-    assert drawn == {"drift": 2, "workbench": 4}
+    files = Counter(path.name.partition("-")[0] for path in tmp_path.glob("*.png"))
+    assert files == {"drift": 2, "workbench": 4}
     assert not any(row["errors"] or row["requests"] or row["violations"] for row in rows)
 
 
-def test_a_command_runs_beside_six_busy_processes() -> None:
+def test_a_command_runs_together_with_six_busy_processes() -> None:
     code = "import os, psutil; print(len(psutil.Process(os.getppid()).children())); exit(3)"
-    done = subprocess.run(
+    result = subprocess.run(
         [*(sys.executable, "-m", "benchmarks.busy"), *(sys.executable, "-c", code)],
         cwd=Path(__file__).parents[2],
         check=False,
         stdout=subprocess.PIPE,
         text=True,
     )
-    assert (done.returncode, done.stdout) == (3, "7\n")  # the command is one of them
+    assert (result.returncode, result.stdout) == (3, "7\n")  # the command is the seventh
 
 
-def test_the_page_of_figures_is_that_of_the_results() -> None:
-    results = (
-        json.loads((tables.FOLDER / name).read_text(encoding="utf-8"))
-        for name in (
-            *("accuracy.json", "results.json", "reproduction.json", "chances.json"),
-            *("views.json", "bayes.json"),
-        )
-    )
-    *others, limit = results
+def test_the_page_of_figures_is_current() -> None:
+    names = ("accuracy", "results", "reproduction", "chances", "views", "bayes")
+    *others, limit = (read_rows(FOLDER / f"{name}.json") for name in names)
     assert tables.PAGE.read_text(encoding="utf-8") == tables.page(*others, bayes=limit)
-    trials = json.loads((tables.FOLDER / "soak.json").read_text(encoding="utf-8"))
+    trials = read_rows(FOLDER / "soak.json")
     page_of_trust = tables.TRUST.read_text(encoding="utf-8")
     assert page_of_trust == tables.trust_page(page_of_trust, trials)
 
 
-def test_every_figure_is_measured_and_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_accuracy_is_measured_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
     rows, printed = run("benchmarks.accuracy", tmp_path / "accuracy.json")
     assert "Montpellier is left out" in printed
-    named = [(one["city"], one["distortion"], one["method"], one["setting"]) for one in rows]
-    assert len(set(named)) == len(named)
+    keys = [(row["city"], row["distortion"], row["method"], row["setting"]) for row in rows]
+    assert len(set(keys)) == len(keys)
     for (method, setting), count in ROWS.items():
-        assert sum(method in one[2] and setting in one[3] for one in named) == count, method
-    for one in rows:
-        assert [name for name in one if name in FIGURES] == FIGURES
-        assert all(0.0 <= one[name] <= 1.0 for name in SHARES if one[name] is not None)
-        assert one["p50_low"] <= one["p50"] <= one["p50_high"]
-        assert one["p5"] <= one["p25"] <= one["p50"]
-        assert one["ms_per_query"] > 0.0
-    bars = [bar for one in rows for bar in one["bars"]]
+        assert sum(method in key[2] and setting in key[3] for key in keys) == count, method
+    for row in rows:
+        assert [name for name in row if name in FIGURES] == FIGURES
+        assert all(0.0 <= row[name] <= 1.0 for name in SHARES if row[name] is not None)
+        assert row["p50_low"] <= row["p50"] <= row["p50_high"]
+        assert row["p5"] <= row["p25"] <= row["p50"]
+        assert row["ms_per_query"] > 0.0
+    bars = [bar for row in rows for bar in row["bars"]]
     assert f"of {len(bars)} bars met" in printed
     for bar in (bar for bar in bars if bar["met"]):
         assert bar["low"] is None or bar["value"] >= bar["low"]
         assert bar["high"] is None or bar["value"] <= bar["high"]
 
 
-def test_chances_on_old_maps_are_measured_and_kept(
+def test_chances_on_old_maps_are_measured_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
@@ -196,56 +190,56 @@ def test_chances_on_old_maps_are_measured_and_kept(
     assert "Real cities are left out" in capsys.readouterr().out
     written = out.read_text(encoding="utf-8")
     rows = json.loads(written)
-    assert [one["told"] for one in rows] == [
+    assert [row[INPUTS] for row in rows] == [
         *("", "--map-age 3 --drift-report", "--map-age 3"),
     ]
-    for one in rows:
-        assert 0 <= one["right"] <= one["answered"] <= one["queries"] == 10
-        assert sum(tenth["n"] for tenth in one["bins"]) <= 10
-        assert one["bins"][-1]["n"] == one["answered"]
+    for row in rows:
+        assert 0 <= row["right"] <= row["answered"] <= row["queries"] == 10
+        assert sum(tenth["n"] for tenth in row["bins"]) <= 10
+        assert row["bins"][-1]["n"] == row["answered"]
     chances.main()
     assert out.read_text(encoding="utf-8") == written
     assert "made up" not in capsys.readouterr().out
 
 
-def test_views_are_measured_and_kept(
+def test_views_are_measured_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("SEMSIG_GEODATA", raising=False)
     out = tmp_path / "views.json"
-    some = [*views.lines()]
-    some = [*some[:16:5], *some[16:-2:7], some[-1]]
-    monkeypatch.setattr(views, "lines", lambda: iter(some))
+    every_line = [*views.lines()]
+    lines = [*every_line[:16:5], *every_line[16:-2:7], every_line[-1]]
+    monkeypatch.setattr(views, "lines", lambda: iter(lines))
     words = f"views --size small --queries 2 --processes 1 --out {out}"
     monkeypatch.setattr(sys, "argv", words.split())
     views.main()
     assert "Real cities are left out" in capsys.readouterr().out
     rows = json.loads(out.read_text(encoding="utf-8"))
-    assert len(rows) == len(some)
+    assert len(rows) == len(lines)
     for row in rows:
         assert 0.0 <= row["p50_low"] <= row["p50"] <= row["p50_high"] <= 1.0
         assert row["queries"] == sum(tenth["n"] for tenth in row["bins"]) == 2
-    assert [row["photos"] for row in rows if "alone" in row] == [5]
+    assert [row["photos"] for row in rows if LAST_ONLY in row] == [5]
     out.write_text(json.dumps(rows[:-1]), encoding="utf-8")
-    views.main()  # goes on where it was
+    views.main()  # measures the missing row
     assert json.loads(out.read_text(encoding="utf-8"))[:-1] == rows[:-1]
     page = tables.page([], [], [], [], rows, bayes=[])
     assert "as a full turn | sectors | sectors and ranges |" in page
     assert all(bar.what in page for _, bar in views.bars(rows))
 
 
-def test_the_limit_by_bayes_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_upper_bound_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "bayes.json"
     monkeypatch.setattr(sys, "argv", f"bayes --size small --out {out}".split())
     bayes.main()
     rows = json.loads(out.read_text(encoding="utf-8"))
-    told = [(row["degrees"], row["ranges"]) for row in rows]
-    assert told == [(one, ranges) for one in (360, 120, 70) for ranges in (False, True)]
+    lines = [(row["degrees"], row["ranges"]) for row in rows]
+    assert lines == [*itertools.product((360, 120, 70), (False, True))]
     for row in rows:
         assert 0.0 < row["limit"] <= 1.0
         assert row["queries"] == 5
     assert "| 360 | no |" in tables.page([], [], [], [], [], bayes=rows)
-    assert (tables.FOLDER / "bayes.json").exists()
+    assert (FOLDER / "bayes.json").exists()
 
 
 @given(st.integers(0, 10_000), st.integers(1, 4), st.integers(0, 4))
@@ -257,7 +251,7 @@ def test_associations_are_summed_exactly(seed: int, objects: int, detections: in
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_exact_likelihood_is_that_of_the_oracle(seed: int) -> None:
+def test_the_exact_likelihood_equals_the_oracle(seed: int) -> None:
     database = random_database(seed, cells=12, longest=4)
     view = random_view(
         database, np.random.default_rng(seed), size=3, photos=(Photo(sectors=((300, 60),)),)
@@ -268,12 +262,12 @@ def test_the_exact_likelihood_is_that_of_the_oracle(seed: int) -> None:
         ranges=None if view.ranges is None else np.where(np.isnan(view.ranges), 9.0, view.ranges),
         photos=view.photos,
     )
-    found = bayes.ExactPosterior(database).loglik(plain)
-    best = found.max()
+    loglik = bayes.ExactPosterior(database).loglik(plain)
+    best = loglik.max()
     for cell in range(len(database)):
         exact = cell_loglik(database, plain, NOISE, cell)
-        if np.isfinite(found[cell]):
-            assert found[cell] == pytest.approx(exact, abs=1e-3)
+        if np.isfinite(loglik[cell]):
+            assert loglik[cell] == pytest.approx(exact, abs=1e-3)
         else:
             assert exact < best - 30.0
 
@@ -281,7 +275,7 @@ def test_the_exact_likelihood_is_that_of_the_oracle(seed: int) -> None:
 ROW = {"name": "a query, 10 cells", "unit": "ms", "ours": 2.0, "peer": 8.0, "peer_name": "cdist"}
 
 
-def test_results_are_kept_by_commit(tmp_path: Path) -> None:
+def test_results_are_saved_by_commit(tmp_path: Path) -> None:
     rows = [ROW | {"bar": 3.0}]
     history.record(rows, commit="1" * 40, seconds=86_400, folder=tmp_path)
     slow = [rows[0] | {"ours": 4.0}, ROW | {"name": "a new one", "bar": None}]
@@ -302,7 +296,7 @@ def test_results_are_kept_by_commit(tmp_path: Path) -> None:
     assert "a new one" not in picture
 
 
-def test_a_stranger_types_what_the_readme_says() -> None:
+def test_commands_are_read_from_the_readme() -> None:
     readme = """`make bench` and
 
 ```

@@ -1,4 +1,4 @@
-"""The README and the pages of the documentation: what they point to and tell to type exists."""
+"""Links and commands in the README and the documentation exist."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PAGES = [
     ),
 ]
 MOST_LINES = 150
-# A line of a block, behind a prompt or not, or code within a sentence.
+# A line of a block, with or without a prompt, or code in a sentence.
 COMMAND = re.compile(r"^(?:\$ )?(semsig .+)$|`(semsig [^`]+)`", re.MULTILINE)
 
 pytestmark = pytest.mark.skipif(
@@ -56,7 +56,7 @@ def test_the_readme_is_short() -> None:
 
 
 @pytest.mark.parametrize("page", REFERRED, ids=lambda page: str(page.relative_to(ROOT)))
-def test_what_a_page_links_to_is_there(page: Path) -> None:
+def test_links_of_a_page_exist(page: Path) -> None:
     text = re.sub(
         r"^```.*?^```|`[^`]*`", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL
     )
@@ -67,7 +67,7 @@ def test_what_a_page_links_to_is_there(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_commands_have_the_options_that_a_page_shows(page: Path) -> None:
+def test_commands_accept_the_options_on_a_page(page: Path) -> None:
     group = get_group(app)
     for words in commands(page):
         if words[0].startswith("-") or words[0].isupper():  # not of one command

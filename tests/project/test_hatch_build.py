@@ -1,4 +1,4 @@
-"""The build hook, with a stand-in for npm that copies a package made here."""
+"""Test the build hooks with a fake npm that copies a local package."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def hook() -> SimpleNamespace:
-    """Return what the build hook defines."""
+    """Return the names that the build hook defines."""
     return SimpleNamespace(**runpy.run_path(str(ROOT / "hatch_build.py")))
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return the folder for two files of one package, in a project of its own."""
+    """Return the folder for the files of one package, in a new project."""
     lines = ["[[package]]", 'name = "thing"', 'version = "1.2.3"', 'license = "MIT"']
-    for name, found in SUMS.items():
+    for name, checksum in SUMS.items():
         lines += ["[[package.file]]", f'path = "dist/{name}"', f'target = "{name}"']
-        lines += [f'sha256 = "{found}"']
+        lines += [f'sha256 = "{checksum}"']
     assets = tmp_path / "project" / "semsig_gis" / "assets"
     assets.mkdir(parents=True)
     (assets / "manifest.toml").write_text("\n".join(lines), encoding="utf-8")
@@ -54,7 +54,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Put an npm on the path that knows one package, and return the log of its calls."""
+    """Put an npm with one package on the path, and return the log of its calls."""
     store = tmp_path / "registry"
     store.mkdir()
     with tarfile.open(store / "thing@1.2.3.tgz", "w:gz") as tar:
@@ -78,19 +78,19 @@ def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(autouse=True)
 def _nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Build a project without an address, unless a test says so."""
+    """Build a project without an address, unless a test sets one."""
     monkeypatch.delenv("SEMSIG_REPOSITORY", raising=False)
 
 
-def told(hook: SimpleNamespace, project: Path, **known: object) -> dict[str, Any]:
-    """Return the metadata that the hook tells for a build."""
-    metadata: dict[str, Any] = {"version": "1.2.3", **known}
+def build_metadata(hook: SimpleNamespace, project: Path, **values: object) -> dict[str, Any]:
+    """Return the metadata of a build, as changed by the hook."""
+    metadata: dict[str, Any] = {"version": "1.2.3", **values}
     hook.ReleaseMetadataHook(str(project), {"license": "BSD-3-Clause"}).update(metadata)
     return metadata
 
 
 def run_hook(hook: SimpleNamespace, project: Path, version: str, target: str) -> dict[str, Any]:
-    """Run the build hook as hatchling does, and return what it made of each SBOM."""
+    """Run the build hook as hatchling does, and return the texts of the SBOMs."""
     package = SimpleNamespace(core=SimpleNamespace(name="project"), version="4.5.6")
     arguments: list[Any] = [str(project), {}, None, package, "", target, None]
     build, data = hook.AssetsBuildHook(*arguments), {"sbom_files": list[str]()}
@@ -99,20 +99,20 @@ def run_hook(hook: SimpleNamespace, project: Path, version: str, target: str) ->
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return the files beside the manifest."""
+    """Return the contents of the files except the manifest."""
     files = {path.name: path.read_bytes() for path in folder.iterdir()}
     del files["manifest.toml"]
     return files
 
 
-def test_files_are_brought_once_and_again_when_they_change(
+def test_files_are_downloaded_once_and_again_when_they_change(
     hook: SimpleNamespace, folder: Path, npm: Path
 ) -> None:
     assert hook.bring_assets(folder) == tuple(FILES)
     assert contents(folder) == FILES
     npm.unlink()
     assert hook.bring_assets(folder) == ()
-    assert not npm.exists()  # nothing was asked for
+    assert not npm.exists()  # npm was not called
     (folder / "thing.js").write_bytes(b"something else")
     assert hook.bring_assets(folder) == ("thing.js",)
     assert contents(folder) == FILES
@@ -133,7 +133,7 @@ def test_files_are_brought_once_and_again_when_they_change(
         ),
     ],
 )
-def test_what_cannot_be_brought_is_one_line_and_nothing_is_written(
+def test_failed_download_prints_one_line_and_writes_nothing(
     hook: SimpleNamespace,
     folder: Path,
     capsys: pytest.CaptureFixture[str],
@@ -143,7 +143,7 @@ def test_what_cannot_be_brought_is_one_line_and_nothing_is_written(
     manifest = folder / "manifest.toml"
     text = manifest.read_text(encoding="utf-8")
     manifest.write_text(text.replace(*fault), encoding="utf-8")
-    metadata = told(hook, folder.parents[1])
+    metadata = build_metadata(hook, folder.parents[1])
     (warning,) = capsys.readouterr().err.splitlines()
     assert warning.startswith("Maps will link Leaflet instead of containing it: ")
     assert re.search(reason, warning)
@@ -153,14 +153,14 @@ def test_what_cannot_be_brought_is_one_line_and_nothing_is_written(
 
 
 @pytest.mark.usefixtures("npm")
-def test_what_is_carried_is_in_the_licences_and_in_a_bill_of_materials(
+def test_included_files_are_in_the_licences_and_the_bill_of_materials(
     hook: SimpleNamespace, folder: Path
 ) -> None:
-    # Here, because jsonschema takes a second.
+    # Imported here, because jsonschema takes a second.
     from cyclonedx.schema import SchemaVersion
     from cyclonedx.validation.json import JsonStrictValidator
 
-    metadata = told(hook, folder.parents[1])
+    metadata = build_metadata(hook, folder.parents[1])
     assert contents(folder) == FILES
     assert metadata["license"] == "BSD-3-Clause AND MIT"
     assert metadata["license-files"] == ["LICENSE", "semsig_gis/assets/thing.LICENSE.txt"]
@@ -177,19 +177,19 @@ def test_what_is_carried_is_in_the_licences_and_in_a_bill_of_materials(
 
 
 @pytest.mark.usefixtures("npm")
-@pytest.mark.parametrize(("version", "brought"), [("standard", {}), ("editable", FILES)])
-def test_files_of_tests_are_for_who_works_on_it(
-    hook: SimpleNamespace, folder: Path, version: str, brought: dict[str, bytes]
+@pytest.mark.parametrize(("version", "files"), [("standard", {}), ("editable", FILES)])
+def test_only_editable_builds_download_the_files_of_tests(
+    hook: SimpleNamespace, folder: Path, version: str, files: dict[str, bytes]
 ) -> None:
     project = folder.parents[1]
     of_tests = project / "tests" / "assets"
     of_tests.mkdir(parents=True)
     (of_tests / "manifest.toml").write_bytes((folder / "manifest.toml").read_bytes())
     assert run_hook(hook, project, version, "wheel") == {}
-    assert contents(of_tests) == brought
+    assert contents(of_tests) == files
 
 
-def test_without_npm(
+def test_missing_npm_is_reported(
     hook: SimpleNamespace,
     folder: Path,
     tmp_path: Path,
@@ -197,23 +197,23 @@ def test_without_npm(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    told(hook, folder.parents[1])
+    build_metadata(hook, folder.parents[1])
     message = "npm is not on this machine, so thing@1.2.3 was not brought.\n"
     assert capsys.readouterr().err.endswith(message)
     assert contents(folder) == {}
 
 
 @pytest.mark.usefixtures("npm")
-def test_a_project_has_the_addresses_that_its_release_tells(
+def test_a_release_sets_the_addresses_of_the_project(
     hook: SimpleNamespace, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     project = folder.parents[1]
-    without = told(hook, project)
+    without = build_metadata(hook, project)
     assert without["readme"]["text"] == "[How](docs/how.md)\n"
     assert list(without["urls"]) == ["Paper"]
     place = "https://forge.example/people/thing"
     monkeypatch.setenv("SEMSIG_REPOSITORY", f"{place}/")
-    metadata = told(hook, project)
+    metadata = build_metadata(hook, project)
     assert metadata["readme"]["text"] == f"[How]({place}/blob/v1.2.3/docs/how.md)\n"
     assert metadata["urls"] == {
         **without["urls"],
@@ -223,16 +223,16 @@ def test_a_project_has_the_addresses_that_its_release_tells(
         "Issues": f"{place}/issues",
         "Changelog": f"{place}/blob/v1.2.3/CHANGELOG.md",
     }
-    # What an sdist was built with is not changed by who builds a wheel from it.
-    kept = {name: without[name] for name in ("readme", "urls")}
-    assert {name: told(hook, project, **kept)[name] for name in kept} == kept
+    # Values of an sdist are not changed when a wheel is built from it.
+    values = {name: without[name] for name in ("readme", "urls")}
+    assert values.items() <= build_metadata(hook, project, **values).items()
     for wrong in ("forge.example/people/thing", "https://forge.example", "https://a.b/c d"):
         monkeypatch.setenv("SEMSIG_REPOSITORY", wrong)
         with pytest.raises(ValueError, match=r"which is not the address of a project; give one"):
-            told(hook, project)
+            build_metadata(hook, project)
 
 
-def test_the_readme_renders_without_a_link_to_a_file_beside_it(hook: SimpleNamespace) -> None:
+def test_the_readme_of_a_release_has_no_relative_links(hook: SimpleNamespace) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     page = render(hook.absolute_links(text, "https://forge.example/people/thing", "v1.2.3"))
     assert page is not None

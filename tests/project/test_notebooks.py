@@ -1,4 +1,4 @@
-"""The notebooks run from top to bottom, show what they promise, and are kept without outputs."""
+"""The notebooks run from top to bottom, show pictures and a map, and contain no outputs."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
-# What a reader has who installed the package: it, what it stands on, and Python.
+# Installed with the package: itself, its dependencies, and Python.
 IMPORTED = {"geopandas", "matplotlib", "numpy", "pandas", "rapidfuzz", "semsig_gis"}
-# How a notebook shows a value, best first; anything can be shown as text.
+# Methods by which a notebook shows a value, best first.
 SHOWN_BY = ("_repr_html_", "_repr_svg_", "_repr_markdown_", "__repr__")
 
 each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -50,7 +50,7 @@ def test_the_folder_lists_its_notebooks() -> None:
 
 
 @each_notebook
-def test_a_notebook_is_kept_clean(path: Path) -> None:
+def test_a_notebook_is_saved_without_outputs(path: Path) -> None:
     notebook = opened(path)
     assert (notebook["nbformat"], notebook["nbformat_minor"]) == (4, 5)
     assert notebook["metadata"] == {"kernelspec": KERNEL, "language_info": {"name": "python"}}
@@ -63,13 +63,13 @@ def test_a_notebook_is_kept_clean(path: Path) -> None:
             assert (cell["outputs"], cell["execution_count"]) == ([], None)
     title, *_ = notebook["cells"][0]["source"]
     assert title == f"# {int(path.name[:2])}. {title[5:]}"
-    # The same bytes, whichever program has saved it.
+    # The same bytes, whichever program saved it.
     text = json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
     assert path.read_text(encoding="utf-8") == text
 
 
 @each_notebook
-def test_a_notebook_uses_what_everybody_has(path: Path) -> None:
+def test_a_notebook_imports_only_installed_packages(path: Path) -> None:
     for _, text in code_of(path):
         for node in ast.walk(ast.parse(text)):
             if not isinstance(node, ast.Import | ast.ImportFrom):
@@ -86,7 +86,7 @@ def test_a_notebook_uses_what_everybody_has(path: Path) -> None:
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Give an empty folder to run in, and take temporary files to another one in it."""
+    """Run in an empty folder, with another one for temporary files."""
     (tmp_path / "work").mkdir()
     (tmp_path / "temporary").mkdir()
     monkeypatch.chdir(tmp_path / "work")
@@ -98,7 +98,7 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 
 @each_notebook
 def test_a_notebook_runs(path: Path, elsewhere: Path) -> None:
-    beside = sorted(FOLDER.rglob("*"))
+    files = sorted(FOLDER.rglob("*"))
     names: dict[str, Any] = {"__name__": "__main__"}
     shown: list[Any] = []
     for cell, text in code_of(path):
@@ -108,18 +108,18 @@ def test_a_notebook_runs(path: Path, elsewhere: Path) -> None:
             figure.canvas.draw()
         shown += figures
         plt.close("all")
-    # A picture of its own, and last a map that can be moved.
-    assert any(isinstance(one, Picture | mpl.figure.Figure) for one in shown)
+    # At least one picture, and at the end an interactive map.
+    assert any(isinstance(value, Picture | mpl.figure.Figure) for value in shown)
     assert isinstance(shown[-1], MapFrame)
     names.clear()
     shown.clear()
     gc.collect()
-    assert sorted(FOLDER.rglob("*")) == beside
+    assert sorted(FOLDER.rglob("*")) == files
     assert [file for file in elsewhere.rglob("*") if file.is_file()] == []
 
 
 def run_cell(text: str, names: dict[str, Any], *, where: str) -> object:
-    """Run a cell, and show what its last line is worth, as a notebook does."""
+    """Run a cell, and show the value of its last line, as a notebook does."""
     body = ast.parse(text)
     last = body.body.pop() if isinstance(body.body[-1], ast.Expr) else None
     exec(compile(body, where, "exec"), names)  # noqa: S102

@@ -1,7 +1,7 @@
-"""The site: it builds without a warning, its links lead somewhere, everybody can read it.
+"""The site builds without a warning, its links work, and its pages are accessible.
 
-Here it is built without running notebooks. ``make docs`` builds all of it, and then runs these
-tests on that, which SEMSIG_SITE names.
+These tests build it without running notebooks. ``make docs`` builds all of it, and then runs them
+on the site that SEMSIG_SITE names.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-# Of a page with its styles, scripts and pictures, as they lie on the disk, but without its maps.
+# Size on disk of a page with its styles, scripts and pictures, but without its maps.
 MOST_BYTES = 300_000
 MAIN = (
-    *("index", "install", "tutorial", "gallery", "beside_the_paper", "how_sure"),
-    *("commands/localize", "api/matching"),
+    *("index", "install", "tutorial", "gallery", "compared_with_the_paper", "how_sure"),
+    *("commands/localize", "api/localization"),
 )
 
 pytestmark = pytest.mark.skipif(
@@ -43,7 +43,7 @@ pytestmark = pytest.mark.skipif(
 
 @dataclass
 class Page(HTMLParser):
-    """What a page links, loads and shows."""
+    """Links, loaded files, pictures and anchors of a page."""
 
     path: Path
     links: list[str] = field(default_factory=list)
@@ -59,19 +59,19 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        given = dict(attrs)
-        self.names |= {given[key] or "" for key in ("id", "name") if key in given}
-        if tag == "a" and given.get("href"):
-            self.links.append(given["href"] or "")
+        values = dict(attrs)
+        self.names |= {values[key] or "" for key in ("id", "name") if key in values}
+        if tag == "a" and values.get("href"):
+            self.links.append(values["href"] or "")
         if tag == "img":
-            self.pictures.append(given)
-        if tag in {"img", "script"} and given.get("src"):
-            self.loaded.append(given["src"] or "")
-        if tag == "link" and given.get("rel") == "stylesheet":
-            self.loaded.append(given["href"] or "")
+            self.pictures.append(values)
+        if tag in {"img", "script"} and values.get("src"):
+            self.loaded.append(values["src"] or "")
+        if tag == "link" and values.get("rel") == "stylesheet":
+            self.loaded.append(values["href"] or "")
 
     def file(self, address: str) -> Path:
-        """Return the file that an address of this page means."""
+        """Return the file of an address on this page."""
         path = unquote(urlsplit(address).path)
         return (self.path.parent / path).resolve() if path else self.path.resolve()
 
@@ -85,8 +85,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = ["-W", "--keep-going", "-q", "-D", "nb_execution_mode=off"]
     places = ["-d", f"{out}.doctrees", str(DOCS), str(out)]
     command = [sys.executable, "-m", "sphinx", *options, *places]
-    built_now = subprocess.run(command, check=False, capture_output=True, text=True)
-    assert built_now.returncode == 0, built_now.stderr
+    run = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
     return out
 
 
@@ -96,15 +96,15 @@ def pages(site: Path) -> dict[str, Page]:
     return {path.relative_to(site).with_suffix("").as_posix(): Page(path) for path in paths}
 
 
-def test_every_link_within_the_site_leads_somewhere(site: Path, pages: dict[str, Page]) -> None:
+def test_links_within_the_site_exist(site: Path, pages: dict[str, Page]) -> None:
     by_file = {page.path.resolve(): page for page in pages.values()}
-    drawn = (site / "gallery").is_dir()
+    has_gallery = (site / "gallery").is_dir()
     broken = []
     for name, page in pages.items():
         for link in page.links:
             parts = urlsplit(link)
             target = page.file(link)
-            if parts.scheme or (target.parent.name == "gallery" and not drawn):
+            if parts.scheme or (target.parent.name == "gallery" and not has_gallery):
                 continue
             fragment = unquote(parts.fragment)
             there = target.is_file()
@@ -115,11 +115,11 @@ def test_every_link_within_the_site_leads_somewhere(site: Path, pages: dict[str,
     assert broken == []
 
 
-def test_a_page_loads_nothing_from_elsewhere_and_is_light(pages: dict[str, Page]) -> None:
+def test_pages_load_only_local_files_and_are_small(pages: dict[str, Page]) -> None:
     heavy = {}
     for name, page in pages.items():
-        assert [one for one in page.loaded if urlsplit(one).scheme not in {"", "data"}] == [], name
-        files = {page.file(one) for one in page.loaded if not urlsplit(one).scheme}
+        assert {urlsplit(address).scheme for address in page.loaded} <= {"", "data"}, name
+        files = {page.file(address) for address in page.loaded if not urlsplit(address).scheme}
         size = page.size + sum(file.stat().st_size for file in files)
         if size > MOST_BYTES and name != "search":  # that page loads the index of all words
             heavy[name] = size
@@ -134,9 +134,9 @@ def test_every_picture_has_an_alternative(pages: dict[str, Page]) -> None:
         if not (picture.get("alt") or "").strip()
     ]
     assert without == []
-    main = {"index", "install", "tutorial", "gallery", "how_sure", "beside_the_paper"}
+    main = {"index", "install", "tutorial", "gallery", "how_sure", "compared_with_the_paper"}
     if "SEMSIG_SITE" not in os.environ:
-        main.remove("tutorial")  # whose commands draw them
+        main.remove("tutorial")  # its pictures are drawn by its commands
     assert [name for name in main if not pages[name].pictures] == []
 
 
@@ -147,7 +147,7 @@ def test_tables_that_the_tutorial_prints_are_whole(site: Path) -> None:
     assert rows or "SEMSIG_SITE" not in os.environ
 
 
-def test_every_command_and_every_public_name_has_its_place(pages: dict[str, Page]) -> None:
+def test_every_command_and_every_public_name_is_documented_once(pages: dict[str, Page]) -> None:
     for name in get_group(app).commands:
         assert f"cmdoption-semsig-{name}-help" in pages[f"commands/{name}"].names
     places = Counter(
@@ -159,11 +159,11 @@ def test_every_command_and_every_public_name_has_its_place(pages: dict[str, Page
     assert places == Counter(dir(semsig_gis))
 
 
-def test_every_thumbnail_of_the_gallery_is_of_what_a_command_writes() -> None:
+def test_every_thumbnail_of_the_gallery_shows_a_file_of_a_command() -> None:
     text = (DOCS / "gallery.md").read_text(encoding="utf-8")
     targets = re.findall(r"^:target: gallery/(\S+)$", text, re.MULTILINE)
     thumbnails = re.findall(r"^```\{figure\} (images/gallery/\S+)$", text, re.MULTILINE)
-    assert [Path(one).stem for one in targets] == [Path(one).stem for one in thumbnails]
+    assert [Path(name).stem for name in targets] == [Path(name).stem for name in thumbnails]
     code = "".join(
         re.findall(r"^```(?:console|python)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     )
@@ -173,7 +173,7 @@ def test_every_thumbnail_of_the_gallery_is_of_what_a_command_writes() -> None:
 
 
 @pytest.mark.parametrize("name", MAIN)
-def test_everybody_can_read_it(name: str, site: Path, browser: Chrome) -> None:
+def test_main_pages_are_accessible(name: str, site: Path, browser: Chrome) -> None:
     browser.get((site / f"{name}.html").as_uri())
     context = {"exclude": [["iframe"]]}  # maps have their own tests
     result = Axe().run(browser, context=context, options={"resultTypes": ["violations"]})

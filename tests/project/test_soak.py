@@ -1,4 +1,4 @@
-"""Some trials of the soak (see `benchmarks.soak`): nothing is lost, every refusal is a sentence."""
+"""A few trials of `benchmarks.soak`: no file is lost, every refusal is one sentence."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 from machine import PATIENCE_S
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="forks, and mounts disks of its own")
+@pytest.mark.skipif(sys.platform != "linux", reason="forks, and mounts disks")
 def test_some_of_the_soak(tmp_path: Path) -> None:
     out = tmp_path / "soak.json"
-    done = subprocess.run(
+    result = subprocess.run(
         [*(sys.executable, "-m", "benchmarks.soak"), *f"--share 0.0086 --out {out}".split()],
         cwd=Path(__file__).parents[2],
         capture_output=True,
@@ -22,7 +22,7 @@ def test_some_of_the_soak(tmp_path: Path) -> None:
         text=True,
         timeout=6 * PATIENCE_S,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert result.returncode == 0, result.stdout + result.stderr
     rows = {row["part"]: row for row in json.loads(out.read_text(encoding="utf-8"))}
     assert rows["kills"]["cases"] == 6
     assert rows["damaged files"]["cases"] >= 350

@@ -1,4 +1,4 @@
-"""What is drawn into axes of matplotlib is where it is, and means what the legend says."""
+"""Results drawn into axes of matplotlib have the right places, colours and legends."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 TOWN = random_town()
 CITY, OBJECTS = TOWN.database, TOWN.street_objects
-FOUND, WORSE = (
+BETTER, WORSE = (
     evaluate(CITY, queries=40, method=Method(), distortion=level) for level in ("light", "strong")
 )
 INDEX = build_index(CITY, named_noise("light"))
@@ -67,7 +67,7 @@ def pixels(image: AxesImage) -> NDArray[np.float64]:
 
 
 def bar_of(ax: Axes) -> Axes:
-    """Return the axes of the bar that tells what the colours of the last image mean."""
+    """Return the axes of the colour bar of the last image."""
     bar = ax.images[-1].colorbar
     assert bar is not None
     return bar.ax
@@ -95,19 +95,19 @@ def test_cells_have_the_colours_of_the_maps(
     assert bar_of(ax).get_ylabel() in ax.get_title()
 
 
-def test_any_number_of_the_cells_is_drawn(ax: Axes) -> None:
+def test_numbers_and_options_of_a_user_are_drawn(ax: Axes) -> None:
     share = pd.Series(CITY.lengths / CITY.lengths.max(), name="share of $most$")
     CITY.plot(share, ax=ax, cmap="magma", vmax=1)
     assert bar_of(ax).get_ylabel() == r"share of \$most\$"
     assert ax.images[-1].get_clim() == (share.min(), 1)
     assert CITY.plot("length", ax=ax, cmap="magma").images[-1].get_cmap().name == "magma"
     assert CITY.plot(ax=ax, legend=False).images[-1].colorbar is None
-    # All on one place: one scale bar is enough.
-    assert sum(isinstance(one, AnchoredSizeBar) for one in ax.artists) == 1
+    # Maps in the same axes share one scale bar.
+    assert sum(isinstance(artist, AnchoredSizeBar) for artist in ax.artists) == 1
     ax.figure.canvas.draw()
 
 
-def test_large_cities_are_drawn_small(ax: Axes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_image_of_a_large_city_has_few_pixels(ax: Axes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drawing, "MOST_PIXELS", 10)
     CITY.plot(ax=ax)
     assert max(pixels(ax.images[-1]).shape) <= 10
@@ -116,7 +116,7 @@ def test_large_cities_are_drawn_small(ax: Axes, monkeypatch: pytest.MonkeyPatch)
     assert (CITY.xy < (east, north)).all()
 
 
-def test_what_cannot_be_drawn_is_refused() -> None:
+def test_unknown_columns_wrong_numbers_and_empty_cities_are_refused() -> None:
     with refused(UnknownNameError, "'lenght'", "length, type_group_size", "'length'"):
         CITY.plot("lenght")
     with refused(InputError, "2 numbers", f"{len(CITY)} cells"):
@@ -137,20 +137,20 @@ def test_objects_have_the_signs_of_their_classes(ax: Axes) -> None:
         assert np.array_equal(line.get_xydata(), OBJECTS.xy[OBJECTS.codes == code])
     keys = ax.get_legend()
     assert keys is not None
-    told = [text.get_text() for text in keys.get_texts()]
-    assert told == [f"{signs[code].symbol} {signs[code].title} ({n})" for code, n in counts.items()]
-    (beside,) = OBJECTS.plot().figure.legends
-    assert [text.get_text() for text in beside.get_texts()] == told
+    labels = [f"{signs[code].symbol} {signs[code].title} ({n})" for code, n in counts.items()]
+    (legend,) = OBJECTS.plot().figure.legends
+    for key in (keys, legend):
+        assert [text.get_text() for text in key.get_texts()] == labels
     assert OBJECTS.plot(legend=False).figure.legends == []
 
 
-def test_titles_from_data_break_nothing(ax: Axes) -> None:
+def test_hostile_titles_are_drawn(ax: Axes) -> None:
     harmful = replace(OBJECTS, taxonomy=hostile_taxonomy(OBJECTS.taxonomy, f"$\\frac{{$ {HOSTILE}"))
     harmful.plot(ax=ax).figure.canvas.draw()
 
 
 @pytest.mark.parametrize("cell", [int(CITY.lengths.argmax()), int(CITY.type_group_sizes.argmax())])
-def test_an_answer_by_likelihood_shows_chances_and_the_place(ax: Axes, cell: int) -> None:
+def test_plot_of_a_likelihood_answer_shows_chances_and_the_place(ax: Axes, cell: int) -> None:
     location = locate(INDEX, CITY.signature(cell))
     assert location.plot(ax=ax) is ax
     assert ax.get_title().startswith("The answer" if location.answer.given else "Cannot tell")
@@ -163,7 +163,7 @@ def test_an_answer_by_likelihood_shows_chances_and_the_place(ax: Axes, cell: int
     assert ax.lines[-1].get_xydata().tolist() == [[*place]]
     (ellipse,) = ax.patches
     assert ellipse.center == place
-    # The longer axis points where it should, clockwise from north.
+    # The bearing of the longer axis is clockwise from north.
     longer, _, bearing = location.estimate.ellipse()
     turn = np.radians(bearing)
     end = ellipse.get_patch_transform().transform((0.0, 1.0))
@@ -173,7 +173,7 @@ def test_an_answer_by_likelihood_shows_chances_and_the_place(ax: Axes, cell: int
     ax.figure.canvas.draw()
 
 
-def test_an_answer_by_distance_shows_the_candidates(ax: Axes) -> None:
+def test_plot_of_a_distance_answer_shows_the_candidates(ax: Axes) -> None:
     localization = localize(CITY, CITY.signature(3), top=7, method=Method())
     localization.plot(ax=ax)
     points = np.asarray(ax.collections[0].get_offsets())[::-1]
@@ -182,37 +182,36 @@ def test_an_answer_by_distance_shows_the_candidates(ax: Axes) -> None:
     assert localization.plot(legend=False) is not ax
 
 
-def test_chances_to_be_found(ax: Axes) -> None:
-    told = identify(INDEX, trials=5, class_trials=2)
-    told.plot(ax=ax)
+def test_colours_of_identifiability_range_from_0_to_1(ax: Axes) -> None:
+    identify(INDEX, trials=5, class_trials=2).plot(ax=ax)
     assert ax.images[-1].get_clim() == (0, 1)
 
 
 @pytest.mark.parametrize("kind", ["errors", "recall"])
 def test_curves_of_evaluations_share_axes(ax: Axes, kind: PlotKind) -> None:
-    for evaluation, label in ((FOUND, None), (WORSE, "wor$e")):
+    for evaluation, label in ((BETTER, None), (WORSE, "wor$e")):
         assert evaluation.plot(kind, ax=ax, label=label) is ax
-    _, told = ax.get_legend_handles_labels()
-    assert told == ["edit+edit, light", r"wor\$e"]
+    _, labels = ax.get_legend_handles_labels()
+    assert labels == ["edit+edit, light", r"wor\$e"]
     first, second = (line for line in ax.lines if not str(line.get_label()).startswith("_"))
     assert first.get_color() != second.get_color()
-    for line, evaluation in ((first, FOUND), (second, WORSE)):
+    for line, evaluation in ((first, BETTER), (second, WORSE)):
         at = dict(np.asarray(line.get_xydata()).tolist())
         share = evaluation.cdf([50])[0] if kind == "errors" else evaluation.recall(10)
         assert at[50 if kind == "errors" else 10] == pytest.approx(share)
     ax.figure.canvas.draw()
 
 
-def test_where_queries_failed(ax: Axes) -> None:
-    assert FOUND.plot("map", ax=ax) is ax
-    drawn = {str(line.get_label()).split(" ")[0]: line for line in ax.lines}
-    for name, some in (("failed", ~FOUND.successful), ("successful", FOUND.successful)):
-        places = FOUND.queries.geometry[some]
-        assert np.array_equal(drawn[name].get_xydata(), np.column_stack([places.x, places.y]))
-    looks = {(line.get_marker(), line.get_color()) for line in drawn.values()}
-    assert len({marker for marker, _ in looks}) == len({colour for _, colour in looks}) == 2
+def test_map_of_an_evaluation_shows_failed_and_successful_queries(ax: Axes) -> None:
+    assert BETTER.plot("map", ax=ax) is ax
+    lines = {str(line.get_label()).split(" ")[0]: line for line in ax.lines}
+    for name, rows in (("failed", ~BETTER.successful), ("successful", BETTER.successful)):
+        places = BETTER.queries.geometry[rows]
+        assert np.array_equal(lines[name].get_xydata(), np.column_stack([places.x, places.y]))
+    assert len({line.get_marker() for line in lines.values()}) == 2
+    assert len({line.get_color() for line in lines.values()}) == 2
     with refused(UnknownNameError, "'error'", "errors, recall, map", "'errors'"):
-        FOUND.plot("error")  # type: ignore[arg-type]
+        BETTER.plot("error")  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("map_files")
@@ -221,14 +220,14 @@ def test_results_are_shown_on_maps() -> None:
         locate(INDEX, CITY.signature(3)),
         localize(CITY, CITY.signature(3), method=Method()),
     )
-    told = identify(INDEX, trials=5, class_trials=2)
+    chances = identify(INDEX, trials=5, class_trials=2)
     for frame, title in (
         (CITY.explore(), "Cells that look the same"),
         (OBJECTS.explore(), "Street objects"),
         (location.explore(), "Where it was seen"),
         (localization.explore(CITY), "Candidates"),
-        (FOUND.explore(CITY), "Localization errors"),
-        (told.explore(), "Where a query can be placed"),
+        (BETTER.explore(CITY), "Localization errors"),
+        (chances.explore(), "Where a query can be placed"),
     ):
         assert isinstance(frame, MapFrame)
         assert title in frame.page

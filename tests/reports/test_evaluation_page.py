@@ -1,4 +1,4 @@
-"""The report of an evaluation: its headline, its parts, and the page in a browser."""
+"""The report of an evaluation: its headline, its sections, and the page in a browser."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def sections(evaluation: object) -> dict[str, Section]:
 
 
 @pytest.mark.parametrize(
-    ("near", "chance", "top", "said"),
+    ("near", "chance", "top", "text"),
     [
         (0.824, None, 1, "82 % of 60 queries were placed within 50 m (95 %: 71 to 90 %)."),
         (0.083, None, 1, "8.3 % of 60 queries were placed within 50 m (95 %: 3.6 to 18 %)."),
@@ -56,17 +56,17 @@ def sections(evaluation: object) -> dict[str, Section]:
         (0.5, 0.1, 1, "; the method was not sure enough to answer any of them."),
     ],
 )
-def test_the_headline(near: float, chance: float | None, top: int, said: str) -> None:
-    told = {"chance": np.nan if chance is None else chance, "right": 0.75}
-    queries = by_distance().queries.assign(p50=near, **told)
-    assert said in evaluation_headline(replace(by_distance(), queries=queries, top=top))
+def test_headline_of_an_evaluation(near: float, chance: float | None, top: int, text: str) -> None:
+    columns = {"chance": np.nan if chance is None else chance, "right": 0.75}
+    queries = by_distance().queries.assign(p50=near, **columns)
+    assert text in evaluation_headline(replace(by_distance(), queries=queries, top=top))
 
 
-@pytest.mark.parametrize("ask", [by_distance, by_likelihood])
-def test_curves_and_numbers_are_those_of_the_evaluation(ask: Callable[[], Evaluation]) -> None:
-    evaluation = ask()
-    parts = sections(evaluation)
-    errors, groups = parts["errors"], parts["groups"]
+@pytest.mark.parametrize("run", [by_distance, by_likelihood])
+def test_curves_and_numbers_agree_with_the_evaluation(run: Callable[[], Evaluation]) -> None:
+    evaluation = run()
+    page = sections(evaluation)
+    errors, groups = page["errors"], page["groups"]
     (curve,) = errors.plots[0].curves
     assert errors.plots[0].log
     shares = dict(zip(curve.x, curve.y, strict=True))
@@ -77,20 +77,20 @@ def test_curves_and_numbers_are_those_of_the_evaluation(ask: Callable[[], Evalua
     means = evaluation.means()
     assert shown["P(error ≤ 50 m)"].ours == means["value"]["p50"]
     assert shown["recall@10 %"].high == means["high"]["recall10"]
-    asked = [one.ours or 0 for one in groups.numbers if one.column == "queries"]
-    assert sum(asked) == 2 * 60  # by objects seen, and by cells alike
+    counts = [number.ours or 0 for number in groups.numbers if number.column == "queries"]
+    assert sum(counts) == 2 * 60  # by objects seen, and by equal cells
     for plot, table in zip(
         groups.plots, (evaluation.by_length(), evaluation.by_ambiguity()), strict=True
     ):
         assert [name for _, name in plot.ticks] == table.iloc[:, 0].tolist()
-        known = table["p50"].dropna()
-        assert plot.curves[0].x == tuple(map(float, known.index))
-        assert plot.curves[0].y == tuple(known)
+        successes = table["p50"].dropna()
+        assert plot.curves[0].x == tuple(map(float, successes.index))
+        assert plot.curves[0].y == tuple(successes)
     assert errors.maps[0].successful.sum() == evaluation.successful.sum()
-    assert [len(pair.scenes) for pair in parts["failures"].pairs] == [2] * 6
+    assert [len(pair.scenes) for pair in page["failures"].pairs] == [2] * 6
 
 
-def test_the_paper_stands_beside_the_same_settings() -> None:
+def test_figures_of_the_paper_are_shown_for_the_same_settings() -> None:
     (plot,) = sections(by_distance())["errors"].plots
     assert [point[:2] for point in plot.paper] == [(50.0, 0.3733)]
     shown = {number.row: number.paper for number in sections(by_distance())["errors"].numbers}
@@ -99,7 +99,7 @@ def test_the_paper_stands_beside_the_same_settings() -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "point"),
+    ("distortions", "point"),
     [
         ("light:resort=false", [(10.0, 0.70)]),
         ("strong:false_class=frequency", [(10.0, 0.25)]),
@@ -107,13 +107,15 @@ def test_the_paper_stands_beside_the_same_settings() -> None:
         ("light, view:90", []),
     ],
 )
-def test_what_the_paper_reads_off_its_plots(asked: str, point: list[tuple[float, float]]) -> None:
-    spec = replace(by_distance().asked, distortions=parse_chain(asked))
+def test_points_of_the_paper_need_its_distortion(
+    distortions: str, point: list[tuple[float, float]]
+) -> None:
+    spec = replace(by_distance().asked, distortions=parse_chain(distortions))
     points = paris_points(replace(by_distance(), asked=spec))
-    assert [one[:2] for one in points] == point
+    assert [(x, y) for x, y, _ in points] == point
 
 
-def test_chances_are_told_where_a_method_states_them() -> None:
+def test_section_of_chances_needs_a_method_with_chances() -> None:
     assert "chances" not in sections(by_distance())
     chances = sections(by_likelihood())["chances"]
     calibration, coverage = chances.plots
@@ -125,42 +127,44 @@ def test_chances_are_told_where_a_method_states_them() -> None:
     assert len(right.y) == len(answered.y)
 
 
-def test_queries_of_which_nothing_was_left_and_none_failed() -> None:
-    lost = by_likelihood().queries.assign(
+def test_report_of_empty_queries_has_no_failures() -> None:
+    queries = by_likelihood().queries.assign(
         query_length=0, error_m=np.inf, chance=np.nan, right=np.nan, best_cell_id=None
     )
-    page = evaluation_page(replace(by_likelihood(), queries=lost), CITY, name="town")
+    page = evaluation_page(replace(by_likelihood(), queries=queries), CITY, name="town")
     assert "Of 60 the distortion left nothing" in page.sections[0].text[0]
     assert "failures" not in [section.name for section in page.sections]
 
 
-def test_another_database_is_refused() -> None:
+def test_report_with_another_database_is_refused() -> None:
     with refused(InputError, "searched", "give the database"):
         evaluation_page(by_distance(), CITY.select(slice(5)), name="town")
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the page of an evaluation."""
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the HTML file of the report of an evaluation."""
     page = evaluation_page(by_likelihood(), CITY, name="town <1>", command="semsig evaluate 'a b'")
     file = tmp_path_factory.mktemp("page") / "report.html"
     write_page(page, file)
     return file
 
 
-def test_the_page_holds_everything(written: Path) -> None:
-    page = HtmlPage(written.read_text("utf-8"))
-    assert all(one.startswith("data:") for one in page.loaded)
+def test_page_has_all_texts_and_loads_no_files(page_file: Path) -> None:
+    page = HtmlPage(page_file.read_text("utf-8"))
+    assert all(address.startswith("data:") for address in page.loaded)
     headline = evaluation_headline(by_likelihood())
     for text in ("town <1>", headline, "semsig evaluate 'a b'", "processors"):
         assert text in page.text
 
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
-def test_the_page_in_a_browser(browser: Chrome, written: Path, width: int, height: int) -> None:
-    shown = MapPage(browser, written.parent)
+def test_page_fits_the_screen_of_a_browser(
+    browser: Chrome, page_file: Path, width: int, height: int
+) -> None:
+    shown = MapPage(browser, page_file.parent)
     with shown.screen(width, height, mobile=width < 500):
-        browser.get(written.as_uri())
+        browser.get(page_file.as_uri())
         images = shown.all("img")
         assert len(images) == 1 + 1 + 2 + 2 + 12
         assert all(image.get_attribute("alt") for image in images)

@@ -15,43 +15,45 @@ CITY = random_town().database
 
 
 @pytest.mark.parametrize("most", [400, 3])
-def test_cells_and_queries_are_where_they_are(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_map_has_the_places_of_cells_and_queries(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(outcomes, "MOST_SQUARES", most)
     evaluation = evaluate(CITY, queries=40, distortion="strong")
-    made = outcomes.outcome_map(evaluation, CITY, name="a", title="A")
-    assert max(made.ground.shape) <= most
+    result = outcomes.outcome_map(evaluation, CITY, name="a", title="A")
+    assert max(result.ground.shape) <= most
     corner = CITY.xy.min(axis=0) - CITY.grid.step / 2
-    columns, rows = np.floor((CITY.xy - corner) / made.step).astype(int).T
-    seen = np.zeros_like(made.ground)
-    seen[rows, columns] = True
-    assert np.array_equal(made.ground, seen)
+    columns, rows = np.floor((CITY.xy - corner) / result.step).astype(int).T
+    ground = np.zeros_like(result.ground)
+    ground[rows, columns] = True
+    assert np.array_equal(result.ground, ground)
     points = evaluation.queries.geometry
-    assert made.places + corner == pytest.approx(np.column_stack([points.x, points.y]))
-    assert made.successful.tolist() == evaluation.successful.tolist()
+    assert result.places + corner == pytest.approx(np.column_stack([points.x, points.y]))
+    assert result.successful.tolist() == evaluation.successful.tolist()
 
 
 @pytest.mark.parametrize("places", [0, 5, 600, 2500])
 def test_outcomes_differ_in_colour_and_shape(places: int) -> None:
-    made = draw_map(outcome_map(places=places))
-    assert draw_map(outcome_map(places=places)) == made  # to the byte
+    result = draw_map(outcome_map(places=places))
+    assert draw_map(outcome_map(places=places)) == result  # to the byte
     failed, successful = places // 2, places - places // 2
     counts = {f"successful: {successful:,}", f"failed: {failed:,}"}
-    assert {*counts, "N", "5 m"} <= set(texts(made.svg))
-    assert f"Queries successful: {successful:,}, failed: {failed:,}." in made.description
-    svg = made.svg.decode()
+    assert {*counts, "N", "5 m"} <= set(texts(result.svg))
+    assert f"Queries successful: {successful:,}, failed: {failed:,}." in result.description
+    svg = result.svg.decode()
     assert all(f"fill: {mark.colour}" in svg for mark in OUTCOMES.values())
-    # Many are pixels.
+    # Many places are drawn as pixels.
     assert svg.count("<use") < 2000
 
 
 @pytest.mark.parametrize("shape", [(1, 300), (300, 1), (1, 1)])
-def test_cities_of_any_shape(shape: tuple[int, int]) -> None:
-    made = draw_map(outcome_map(ground=np.ones(shape, np.bool_)))
-    assert "Places" in texts(made.svg)
+def test_maps_of_narrow_cities_are_drawn(shape: tuple[int, int]) -> None:
+    result = draw_map(outcome_map(ground=np.ones(shape, np.bool_)))
+    assert "Places" in texts(result.svg)
 
 
 @pytest.mark.parametrize("text", [HARM, LONG, "$", ""])
-def test_text_from_data_breaks_nothing(text: str) -> None:
-    made = draw_map(outcome_map(title=text))
-    assert b"<script>" not in made.svg
-    assert max(map(len, texts(made.svg))) < 80
+def test_text_from_data_is_escaped_and_truncated(text: str) -> None:
+    result = draw_map(outcome_map(title=text))
+    assert b"<script>" not in result.svg
+    assert max(map(len, texts(result.svg))) < 80

@@ -1,4 +1,4 @@
-"""Pages and files of a report: in a real browser, and with text that tries to do harm."""
+"""Pages and files of a report, also in a browser and with hostile texts."""
 
 from __future__ import annotations
 
@@ -31,27 +31,20 @@ if TYPE_CHECKING:
 
     from selenium.webdriver import Chrome
 
-    from semsig_gis.reports import Report
 
 FLOATS = st.none() | st.floats()
 TEXTS = st.text(max_size=20) | st.sampled_from(["=1+1", "\t@a", "+", "-2", "a,b", 'a"b', "a\nb"])
 
 
-def written(given: Report, folder: Path) -> dict[str, bytes]:
-    """Write a report; return what the folder holds."""
-    write_report(given, folder)
-    return contents(folder)
-
-
 @pytest.fixture(scope="module")
-def reported(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return what gives the folder of a report, with texts that try to do harm if any are given."""
+def report_folder(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return a function for the folder of a report with a hostile text, or with none if empty."""
 
     @functools.cache
     def folder(harm: str) -> Path:
-        place = tmp_path_factory.mktemp("reported")
-        write_report(hostile_report(harm) if harm else ordinary_report(), place)
-        return place
+        path = tmp_path_factory.mktemp("report")
+        write_report(hostile_report(harm) if harm else ordinary_report(), path)
+        return path
 
     return folder
 
@@ -66,18 +59,18 @@ def rows(text: bytes) -> list[dict[str, str]]:
 
 
 def strict(text: bytes) -> Any:  # noqa: ANN401
-    """Read JSON without the words that only some readers know."""
+    """Read JSON without NaN and Infinity, which only some readers accept."""
 
-    def refuse(word: str) -> None:
-        pytest.fail(f"{word} is not JSON")
+    def refuse(constant: str) -> None:
+        pytest.fail(f"{constant} is not JSON")
 
     return json.loads(text, parse_constant=refuse)
 
 
-def harmless(text: str) -> HtmlPage:
-    """Return a page, which must load nothing and run nothing."""
+def harmless_page(text: str) -> HtmlPage:
+    """Return a page, which must load no files and run no scripts."""
     page = HtmlPage(text)
-    assert all(one.startswith("data:") for one in page.loaded)
+    assert all(address.startswith("data:") for address in page.loaded)
     assert page.tags.isdisjoint({"script", "iframe", "object", "svg", "base", "form"})
     assert not re.search(r"url\(|@import", text.partition("</style>")[0])
     assert "default-src 'none'" in text
@@ -85,33 +78,35 @@ def harmless(text: str) -> HtmlPage:
     return page
 
 
-def test_what_is_written(
-    reported: Callable[[str], Path], tmp_path: Path, snapshot: Callable[[str, str], None]
+def test_files_of_a_report_match_their_snapshots(
+    report_folder: Callable[[str], Path], tmp_path: Path, snapshot: Callable[[str, str], None]
 ) -> None:
-    files = written(ordinary_report(), tmp_path / "new" / "folder")
-    assert files == contents(reported(""))
+    write_report(ordinary_report(), tmp_path / "new" / "folder")
+    files = contents(tmp_path / "new" / "folder")
+    assert files == contents(report_folder(""))
     texts = {"numbers.csv", "figures/errors.csv", "report.json", "report.md"}
     for name in texts:
         text = files[name].decode().replace(__version__, "VERSION")
         snapshot(f"ordinary-{Path(name).name}", text)
-    drawn = ("errors", "place", "other", "where", "true", "taken")
-    figures = {f"figures/{one}.{kind}" for one in drawn
-               for kind in ("png", "svg")}  # fmt: skip
+    names = ("errors", "place", "other", "where", "true", "taken")
+    figures = {f"figures/{name}.{kind}" for name in names for kind in ("png", "svg")}
     assert set(files) == texts | figures | {"report.html"}
-    page = harmless(files["report.html"].decode())
+    page = harmless_page(files["report.html"].decode())
     for text in ("Report", "What it is.", "city.parquet", "Range", "0.2100", "0.1793", "infinite",
                  "Half of it.", "Two lamps.", "semsig evaluate city.parquet"):  # fmt: skip
         assert text in page.text
-    assert sum(one.startswith("data:image/svg+xml;base64,") for one in page.loaded) == len(drawn)
+    svgs = [address.startswith("data:image/svg+xml;base64,") for address in page.loaded]
+    assert sum(svgs) == len(names)
     assert all(name.encode() in files["report.html"] for name in figures)
 
 
 @pytest.mark.parametrize("harm", [HARM, LONG, "\ud83d"])
-def test_text_from_data_stays_text(harm: str, reported: Callable[[str], Path]) -> None:
-    given = hostile_report(harm)
-    files = contents(reported(harm))
-    harmless(files["report.html"].decode())
-    assert strict(files["report.json"])["title"] == given.title
+def test_files_with_hostile_texts_are_harmless(
+    harm: str, report_folder: Callable[[str], Path]
+) -> None:
+    files = contents(report_folder(harm))
+    harmless_page(files["report.html"].decode())
+    assert strict(files["report.json"])["title"] == harm
     assert len(rows(files["numbers.csv"])) == 3
     for name, content in files.items():
         if name.endswith(".csv"):
@@ -119,22 +114,22 @@ def test_text_from_data_stays_text(harm: str, reported: Callable[[str], Path]) -
             assert not any(cell.startswith("=") for cell in cells)
 
 
-def test_a_page_alone_names_no_files(tmp_path: Path) -> None:
+def test_single_page_has_no_links_to_files(tmp_path: Path) -> None:
     write_page(ordinary_report(), tmp_path / "page.html")
     assert list(contents(tmp_path)) == ["page.html"]
     text = (tmp_path / "page.html").read_text("utf-8")
     assert 'href="figures' not in text
     assert "numbers.csv" not in text
-    assert "0.1793" in harmless(text).text
+    assert "0.1793" in harmless_page(text).text
 
 
-def test_text_is_shown_as_it_is() -> None:
+def test_special_characters_are_shown_unchanged() -> None:
     text = 'a < b & "c" {{ 7 * 7 }} {% raw %} it\'s'
-    given = report(Section(name="a", title=text), title=text)
-    assert HtmlPage(html_page(given, {})).text.count(text) == 4  # title, heading, contents, section
+    page = html_page(report(Section(name="a", title=text), title=text), {})
+    assert HtmlPage(page).text.count(text) == 4  # title, heading, contents, section
 
 
-def test_wide_and_long_tables() -> None:
+def test_too_wide_table_has_joined_rows() -> None:
     wide = [
         Number(row, f"column {column}", 0.5, low=0.4, high=0.6, paper=0.5)
         for column in range(5)
@@ -147,9 +142,9 @@ def test_wide_and_long_tables() -> None:
 
 
 @pytest.mark.parametrize("harm", [HARM, LONG])
-def test_markdown_keeps_its_shape(harm: str, reported: Callable[[str], Path]) -> None:
-    text = (reported(harm) / "report.md").read_bytes().decode()
-    # No mark of the data's own is left: not of HTML, images, code, emphasis, tables or formulas.
+def test_markdown_escapes_hostile_texts(harm: str, report_folder: Callable[[str], Path]) -> None:
+    text = (report_folder(harm) / "report.md").read_bytes().decode()
+    # No markup of the data remains: no HTML, images, code, emphasis, tables or formulas.
     assert "<" not in text
     bare = re.sub(r"\\.", "", text.replace("![", "").replace("](figures/", ""))
     assert not set(bare) & set("`[]{}~$_\0\r\u202e")
@@ -160,9 +155,9 @@ def test_markdown_keeps_its_shape(harm: str, reported: Callable[[str], Path]) ->
     assert len(headings) == 4
 
 
-def test_markdown_begins_no_list_by_chance() -> None:
-    given = report(text=("- not a list", "1. nor this", "# nor a heading", "+1", "0.5 m"))
-    lines = markdown_page(given, {}).splitlines()[2::2]
+def test_markdown_escapes_the_start_of_a_paragraph() -> None:
+    paragraphs = ("- not a list", "1. nor this", "# nor a heading", "+1", "0.5 m")
+    lines = markdown_page(report(text=paragraphs), {}).splitlines()[2::2]
     assert lines == ["\\- not a list", "1\\. nor this", "\\# nor a heading", "\\+1", "0\\.5 m"]
 
 
@@ -183,13 +178,13 @@ def test_markdown_begins_no_list_by_chance() -> None:
         max_size=6,
     )
 )
-def test_every_number_is_written(numbers: list[Number]) -> None:
-    given = report(Section(name="a", title="A", numbers=tuple(numbers)))
+def test_csv_and_json_have_every_number(numbers: list[Number]) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        files = written(given, Path(folder))
-    table, told = rows(files["numbers.csv"]), strict(files["report.json"])["sections"][0]["numbers"]
-    assert len(table) == len(told) == len(numbers)
-    for number, row, plain in zip(numbers, table, told, strict=True):
+        write_report(report(Section(name="a", title="A", numbers=tuple(numbers))), folder)
+        files = contents(Path(folder))
+    table = rows(files["numbers.csv"])
+    members = strict(files["report.json"])["sections"][0]["numbers"]
+    for number, row, plain in zip(numbers, table, members, strict=True):
         for name in ("ours", "low", "high", "paper", "difference"):
             value = getattr(number, name)
             assert row[name] == ("" if value is None else repr(value))
@@ -202,10 +197,11 @@ def test_every_number_is_written(numbers: list[Number]) -> None:
             assert not row[name].startswith(("=", "+", "-", "@"))
 
 
-def test_other_files_of_the_folder_are_left_alone(tmp_path: Path) -> None:
+def test_other_files_of_the_folder_are_unchanged(tmp_path: Path) -> None:
     for name in ("mine.txt", "report.md"):
         (tmp_path / name).write_text("mine")
-    files = written(report(), tmp_path)
+    write_report(report(), tmp_path)
+    files = contents(tmp_path)
     assert files["mine.txt"] == b"mine" != files["report.md"]
     assert files["numbers.csv"].count(b"\n") == 1
     assert not list(tmp_path.rglob(".semsig-*"))
@@ -213,20 +209,22 @@ def test_other_files_of_the_folder_are_left_alone(tmp_path: Path) -> None:
         write_report(report(), tmp_path / "mine.txt")
 
 
-NO_NAMES = ["", "../up", "a b", "a.b", "a/b", "é", "a\n"]
+BAD_NAMES = ["", "../up", "a b", "a.b", "a/b", "é", "a\n"]
 
 
 @pytest.mark.parametrize(
     ("sections", "word"),
     [
-        *(([Section(name=name, title="A")], "name") for name in NO_NAMES),
-        *(([Section(name="a", title="A", plots=(plot(name),))], "name") for name in NO_NAMES),
-        *(([Section(name="a", title="A", scenes=(scene(name),))], "name") for name in NO_NAMES),
+        *(([Section(name=name, title="A")], "name") for name in BAD_NAMES),
+        *(([Section(name="a", title="A", plots=(plot(name),))], "name") for name in BAD_NAMES),
+        *(([Section(name="a", title="A", scenes=(scene(name),))], "name") for name in BAD_NAMES),
         ([Section(name="a", title="A", plots=(plot("one"),), scenes=(scene("One"),))], "twice"),
         ([Section(name="b", title="B"), Section(name="B", title="B")], "twice"),
     ],
 )
-def test_what_no_files_can_be_called(sections: list[Section], word: str, tmp_path: Path) -> None:
+def test_invalid_and_repeated_names_are_refused(
+    sections: list[Section], word: str, tmp_path: Path
+) -> None:
     with refused(InputError, word):
         write_report(report(*sections), tmp_path / "out")
     assert contents(tmp_path) == {}
@@ -234,12 +232,12 @@ def test_what_no_files_can_be_called(sections: list[Section], word: str, tmp_pat
 
 @pytest.fixture
 def page(browser: Chrome, tmp_path: Path) -> MapPage:
-    """Return what shows a page in a browser."""
+    """Return the page of a browser."""
     return MapPage(browser, tmp_path)
 
 
-def assert_only_its_pictures(page: MapPage, count: int) -> None:
-    """Check that a page shows its pictures, reports no error and asks the network for nothing."""
+def assert_shows_pictures(page: MapPage, count: int) -> None:
+    """Check that a page shows its pictures, reports no error and uses no network."""
     browser = page.browser
     images = page.all("img")
     assert len(images) == count
@@ -254,28 +252,32 @@ def assert_only_its_pictures(page: MapPage, count: int) -> None:
 
 
 @pytest.mark.parametrize("width", [1400, 400])
-def test_a_page_in_a_browser(page: MapPage, width: int, reported: Callable[[str], Path]) -> None:
+def test_page_fits_the_screen_of_a_browser(
+    page: MapPage, width: int, report_folder: Callable[[str], Path]
+) -> None:
     with page.screen(width, 900, mobile=width < 500):
-        page.browser.get((reported("") / "report.html").as_uri())
+        page.browser.get((report_folder("") / "report.html").as_uri())
         assert page.browser.title == "Report"
         assert max(image.size["width"] for image in page.all("figure img")) <= width
         overflow = "return document.documentElement.scrollWidth - window.innerWidth"
         assert page.browser.execute_script(overflow) <= 0
-        assert_only_its_pictures(page, 6)
+        assert_shows_pictures(page, 6)
 
 
-def test_a_page_is_dark_where_that_is_liked(page: MapPage, reported: Callable[[str], Path]) -> None:
+def test_page_follows_the_preferred_colour_scheme(
+    page: MapPage, report_folder: Callable[[str], Path]
+) -> None:
     for mode, most in (("light", 256), ("dark", 90)):
-        liked = {"features": [{"name": "prefers-color-scheme", "value": mode}]}
-        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", liked)
-        page.browser.get((reported("") / "report.html").as_uri())
+        preference = {"features": [{"name": "prefers-color-scheme", "value": mode}]}
+        page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", preference)
+        page.browser.get((report_folder("") / "report.html").as_uri())
         for image in page.all("img"):
             pixels = np.asarray(Image.open(io.BytesIO(image.screenshot_as_png)).convert("L"))
             assert most - 90 < np.median(pixels) < most
     page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
-@pytest.mark.parametrize(("width", "media"), [(900, "screen"), (680, "print")])  # A4 has 680
+@pytest.mark.parametrize(("width", "media"), [(900, "screen"), (680, "print")])  # width of A4
 def test_tables_fit_a_screen_and_a_sheet(page: MapPage, width: int, media: str) -> None:
     times = [
         Number(f"{row} distance", column, 61.2, paper=1850.0, unit="ms", decimals=1)
@@ -300,10 +302,12 @@ def test_tables_fit_a_screen_and_a_sheet(page: MapPage, width: int, media: str) 
 
 
 @pytest.mark.parametrize("harm", [HARM, LONG])
-def test_harm_in_a_browser(page: MapPage, harm: str, reported: Callable[[str], Path]) -> None:
-    page.browser.get((reported(harm) / "report.html").as_uri())
+def test_browser_runs_no_hostile_texts(
+    page: MapPage, harm: str, report_folder: Callable[[str], Path]
+) -> None:
+    page.browser.get((report_folder(harm) / "report.html").as_uri())
     assert page.all("script") == []
     assert one_line(HOSTILE) in page.browser.execute_script("return document.body.textContent")
-    assert_only_its_pictures(page, 5)
-    page.browser.get((reported(harm) / "figures" / "errors.svg").as_uri())
+    assert_shows_pictures(page, 5)
+    page.browser.get((report_folder(harm) / "figures" / "errors.svg").as_uri())
     assert page.all("script") == []

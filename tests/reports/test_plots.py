@@ -4,7 +4,7 @@ import dataclasses
 import re
 import struct
 import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import pytest
@@ -29,7 +29,7 @@ from semsig_gis.reports import (
     label,
     saved,
 )
-from semsig_gis.reports.plots import _look
+from semsig_gis.reports.plots import _line_options
 
 if TYPE_CHECKING:
     from semsig_gis.reports import Picture
@@ -41,55 +41,55 @@ def picture(text: str, *, title: str = "A title") -> Picture:
         return saved(figure, title=title, description="what is seen")
 
 
-def test_a_picture_says_what_it_shows() -> None:
-    made = picture("words", title="A < B\n& C")
-    root = ET.fromstring(made.svg)  # noqa: S314
+def test_picture_has_title_description_and_text() -> None:
+    drawing = picture("words", title="A < B\n& C")
+    root = ET.fromstring(drawing.svg)  # noqa: S314
     assert root.attrib["role"] == "img"
     assert [child.text for child in root[:2]] == ["A < B & C", "what is seen"]
-    assert texts(made.svg) == ["words"]
-    assert made.description == "what is seen"
-    assert made._repr_svg_().encode() == made.svg  # what a notebook shows
-    assert struct.unpack(">II", made.png[16:24]) == (600, 400)
-    # No program, no date and no address is named.
-    assert b"atplotlib" not in made.svg + made.png
-    assert b"DOCTYPE" not in made.svg
+    assert texts(drawing.svg) == ["words"]
+    assert drawing.description == "what is seen"
+    assert drawing._repr_svg_().encode() == drawing.svg  # what a notebook shows
+    assert struct.unpack(">II", drawing.png[16:24]) == (600, 400)
+    # The files contain no program name, no date and no address.
+    assert b"atplotlib" not in drawing.svg + drawing.png
+    assert b"DOCTYPE" not in drawing.svg
     namespaces = {b"http://www.w3.org/2000/svg", b"http://www.w3.org/1999/xlink"}
-    found = {part.partition(b'"')[0] for part in made.svg.split(b'"')[1::2] if b"://" in part}
-    assert found <= namespaces
+    addresses = {text for text in drawing.svg.split(b'"')[1::2] if b"://" in text}
+    assert addresses <= namespaces
 
 
-def test_a_plot_is_the_same_bytes_whatever_a_user_has_set_and_changes_no_setting() -> None:
-    given = plot(curves=9, paper=((3.0, 0.5, "a"), (5.0, 0.7, "b")), diagonal=True)
-    before = draw_plot(given)
+def test_plot_does_not_depend_on_settings_of_the_user_and_does_not_change_them() -> None:
+    example = plot(curves=9, paper=((3.0, 0.5, "a"), (5.0, 0.7, "b")), diagonal=True)
+    expected = draw_plot(example)
     with mpl.rc_context({"font.size": 30, "svg.fonttype": "path", "savefig.facecolor": "red"}):
-        mine = dict(mpl.rcParams)
-        assert draw_plot(given) == before
-        assert dict(mpl.rcParams) == mine
+        settings = dict(mpl.rcParams)
+        assert draw_plot(example) == expected
+        assert dict(mpl.rcParams) == settings
 
 
 @pytest.mark.parametrize(
     "text", ["$\\frac{", "a$b$c", "\u4e2d\u6587", "\U0001f333", "<script>&amp;", "\\", "{x}", "%s"]
 )
-def test_text_is_drawn_as_it_is(text: str) -> None:
+def test_special_characters_are_drawn_unchanged(text: str) -> None:
     assert texts(picture(text).svg) == [text]
 
 
 @given(st.text(max_size=30), st.integers(1, 20))
 @example("0 \x1b\r0", 4)
-def test_a_label_fits(text: str, length: int) -> None:
+def test_label_is_truncated_to_its_length(text: str, length: int) -> None:
     cut = label(text, length)
     assert len(cut) <= length
     assert cut == label(cut, length)
     assert cut == label(text, 1000) or cut.endswith("…")
 
 
-def test_wide_letters_count_twice() -> None:
+def test_wide_letters_of_a_label_count_twice() -> None:
     assert label("\u4e2d\u6587\u6a39", 6) == "\u4e2d\u6587\u6a39"
     assert label("\u4e2d\u6587\u6a39", 5) == "\u4e2d\u6587…"
     assert label("\u4e2d\u6587\u6a39", 4) == "\u4e2d…"
 
 
-def test_a_legend_shows_every_key_in_columns() -> None:
+def test_legend_shows_every_key_in_columns() -> None:
     keys = [(Line2D([], [], color=colour), f"_{colour}") for colour in COLOURS]
     with blank_figure(6, 2) as figure:
         draw_legend(figure, keys, place=(0, 1, 1), columns=4, size=8, sign_width=2)
@@ -102,58 +102,60 @@ def test_a_legend_shows_every_key_in_columns() -> None:
 
 @pytest.mark.parametrize("points", [1, 2, 12, 13, 300])
 @pytest.mark.parametrize("curves", [0, 1, 9])
-def test_a_plot_names_all_its_curves(curves: int, points: int) -> None:
-    given = plot(curves=curves, points=points)
-    made = draw_plot(given)
-    shown = texts(made.svg)
-    assert {curve.label for curve in given.curves} <= set(shown)
+def test_legend_and_description_have_all_curves(curves: int, points: int) -> None:
+    example = plot(curves=curves, points=points)
+    drawing = draw_plot(example)
+    shown = texts(drawing.svg)
+    assert {curve.label for curve in example.curves} <= set(shown)
     assert {"Errors", "error (m)", "share"} <= set(shown)
     assert ("interval of 95 %" in shown) == (curves > 0)
-    assert all(curve.label in made.description.lower() for curve in given.curves)
+    assert all(curve.label in drawing.description.lower() for curve in example.curves)
 
 
-def test_no_two_curves_look_alike() -> None:
-    looks = [_look(number) for number in range(100)]
-    without_colour = [(str(one["linestyle"]), one["marker"]) for one in looks[:28]]
-    assert len(set(without_colour)) == 28
-    assert len({(str(one["color"]), str(one["linestyle"]), one["marker"]) for one in looks}) == 100
+def test_all_curves_of_a_plot_look_different() -> None:
+    lines = [
+        (str(line["linestyle"]), line["marker"], line["color"])
+        for line in map(_line_options, range(100))
+    ]
+    assert len({line[:2] for line in lines[:28]}) == 28  # in black and white
+    assert len(set(lines)) == 100
     assert len(set(COLOURS) - {GROUND}) == len(COLOURS)
 
 
-def test_points_of_the_paper_are_numbered_where_there_are_several() -> None:
-    one = texts(draw_plot(plot(paper=((5.0, 0.5, "Table 5"),))).svg)
-    assert "paper: Table 5" in one
-    two = texts(draw_plot(plot(paper=((5.0, 0.5, "Table 5"), (29.0, 0.7, "Table 6")))).svg)
-    assert {"1", "2", "paper 1: Table 5", "paper 2: Table 6"} <= set(two)
+def test_several_points_of_the_paper_are_numbered() -> None:
+    first, second = (5.0, 0.5, "Table 5"), (29.0, 0.7, "Table 6")
+    assert "paper: Table 5" in texts(draw_plot(plot(paper=(first,))).svg)
+    shown = texts(draw_plot(plot(paper=(first, second))).svg)
+    assert {"1", "2", "paper 1: Table 5", "paper 2: Table 6"} <= set(shown)
 
 
-def test_intervals_are_drawn_where_they_are() -> None:
+def test_intervals_are_drawn_as_bars_or_bands() -> None:
     few = Curve(label="few", x=(1.0, 2.0), y=(0.5, 0.6), low=(0.4, 0.5), high=(0.6, 0.7))
     many = plot(curves=1).curves[0]
     for curve, kind in ((few, "LineCollection"), (many, "FillBetweenPolyCollection")):
         with blank_figure(3, 3) as figure:
             axes = figure.add_subplot()
             draw_curve(axes, curve, 0, 1)
-            drawn = axes.collections[0]
-            assert type(drawn).__name__ in {kind, "PolyCollection"}
-            corners = drawn.get_datalim(axes.transData)
+            artist = axes.collections[0]
+            assert type(artist).__name__ in {kind, "PolyCollection"}
+            corners = artist.get_datalim(axes.transData)
             assert corners.y0 == pytest.approx(min(curve.low))
             assert corners.y1 == pytest.approx(max(curve.high))
 
 
-def test_ticks_are_the_values_where_they_are_few() -> None:
+def test_ticks_of_few_values_are_the_values() -> None:
     curve = Curve(label="P", x=(8.0, 16.0, 24.0, 32.0), y=(0.3, 0.4, 0.4, 0.4))
     shown = texts(draw_plot(dataclasses.replace(plot(), curves=(curve,))).svg)
     assert {"8", "16", "24", "32"} <= set(shown)
     assert "20" not in shown
 
 
-def test_ticks_may_have_names() -> None:
+def test_names_of_ticks_are_drawn_and_described() -> None:
     ticks = ((0.0, "few"), (1.0, "some"), (2.0, "many"))
     curve = Curve(label="P", x=(0.0, 2.0), y=(0.3, 0.4))
-    made = draw_plot(dataclasses.replace(plot(), curves=(curve,), ticks=ticks))
-    assert {"few", "some", "many"} <= set(texts(made.svg))
-    assert "P: 0.3 at few, 0.4 at many." in made.description
+    drawing = draw_plot(dataclasses.replace(plot(), curves=(curve,), ticks=ticks))
+    assert {"few", "some", "many"} <= set(texts(drawing.svg))
+    assert "P: 0.3 at few, 0.4 at many." in drawing.description
 
 
 @pytest.mark.parametrize(
@@ -166,33 +168,33 @@ def test_ticks_may_have_names() -> None:
         ((0.0,), {"0"}, {"5"}),
     ],
 )
-def test_an_axis_may_be_logarithmic(
+def test_ticks_of_a_logarithmic_axis(
     x: tuple[float, ...], shown: set[str], hidden: set[str]
 ) -> None:
     curve = Curve(label="P", x=x, y=(0.33,) * len(x))
     paper = ((x[-1], 0.33, "one"), (x[0], 0.32, "two"))
-    given = dataclasses.replace(plot(), curves=(curve,), log=True, y_range=(0.31, 0.35))
-    drawn = texts(draw_plot(given).svg)
-    assert shown <= set(drawn)
-    assert hidden.isdisjoint(drawn)
-    assert {"1", "2"} <= set(texts(draw_plot(dataclasses.replace(given, paper=paper)).svg))
+    example = dataclasses.replace(plot(), curves=(curve,), log=True, y_range=(0.31, 0.35))
+    labels = texts(draw_plot(example).svg)
+    assert shown <= set(labels)
+    assert hidden.isdisjoint(labels)
+    assert {"1", "2"} <= set(texts(draw_plot(dataclasses.replace(example, paper=paper)).svg))
 
 
-def test_a_drawing_has_other_colours_in_the_dark() -> None:
-    made = draw_plot(plot(curves=9, diagonal=True)).svg
-    dark = in_the_dark(made).decode()
+def test_dark_drawing_has_rules_for_all_colours() -> None:
+    drawing = draw_plot(plot(curves=9, diagonal=True)).svg
+    dark = in_the_dark(drawing).decode()
     ET.fromstring(dark)  # noqa: S314
     style = dark.partition("<style>")[2].partition("</style>")[0]
-    assert dark.replace(f"<style>{style}</style>", "") == made.decode()
-    for light, other in DARK.items():
-        assert f'[style*="fill: {light}"]{{fill:{other}!important}}' in style
+    assert dark.replace(f"<style>{style}</style>", "") == drawing.decode()
+    for light, colour in DARK.items():
+        assert f'[style*="fill: {light}"]{{fill:{colour}!important}}' in style
     assert {f"fill: {GROUND}", f"fill: {INK}", f"stroke: {GRID}"} <= set(
-        re.findall(r"(?:fill|stroke): #[0-9a-f]{6}", made.decode())
+        re.findall(r"(?:fill|stroke): #[0-9a-f]{6}", drawing.decode())
     )
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_values_that_are_no_numbers(value: float) -> None:
+def test_plots_with_nan_and_infinity_are_drawn(value: float) -> None:
     for x, y in (((0.0, value), (0.5, 1.0)), ((0.0, 1.0), (value, 1.0)), ((value,), (value,))):
         curve = Curve(label="odd", x=x, y=y)
         many = Curve(label="many", x=tuple(map(float, range(40))), y=(value,) * 40)
@@ -200,16 +202,9 @@ def test_values_that_are_no_numbers(value: float) -> None:
 
 
 @pytest.mark.parametrize("text", [HARM, LONG, "_", "$", ""])
-def test_text_from_data_breaks_nothing(text: str) -> None:
+def test_text_from_data_is_escaped_and_truncated(text: str) -> None:
     curve = Curve(label=text, x=(0.0, 1.0), y=(0.5, 0.6))
-    given = Plot(
-        name="a",
-        title=text,
-        x_label=text,
-        y_label=text,
-        curves=(curve,) * 9,
-        paper=((0.5, 0.5, text),),
-    )
-    made = draw_plot(given)
-    assert b"<script>" not in made.svg
-    assert max(map(len, texts(made.svg))) < 80
+    labels: dict[str, Any] = {"title": text, "x_label": text, "y_label": text}
+    drawing = draw_plot(Plot(name="a", **labels, curves=(curve,) * 9, paper=((0.5, 0.5, text),)))
+    assert b"<script>" not in drawing.svg
+    assert max(map(len, texts(drawing.svg))) < 80

@@ -1,4 +1,4 @@
-"""Tables of results: of databases, evaluations, experiments, identifiability, loads and updates."""
+"""Tables of databases, evaluations, experiments, identifiability, loads and updates."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ STREETS = replace(
 EVALUATION = evaluate(SIX, queries=6, method=Method.parse("edit+edit:5%"), seed=1)
 TIMED = replace(EVALUATION, seconds_per_query=0.0125)
 QUIET = QuerySpec(distortions=parse_chain("medium:resort=false, view:90"), seeds=(1, 2))
-LOST = EVALUATION.queries.assign(error_m=np.inf, heading_error=np.arange(6) * 20.0)
+UNLOCALIZED = EVALUATION.queries.assign(error_m=np.inf, heading_error=np.arange(6) * 20.0)
 
 DATABASE = random_database(5, cells=150)
 LIGHT = named_noise("light")
@@ -169,7 +169,7 @@ UPDATE = UpdateReport(
 
 TABLES: dict[str, tuple[Table, ...]] = {
     "database-cells": database_tables(SIX, file_bytes=1_500_000),
-    # An object that no cell sees is there all the same.
+    # With an object that no cell sees.
     "database-objects": database_tables(SIX, object_counts={3: 2, 1: 1, 11: 1}),
     "database-streets": database_tables(STREETS),
     "database-long": database_tables(LONG),
@@ -177,7 +177,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
     "evaluation-paper": evaluation_tables(TIMED),
     "evaluation-other": evaluation_tables(replace(TIMED, asked=QUIET, city="b")),
     "evaluation-none": evaluation_tables(
-        replace(TIMED, asked=QuerySpec(distortions=()), queries=LOST)
+        replace(TIMED, asked=QuerySpec(distortions=()), queries=UNLOCALIZED)
     ),
     "identifiability": (
         *identifiability_tables(CHANCES),
@@ -190,13 +190,13 @@ TABLES: dict[str, tuple[Table, ...]] = {
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_what_the_tables_say(name: str, snapshot: Callable[[str, str], None]) -> None:
+def test_tables_match_their_snapshots(name: str, snapshot: Callable[[str, str], None]) -> None:
     tables = TABLES[name]
     assert all(len(row) == len(table.columns) for table in tables for row in table.rows)
     snapshot(f"{name}.md", "\n".join(table.markdown() for table in tables))
 
 
-def test_markdown_of_a_database_escapes_text_from_data() -> None:
+def test_markdown_of_tables_escapes_text_from_data() -> None:
     texts = [table.markdown() for table in TABLES["database-cells"]]
     assert "Crossing \\| zebra (z)" in texts[0]
     for table in texts:
@@ -204,19 +204,19 @@ def test_markdown_of_a_database_escapes_text_from_data() -> None:
         assert len({line.replace("\\|", "").count("|") for line in lines}) == 1
 
 
-def test_properties_that_can_be_counted_by_hand() -> None:
+def test_properties_of_a_database_match_a_count_by_hand() -> None:
     _, properties, groups, classes = map(rows, TABLES["database-cells"])
     assert properties["Signatures"] == ("6", "312,134")
     assert properties["Largest group by type"] == ("DD, 3 cells", "DDD, 29,958 cells")
     assert groups["count"] == ("3", "3", "4", "140,296", "204,891")
     assert groups["cells alone in their group"][:3] == ("16.7 %", "16.7 %", "33.3 %")
-    # Seven in six cells, each of which looks at 2,827 m2.
+    # Seven in six cells, where each cell sees 2,827 m2.
     assert classes["Street light (D)"] == ("30", "412.6", "1.459")
     outdoor = replace(SIX, viewpoints=ViewpointSpec(mode="outdoor"))
     assert rows(database_tables(outdoor)[1])["Viewpoints"][0] == "cells outside buildings"
 
 
-def test_figures_are_those_of_the_evaluation() -> None:
+def test_figures_agree_with_the_evaluation() -> None:
     figures = rows(TABLES["evaluation-paper"][1])
     mean = EVALUATION.cdf([50])[0]
     low, high = wilson_interval(mean, 6)
@@ -250,7 +250,7 @@ def test_other_settings_are_not_compared_with_the_paper(changed: dict[str, objec
     ("radius", "levels", "p50", "recall10"),
     [(20.0, 16, "0.1793", "0.5110"), (40.0, 16, "0.4946", "0.7269"), (30.0, 24, "0.3861", "")],
 )
-def test_the_paper_has_figures_for_other_ranges_and_levels(
+def test_figures_of_the_paper_for_other_ranges_and_levels(
     radius: float, levels: int, p50: str, recall10: str
 ) -> None:
     facts = {**EVALUATION.database, "radius_m": radius, "levels": levels}
@@ -258,28 +258,29 @@ def test_the_paper_has_figures_for_other_ranges_and_levels(
     assert (figures["P(error ≤ 50 m)"][2], figures["recall@10 %"][2]) == (p50, recall10)
 
 
-def test_figures_of_every_case_of_an_experiment() -> None:
+def test_experiment_figures_have_every_case() -> None:
     table = experiment_figures(RESULTS)
     assert list(dict.fromkeys(table["case"])) == [case.name for case in SPEC.cases]
     for name, evaluation in RESULTS.items():
-        mine = table[table["case"] == name].set_index("figure")
+        figures = table[table["case"] == name].set_index("figure")
         errors = evaluation.queries["error_m"]
-        assert mine["value"]["error_median"] == pytest.approx(np.median(errors))
-        assert mine["n"]["error_median"] == 40
-        assert ("coverage" in mine.index) == ("light" in name)
-        assert "heading_error_median" not in mine.index
+        assert figures["value"]["error_median"] == pytest.approx(np.median(errors))
+        assert figures["n"]["error_median"] == 40
+        assert ("coverage" in figures.index) == ("light" in name)
+        assert "heading_error_median" not in figures.index
 
 
-def test_tables_of_an_experiment(snapshot: Callable[[str, str], None]) -> None:
+def test_tables_of_an_experiment_match_their_snapshot(snapshot: Callable[[str, str], None]) -> None:
     tables = experiment_tables(SPEC, RESULTS)
     assert {table.columns[-1] for table in tables[1:]} == {"s a query"}
     assert all(len(row) == len(table.columns) for table in tables for row in table.rows)
     case = RESULTS["some/paper-top1"]
-    lost = replace(case, queries=case.queries.assign(error_m=np.inf))
-    snapshot("experiment.md", experiment_markdown(SPEC, {**RESULTS, "some/paper-top1": lost}))
+    unlocalized = replace(case, queries=case.queries.assign(error_m=np.inf))
+    results = {**RESULTS, "some/paper-top1": unlocalized}
+    snapshot("experiment.md", experiment_markdown(SPEC, results))
 
 
-def test_a_comparison_says_what_is_proven() -> None:
+def test_comparison_table_has_a_verdict_for_significant_differences() -> None:
     figures = [
         ("p50", 0.5, 0.6, 0.1, 0.05, 0.2),
         ("p5", 0.5, 0.4, -0.1, -0.2, 0.0),
@@ -297,7 +298,7 @@ def test_a_comparison_says_what_is_proven() -> None:
 
 
 @pytest.mark.parametrize(
-    ("difference", "low", "high", "said"),
+    ("difference", "low", "high", "text"),
     [
         (0.041, 0.019, 0.063, "B places 4.1 points more queries within 50 m than A (95 %: 1.9 to"),
         (-0.041, -0.063, -0.019, "4.1 points fewer queries within 50 m than A (95 %: 1.9 to 6.3)"),
@@ -307,15 +308,15 @@ def test_a_comparison_says_what_is_proven() -> None:
         (0.0, 0.0, 0.0, "B places as many queries within 50 m as A."),
     ],
 )  # fmt: skip
-def test_a_comparison_in_words(difference: float, low: float, high: float, said: str) -> None:
+def test_sentence_of_a_comparison(difference: float, low: float, high: float, text: str) -> None:
     row = {"figure": "p50", "first": 0.5, "second": 0.5 + difference, "difference": difference}
     comparison = pd.DataFrame([{**row, "low": low, "high": high}])
     sentence = comparison_sentence(comparison, (1120, 79), names=("A", "B"))
-    assert said in sentence
+    assert text in sentence
     assert (": 1,120 queries gained, 79 lost." in sentence) == any((difference, low, high))
 
 
-def test_tables_of_identifiability_have_its_numbers() -> None:
+def test_tables_agree_with_the_identifiability() -> None:
     whole, plain, counted, *_ = TABLES["identifiability"]
     facts, cells = CHANCES.summary(), rows(whole)
     assert cells["chance that the answer is within 30 m"] == (
@@ -327,37 +328,37 @@ def test_tables_of_identifiability_have_its_numbers() -> None:
     assert rows(counted)["Street light (D)"][2:] == ("10", f"{1e5 * gain / 10:+.3f} %")
 
 
-def test_the_numbers_of_a_page_are_those_of_the_check(tmp_path: Path) -> None:
+def test_report_of_identifiability_agrees_with_its_check(tmp_path: Path) -> None:
     index = build_index(random_town().database, LIGHT)
-    told = identify(index, trials=40, class_trials=5)
-    check = check_identifiability(told, index, queries=60)
-    page = identifiability_page(told, check, name="<town>", object_counts={3: 5})
-    found = f"{100 * check.found:.0f} % were."
-    assert page.headline.endswith(f"; of 60 fresh ones, {found}")
-    parts = {one.name: one for one in page.sections}
-    ranks = {one.row: one.ours for one in parts["ranks"].numbers}
+    chances = identify(index, trials=40, class_trials=5)
+    check = check_identifiability(chances, index, queries=60)
+    page = identifiability_page(chances, check, name="<town>", object_counts={3: 5})
+    assert page.headline.endswith(f"; of 60 fresh ones, {100 * check.found:.0f} % were.")
+    sections = {section.name: section for section in page.sections}
+    ranks = {number.row: number.ours for number in sections["ranks"].numbers}
     assert ranks["chance to be found"] == check.correlations["found"]
-    (plot,) = parts["calibration"].plots
+    calibration = sections["calibration"]
+    (plot,) = calibration.plots
     assert plot.diagonal
-    assert plot.curves[0].x == tuple(one.stated for one in check.bins)
-    assert plot.curves[0].y == tuple(one.true for one in check.bins)
-    asked = [one.ours for one in parts["calibration"].numbers if one.column == "queries"]
-    assert sum(one or 0 for one in asked) == 60
-    assert any(one.column == "objects" for one in parts["classes"].numbers)
+    assert plot.curves[0].x == tuple(item.stated for item in check.bins)
+    assert plot.curves[0].y == tuple(item.true for item in check.bins)
+    assert sum(item.ours or 0 for item in calibration.numbers if item.column == "queries") == 60
+    assert any(number.column == "objects" for number in sections["classes"].numbers)
     write_report(page, tmp_path)
     assert "&lt;town&gt;" in (tmp_path / "report.html").read_text("utf-8")
     assert (tmp_path / "figures" / "identifiability-calibration.svg").is_file()
 
 
-def test_what_there_is_nothing_of_is_left_out() -> None:
-    nothing = dict.fromkeys(CHECK.correlations, math.nan)
-    check = replace(CHECK, correlations=nothing, attainable=math.nan)
+def test_empty_parts_of_tables_and_reports_are_omitted() -> None:
+    correlations = dict.fromkeys(CHECK.correlations, math.nan)
+    check = replace(CHECK, correlations=correlations, attainable=math.nan)
     assert check_tables(check)[1].note == ""
     page = identifiability_page(CHANCES, check, name="town")
-    ranks = next(one for one in page.sections if one.name == "ranks")
-    assert {one.ours for one in ranks.numbers} == {None}
-    assert ranks.text == ()
-    assert not any(one.column == "objects" for part in page.sections for one in part.numbers)
+    ranks = page.sections[-1]
+    assert (ranks.name, ranks.text) == ("ranks", ())
+    assert {number.ours for number in ranks.numbers} == {None}
+    columns = {number.column for section in page.sections for number in section.numbers}
+    assert "objects" not in columns
     objects, *others = quality_tables(replace(LOAD, conflated=(), absent=(), unread=()))
     assert objects.note.endswith("of the class.")
     assert [table.title for table in others] == ["Rows by layer", "Place", "Licences"]

@@ -41,65 +41,63 @@ def evaluation() -> Evaluation:
 
 
 @pytest.mark.parametrize("successful", [True, False])
-def test_scenes_show_what_is_there(successful: bool) -> None:  # noqa: FBT001
+def test_example_scenes_have_the_objects_of_the_city(successful: bool) -> None:  # noqa: FBT001
     scenes = example_scenes(evaluation(), CITY, successful=successful, count=3)
-    chosen = evaluation().queries[evaluation().successful == successful].head(3)
-    assert len(scenes) == len(chosen) == 3
-    for shown, row in zip(scenes, chosen.to_dict("records"), strict=True):
+    queries = evaluation().queries[evaluation().successful == successful].head(3)
+    assert len(scenes) == len(queries) == 3
+    for shown, row in zip(scenes, queries.to_dict("records"), strict=True):
         x, y = CITY.xy[row["cell"]]
         assert shown.types == row["types"]
         assert shown.error_m == row["error_m"]
-        codes = [CITY.taxonomy.by_code(one.code).symbol for one in shown.objects]
-        assert "".join(codes) == row["types"]
+        assert CITY.taxonomy.decode([item.code for item in shown.objects]) == row["types"]
         kind = "successful" if successful else "failed"
         assert (shown.radius, shown.name.split("-")[0]) == (30.0, kind)
         assert shown.title == f"{kind.capitalize()}: query {row['number'] + 1}"
-        for one in shown.objects:
-            assert math.hypot(one.east, one.north) <= 30.1
-        # Bearings are kept to 1/20 degree and distances to 1/8 metre: all is within 20 cm.
-        for one in (*shown.objects, *shown.others):
-            assert nearest(x + one.east, y + one.north, one.code) < 0.2
-        there = {
+        assert all(math.hypot(item.east, item.north) <= 30.1 for item in shown.objects)
+        # Bearings are stored to 1/20 degree and distances to 1/8 metre: errors are below 20 cm.
+        for item in (*shown.objects, *shown.others):
+            assert nearest(x + item.east, y + item.north, item.code) < 0.2
+        around = {
             (code, round(math.hypot(a - x, b - y) * 4))
             for a, b, code in TOWN.objects
             if 30 < math.hypot(a - x, b - y) < 36
         }
-        assert len(shown.others) >= len(there)
+        assert len(shown.others) >= len(around)
         if shown.answer is not None:
             east, north = shown.answer
             assert (x + east, y + north) == pytest.approx((row["best_x"], row["best_y"]))
 
 
-def test_the_worst_failures_are_shown_in_pairs() -> None:
+def test_worst_failures_are_pairs_of_true_and_best_cell() -> None:
     pairs = failure_pairs(evaluation(), CITY, count=3)
     queries = evaluation().queries
-    told = queries[~evaluation().successful & np.isfinite(queries["error_m"])]
-    worst = told.sort_values("error_m", ascending=False, kind="stable").head(3)
+    failed = queries[~evaluation().successful & np.isfinite(queries["error_m"])]
+    worst = failed.sort_values("error_m", ascending=False, kind="stable").head(3)
     assert len({scene.name for pair in pairs for scene in pair.scenes}) == 6
     for pair, (number, row) in zip(pairs, worst.iterrows(), strict=True):
-        true, taken = pair.scenes
+        true, other = pair.scenes
         assert pair.title.startswith(f"Query {number + 1:,}: off by ")
         assert true.types == row["types"]
         best = int(np.flatnonzero(CITY.cell_ids == row["best_cell_id"])[0])
-        assert taken.types == CITY.types(best)
-        assert true.asked == taken.asked
+        assert other.types == CITY.types(best)
+        assert true.asked == other.asked
         assert CITY.taxonomy.decode([code for code, _ in true.asked]) == row["query_types"]
         bearings = [f"{bearing:.6g}" for _, bearing in true.asked]
-        assert bearings == [f"{float(one):.6g}" for one in row["query_bearings"].split(",")]
+        assert bearings == [f"{float(text):.6g}" for text in row["query_bearings"].split(",")]
         assert ("fit it as well" in pair.text) == (row["tied"] > 1)
         for symbol in row["query_types"]:
             assert CITY.taxonomy.by_symbol(symbol).title in pair.text
 
 
-def test_what_a_query_told_stands_around_the_circle() -> None:
-    made = draw_scene(scene(objects=0, asked=((3, 90.0), (3, 180.0), (1, 0.0))))
-    shown = texts(made.svg)
+def test_query_is_drawn_around_the_circle() -> None:
+    picture = draw_scene(scene(objects=0, asked=((3, 90.0), (3, 180.0), (1, 0.0))))
+    shown = texts(picture.svg)
     assert (shown.count("D"), shown.count("B")) == (2, 1)
     assert "around the circle: the query" in shown
-    assert "The query had DDB." in made.description
+    assert "The query had DDB." in picture.description
 
 
-def test_a_scene_of_a_cell() -> None:
+def test_scene_of_a_cell_has_its_types_and_place() -> None:
     shown = cell_scene(CITY, 3)
     assert shown.types == CITY.types(3)
     assert shown.title == f"Cell {CITY.cell_ids[3]}"
@@ -108,34 +106,34 @@ def test_a_scene_of_a_cell() -> None:
     assert (shown.lon, shown.lat) == pytest.approx((3.8, 43.57), abs=0.1)  # Montpellier
 
 
-def test_no_examples() -> None:
+def test_evaluation_without_failures_has_no_scenes() -> None:
     perfect = evaluate(CITY, queries=3, distortion="none", top=len(CITY))
     assert example_scenes(perfect, CITY, successful=False) == ()
     assert failure_pairs(perfect, CITY) == ()
 
 
 def nearest(x: float, y: float, code: int) -> float:
-    """Return how far the nearest object of a class is."""
+    """Return the distance to the nearest object of a class."""
     return min(math.hypot(a - x, b - y) for a, b, kind in TOWN.objects if kind == code)
 
 
 @pytest.mark.parametrize("objects", [0, 2, 60])
-def test_a_scene_shows_its_objects(objects: int) -> None:
-    made = scene(objects=objects)
-    picture = draw_scene(made)
-    assert draw_scene(made) == picture  # to the byte
+def test_scene_is_drawn_with_its_objects_and_legend(objects: int) -> None:
+    example = scene(objects=objects)
+    picture = draw_scene(example)
+    assert draw_scene(example) == picture  # the same bytes
     shown = texts(picture.svg)
-    for symbol in set(made.types):
-        assert shown.count(symbol) == made.types.count(symbol)
-        title = CLASSES.by_symbol(symbol).title
-        assert f"{symbol} {title} ({made.types.count(symbol)})" in shown
+    for symbol in set(example.types):
+        count = example.types.count(symbol)
+        assert shown.count(symbol) == count
+        assert f"{symbol} {CLASSES.by_symbol(symbol).title} ({count})" in shown
     assert {"N", "10 m", "A place", "2.300000°, 48.800000° · error 12.0 m"} <= set(shown)
-    assert (made.types or "Nothing is seen") in picture.description
-    # The one around is in the legend, without a count.
-    assert ("D Street light" in shown) == ("D" not in made.types)
+    assert (example.types or "Nothing is seen") in picture.description
+    # The object that is not visible is in the legend, without a count.
+    assert ("D Street light" in shown) == ("D" not in example.types)
 
 
-def test_an_answer_is_drawn_or_pointed_to() -> None:
+def test_answer_is_a_cross_or_an_arrow_with_its_distance() -> None:
     assert "answer" not in texts(draw_scene(scene()).svg)
     near = texts(draw_scene(scene(answer=(40.0, -30.0))).svg)
     assert "answer" in near
@@ -143,57 +141,55 @@ def test_an_answer_is_drawn_or_pointed_to() -> None:
     assert {"answer", "5,000 m"} <= set(texts(draw_scene(scene(answer=(4e3, 3e3))).svg))
 
 
-def test_places_that_were_not_found_and_that_nobody_asked_for() -> None:
-    lost = draw_scene(scene(error_m=float("inf")))
-    assert "2.300000°, 48.800000° · not localized" in texts(lost.svg)
-    assert lost.description.endswith("Not localized.")
-    shown = draw_scene(scene(error_m=None))
-    assert "2.300000°, 48.800000°" in texts(shown.svg)
-    assert "rror" not in shown.description
+def test_error_text_of_unlocalized_queries_and_of_scenes_without_query() -> None:
+    unlocalized = draw_scene(scene(error_m=float("inf")))
+    assert "2.300000°, 48.800000° · not localized" in texts(unlocalized.svg)
+    assert unlocalized.description.endswith("Not localized.")
+    picture = draw_scene(scene(error_m=None))
+    assert "2.300000°, 48.800000°" in texts(picture.svg)
+    assert "rror" not in picture.description
 
 
 def test_objects_have_the_signs_of_their_classes() -> None:
-    made = draw_scene(scene(objects=11)).svg.decode("utf-8")
+    svg = draw_scene(scene(objects=11)).svg.decode("utf-8")
     for sign in class_signs(CLASSES).values():
-        assert f"fill: {sign.colour}" in made
-        (style,) = re.findall(rf'<text style="([^"]*)"[^>]*>{sign.symbol}</text>', made)
-        # Black is what an SVG is drawn in unless told otherwise.
+        assert f"fill: {sign.colour}" in svg
+        (style,) = re.findall(rf'<text style="([^"]*)"[^>]*>{sign.symbol}</text>', svg)
+        # Black is the default colour of an SVG and is not written.
         assert ("fill: #ffffff" in style) == (sign.ink == "#ffffff")
 
 
-def test_scenes_side_by_side() -> None:
-    made = [scene(title="Here"), scene(title="There", objects=11, answer=(9.0, 2.0))]
-    picture = draw_scenes(made)
-    together = texts(picture.svg)
-    for one in made:
-        assert {*texts(draw_scene(one).svg)} <= {*together}
-        assert draw_scene(one).description in picture.description
-    sizes = [
-        float(re.findall(rb' width="([.\d]+)pt"', one.svg)[0])
-        for one in (picture, draw_scene(made[0]))
+def test_several_scenes_are_drawn_in_one_picture() -> None:
+    scenes = [scene(title="Here"), scene(title="There", objects=11, answer=(9.0, 2.0))]
+    picture, single = draw_scenes(scenes), [draw_scene(example) for example in scenes]
+    for drawing in single:
+        assert {*texts(drawing.svg)} <= {*texts(picture.svg)}
+        assert drawing.description in picture.description
+    widths = [
+        float(re.findall(rb' width="([.\d]+)pt"', drawing.svg)[0])
+        for drawing in (picture, single[0])
     ]
-    assert sizes[0] == pytest.approx(2 * sizes[1])
-    assert draw_scenes(made[:1]) == draw_scene(made[0])
+    assert widths[0] == pytest.approx(2 * widths[1])
+    assert draw_scenes(scenes[:1]) == single[0]
     with refused(InputError, "no scene"):
         draw_scenes([])
 
 
-def test_an_object_of_no_class() -> None:
+def test_object_of_an_unknown_class_is_drawn() -> None:
     odd = dataclasses.replace(scene(), objects=(SceneObject(code=0, east=1.0, north=2.0),))
     assert "? unknown class (1)" in texts(draw_scene(odd).svg)
 
 
 @pytest.mark.parametrize("text", [HARM, LONG, "$", ""])
-def test_text_from_data_breaks_nothing(text: str) -> None:
-    made = draw_scene(
-        scene(title=text, types=text, objects=11, taxonomy=hostile_report(text).taxonomy)
-    )
-    assert b"<script>" not in made.svg
-    assert max(map(len, texts(made.svg))) < 80
+def test_text_from_data_is_escaped_and_truncated(text: str) -> None:
+    taxonomy = hostile_report(text).taxonomy
+    svg = draw_scene(scene(title=text, types=text, objects=11, taxonomy=taxonomy)).svg
+    assert b"<script>" not in svg
+    assert max(map(len, texts(svg))) < 80
 
 
 @given(st.floats(0.01, 1e6))
-def test_a_scale_bar_is_round_and_fits(longest: float) -> None:
+def test_scale_bar_is_round_and_fits(longest: float) -> None:
     metres = _round_length(longest)
     assert longest / 2.6 < metres <= longest
     assert f"{metres:.0e}"[0] in "125"

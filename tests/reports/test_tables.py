@@ -46,7 +46,7 @@ def test_a_table_is_markdown() -> None:
 def test_numbers_as_text() -> None:
     assert percent(1.0) == "100.0 %"
     values = (None, math.nan, math.inf, 1234.56)
-    assert [figure(one, ",.1f") for one in values] == ["", "", "infinite", "1,234.6"]
+    assert [figure(value, ",.1f") for value in values] == ["", "", "infinite", "1,234.6"]
     assert interval(math.nan, math.nan) == ""
     assert interval(0.5, math.inf) == "0.5000 to infinite"
 
@@ -55,13 +55,13 @@ def test_numbers_as_text() -> None:
     ("ours", "paper", "difference"),
     [(0.5, 0.3733, 0.1267), (None, 0.3733, None), (0.5, None, None)],
 )
-def test_the_difference_needs_both_figures(
+def test_difference_needs_both_numbers(
     ours: float | None, paper: float | None, difference: float | None
 ) -> None:
     assert Number("R", "P", ours, paper=paper).difference == difference
 
 
-def test_one_column_has_its_interval_in_a_column() -> None:
+def test_interval_of_a_single_column_is_a_separate_column() -> None:
     numbers = [
         Number("R = 20 m", "P", 0.21, low=0.2, high=0.22, paper=0.1793),
         Number("R = 30 m", "P", 0.37, low=0.36, high=0.38, paper=0.3733),
@@ -79,7 +79,7 @@ def test_one_column_has_its_interval_in_a_column() -> None:
     assert table.note.startswith("Bold: ")
 
 
-def test_several_columns_stand_side_by_side() -> None:
+def test_several_columns_have_intervals_below_their_figures() -> None:
     numbers = [
         Number("Edit", "type", 9.1, paper=277, unit="ms", decimals=1),
         Number("Edit", "angle", 61.2, low=60, high=62, unit="ms", decimals=1),
@@ -102,7 +102,7 @@ def test_several_columns_stand_side_by_side() -> None:
     assert (table.bold, table.note) == (frozenset(), "")
 
 
-def test_what_is_too_wide_has_a_row_for_each_number() -> None:
+def test_too_wide_table_has_a_row_for_each_number() -> None:
     numbers = [
         Number(row, f"column {column}", 0.5, paper=0.5) for column in range(5) for row in ("a", "b")
     ]
@@ -114,12 +114,12 @@ def test_what_is_too_wide_has_a_row_for_each_number() -> None:
     assert (table.groups, table.group_starts) == ((), frozenset())
 
 
-def test_a_place_with_two_numbers_shows_both() -> None:
+def test_two_numbers_of_a_row_and_column_are_both_shown() -> None:
     twice = [Number("a", "b", value, decimals=0) for value in (1.0, 2.0)]
     assert number_table(twice).rows == (("a", "b", "1"), ("a", "b", "2"))
 
 
-def test_units_that_differ_stand_in_the_cells() -> None:
+def test_different_units_of_a_column_are_in_the_cells() -> None:
     numbers = [
         Number("Range", "City", 30, low=29, high=31, paper=30, unit="m", decimals=0),
         Number("Cells", "City", 312_806, paper=312_134, decimals=0),
@@ -134,13 +134,13 @@ def test_units_that_differ_stand_in_the_cells() -> None:
     ("value", "shown"),
     [(None, "\u2013"), (math.nan, "\u2013"), (math.inf, "infinite"), (-1e-9, "0.0000")],
 )
-def test_odd_values(value: float | None, shown: str) -> None:
+def test_texts_of_missing_infinite_and_tiny_numbers(value: float | None, shown: str) -> None:
     table = number_table([Number("a", "b", value)])
     assert (table.columns, table.rows) == (("", "b"), (("a", shown),))
 
 
 @given(NUMBERS)
-def test_every_number_is_shown_once_and_no_table_is_too_wide(numbers: list[Number]) -> None:
+def test_table_shows_every_number_once_and_is_not_too_wide(numbers: list[Number]) -> None:
     table = number_table(numbers)
     assert all(len(row) == len(table.columns) for row in table.rows)
     ours = [
@@ -157,7 +157,7 @@ def test_every_number_is_shown_once_and_no_table_is_too_wide(numbers: list[Numbe
     )
 
 
-def test_notes_on_single_rows_are_shortened() -> None:
+def test_notes_about_rows_of_a_layer_are_shortened() -> None:
     notes = (
         "odd",
         "a: old",
@@ -176,7 +176,7 @@ def test_notes_on_single_rows_are_shortened() -> None:
     assert note_tables(()) == ()
 
 
-def test_grid_north_has_no_minus_before_nothing() -> None:
+def test_grid_north_has_no_minus_before_zero() -> None:
     facts = {"convergence": (-0.0038, 0.0038), "angle": 0.0038, "stretch": 0.0004}
-    (_, turned), _ = distortion_rows(facts)
-    assert turned == "at most 0.00° off true north (0.00° clockwise)"
+    (_, text), _ = distortion_rows(facts)
+    assert text == "at most 0.00° off true north (0.00° clockwise)"

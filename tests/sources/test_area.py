@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
+from geojson import collection, feature
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
+from raw_layers import raw_layer
 from sentences import refused
 
 from semsig_gis.core import CrsError, InputError, SemsigError
 from semsig_gis.sources import (
-    LayerSpec,
-    RawLayer,
     RowCounts,
     clip_layer,
     clip_layers,
@@ -29,6 +30,8 @@ from semsig_gis.sources import (
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from semsig_gis.sources import RawLayer
 
 BOX = (3.8, 43.5, 3.9, 43.7)
 
@@ -149,8 +152,8 @@ def test_unreadable_polygon_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "quarter.geojson"
     with refused(SemsigError, "does not exist"):
         parse_area(str(path))
-    broken = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": [broken]}))
+    broken = feature({"type": "Polygon", "coordinates": 5}, {})
+    path.write_text(json.dumps(collection([broken])))
     with refused(InputError, "polygons that cannot be read", "correct the file"):
         parse_area(str(path))
     with pytest.warns(UserWarning, match="'crs' was not provided"):
@@ -167,26 +170,21 @@ def test_layer_is_clipped(role: str, ids: list[str], crs: str) -> None:
     inside = shapely.LineString([(3.81, 43.6), (3.82, 43.6)])
     across = shapely.LineString([(3.89, 43.6), (4.2, 43.6)])
     outside = shapely.LineString([(4.1, 43.6), (4.2, 43.6)])
-    table = gpd.GeoDataFrame(
-        {"class_name": [""] * 4, "source_id": ["1", "2", "3", "none"]},
-        geometry=[inside, across, outside, None],
-        crs="EPSG:4326",
-    ).to_crs(crs)
-    spec = LayerSpec(name="x", class_name="", role=role, geometry="line")  # type: ignore[arg-type]
-    layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=9, filtered=5))
+    lines = [inside, across, outside, None]
+    layer = raw_layer(lines, ids=["1", "2", "3", "none"], crs="EPSG:4326", filtered=5)
+    spec = replace(layer.spec, role=role, geometry="line")  # type: ignore[arg-type]
+    layer = replace(layer, spec=spec, table=layer.table.to_crs(crs))
     clipped = clip_layer(layer, parse_area(",".join(map(str, BOX))))
     assert clipped.table["source_id"].tolist() == ids
     assert clipped.table.index.tolist() == list(range(len(ids)))
-    assert clipped.table.crs == table.crs
+    assert clipped.table.crs == crs
     assert clipped.counts == RowCounts(read=9, filtered=5, outside=4 - len(ids))
 
 
 def test_line_is_clipped_by_its_centroid_in_metres() -> None:
     # At 60 degrees north, a degree to the east is half as long as one to the north.
     line = shapely.LineString([(25.0, 60.0), (25.0, 60.001), (25.002, 60.001)])
-    table = gpd.GeoDataFrame({"source_id": ["1"]}, geometry=[line], crs="EPSG:4326")
-    spec = LayerSpec(name="x", class_name="bench", geometry="line")
-    layer = RawLayer(spec=spec, table=table, counts=RowCounts(read=1))
+    layer = raw_layer([line], crs="EPSG:4326")
     for east, count in ((25.00051, 1), (25.00049, 0)):
         assert len(clip_layer(layer, parse_area(f"24,59,{east},61")).table) == count
 
@@ -195,17 +193,11 @@ def benches(
     *places: tuple[float, float], extent: str | None = None, role: str = "objects"
 ) -> RawLayer:
     """Return a layer of points or small houses; `extent` is the box that its file states."""
-    shapes = shapely.points(places)
-    shapes = shapes if role == "objects" else shapely.buffer(shapes, 0.001)
-    table = gpd.GeoDataFrame(
-        {"source_id": [str(row) for row in range(len(places))]}, geometry=shapes, crs="EPSG:4326"
-    )
-    return RawLayer(
-        spec=LayerSpec(name="benches", class_name="bench", role=role),  # type: ignore[arg-type]
-        table=table,
-        counts=RowCounts(read=len(table)),
-        extent=parse_area(extent) if extent else None,
-    )
+    points = shapely.points(places)
+    shapes = points if role == "objects" else shapely.buffer(points, 0.001)
+    layer = raw_layer(shapes.tolist(), name="benches", classes="bench", crs="EPSG:4326")
+    spec = replace(layer.spec, role=role)  # type: ignore[arg-type]
+    return replace(layer, spec=spec, extent=parse_area(extent) if extent else None)
 
 
 def test_rows_outside_the_box_of_their_file_are_noted_and_clipped() -> None:

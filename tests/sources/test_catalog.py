@@ -12,6 +12,7 @@ import pyogrio
 import pytest
 import shapely
 from pyproj import CRS
+from raw_layers import BENCHES, catalog_of
 from sentences import refused
 from town_catalog import MISTAKES, TOWN, mistake
 
@@ -19,7 +20,6 @@ from semsig_gis.core import CatalogError, InputError, ObjectClass, SourceError, 
 from semsig_gis.sources import (
     DRIVERS,
     FILE_SUFFIXES,
-    Catalog,
     LayerSpec,
     WidthBy,
     catalog_names,
@@ -151,12 +151,6 @@ def test_unknown_catalogue_is_refused(name: str) -> None:
         load_catalog(name)
 
 
-def catalog_of(**values: object) -> Catalog:
-    benches = LayerSpec(name="benches", class_name="bench")
-    plain = {"name": "town", "title": "Town", "taxonomy": paper_taxonomy(), "layers": (benches,)}
-    return Catalog(**{**plain, **values})  # type: ignore[arg-type]
-
-
 def test_catalogues_are_combined() -> None:
     both = combine_catalogs([load_catalog("openstreetmap"), load_catalog("montpellier")])
     assert both.name == "openstreetmap+montpellier"
@@ -270,8 +264,8 @@ def test_layer_of_montpellier_matches_the_published_file(layer: str, geodata: Pa
 
 TREES = LayerSpec(name="trees", class_name="alignment_tree", files=("*trees*.zip", "*trees*"))
 LIGHTS = LayerSpec(name="lights", class_name="street_light", files=("lights.*", "city.gpkg"))
-BENCHES = LayerSpec(name="benches", class_name="bench", files=("city.gpkg",))
-SPECS = (TREES, LIGHTS, BENCHES)
+SEATS = dataclasses.replace(BENCHES, files=("city.gpkg",))
+SPECS = (TREES, LIGHTS, SEATS)
 
 
 def touch(folder: Path, *names: str) -> list[Path]:
@@ -287,10 +281,10 @@ def test_find_files_pairs_layers_with_files(tmp_path: Path) -> None:
     zipped, _, lights, *_ = touch(
         folder, "Trees_2014.ZIP", "trees.geojson", "lights.shp", "lights.dbf", "readme.txt"
     )
-    assert find_files(SPECS, [folder]) == (((TREES, zipped), (LIGHTS, lights)), (BENCHES,))
+    assert find_files(SPECS, [folder]) == (((TREES, zipped), (LIGHTS, lights)), (SEATS,))
     # One file may hold several layers, and one that is given by itself goes first.
     city, mine = touch(tmp_path, "city.gpkg", "my_trees.geojson")
-    assert find_files(SPECS, [str(city)]) == (((LIGHTS, city), (BENCHES, city)), (TREES,))
+    assert find_files(SPECS, [str(city)]) == (((LIGHTS, city), (SEATS, city)), (TREES,))
     for paths in ([folder, mine], [mine, mine]):
         assert find_files(SPECS, paths)[0][0] == (TREES, mine)
     assert {*DRIVERS, ".zip"} < FILE_SUFFIXES

@@ -63,12 +63,7 @@ def test_text_is_compared_as_text(a: str, b: str) -> None:
         ("a/b", "a/b", True),
     ],
 )
-def test_match_is_exact_or_a_pattern(
-    value: object,
-    accepted: Any,  # noqa: ANN401
-    *,
-    expected: bool,
-) -> None:
+def test_match_is_exact_or_a_pattern(value: object, accepted: Any, *, expected: bool) -> None:  # noqa: ANN401
     assert matches(value, accepted) == expected
 
 

@@ -13,13 +13,15 @@ from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core import SourceError
-from semsig_gis.sources import LayerSpec, decimal, list_layers, read_layer
-from semsig_gis.sources.services import layers as opendatasoft
+from semsig_gis.sources import LayerSpec, decimal, list_layers
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from semsig_gis.sources import RawLayer
+
+    Read = Callable[..., RawLayer]
 
 WORDS = {
     "cp1252": (
@@ -44,21 +46,25 @@ WORDS = {
 }
 
 
-def read(path: Path, reader: str = "vector", **what: Any) -> RawLayer:  # noqa: ANN401
-    spec = LayerSpec(name="a", class_name="bench", **{"crs": "EPSG:4326", **what})
-    return (
-        read_layer(path, spec) if reader == "vector" else opendatasoft.read_layers(path, [spec])[0]
-    )
+@pytest.fixture
+def read(read_as: Read) -> Read:
+    """Read a layer of a CSV file with this content; keywords are fields of its specification."""
+
+    def call(content: str | bytes, by: str = "vector_file", **what: Any) -> RawLayer:  # noqa: ANN401
+        spec = LayerSpec(name="a", class_name="bench", **{"crs": "EPSG:4326", **what})
+        return read_as("a.csv", content, spec, by=by)
+
+    return call
 
 
-@pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
+@pytest.mark.parametrize("by", ["vector_file", "opendatasoft"])
 @pytest.mark.parametrize("encoding", WORDS)
-def test_encoding_is_detected(tmp_path: Path, encoding: str, reader: str) -> None:
-    path = tmp_path / "a.csv"
+def test_encoding_is_detected(read: Read, encoding: str, by: str) -> None:
     words = WORDS[encoding]
     lines = ["nom;lon;lat", *(f"{word};2,5;48,5" for word in words)]
-    path.write_bytes("\r\n".join(lines).encode(encoding))
-    layer = read(path, reader, id_field="nom", x_field="lon", y_field="lat")
+    layer = read(
+        "\r\n".join(lines).encode(encoding), by, id_field="nom", x_field="lon", y_field="lat"
+    )
     assert tuple(layer.table.source_id) == words
     assert set(layer.table.geometry.to_wkt()) == {"POINT (2.5 48.5)"}
     notes = [f"the file is not in UTF-8; it is read as {encoding.replace('-', '_')}"]
@@ -66,32 +72,20 @@ def test_encoding_is_detected(tmp_path: Path, encoding: str, reader: str) -> Non
     assert list(layer.notes) == ([] if marked else notes)
 
 
-def test_invalid_utf8_is_noted(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_bytes("nom;lon;lat\nérable;2;48\nhêtre;2;48\n".encode() + b"ch\xeane;2;48\n")
-    layer = read(path, id_field="nom")
+def test_invalid_utf8_is_noted(read: Read) -> None:
+    text = "nom;lon;lat\nérable;2;48\nhêtre;2;48\n".encode() + b"ch\xeane;2;48\n"
+    layer = read(text, id_field="nom")
     assert list(layer.table.source_id) == ["érable", "hêtre", "ch\ufffdne"]
     assert layer.notes == ("1 places are not UTF-8 and are read as \ufffd",)
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\xef\xbb\xbf", b"\n\n", b"\0\1\2" * 99, bytes(range(256))]
-)
-def test_file_that_is_not_text_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "a.csv"
-    path.write_bytes(content)
-    for use in (read, list_layers):
-        with refused(SourceError, str(path)):
-            use(path)
-
-
-@pytest.mark.parametrize("reader", ["vector", "opendatasoft"])
+@pytest.mark.parametrize("by", ["vector_file", "opendatasoft"])
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
-def test_column_names_are_stripped(tmp_path: Path, separator: str, reader: str) -> None:
-    path = tmp_path / "a.csv"
+def test_column_names_are_stripped(read: Read, separator: str, by: str) -> None:
     lines = [["id ", " lon", "\u00a0lat "], ["7", " 2.5", "48.5 "]]
-    path.write_text("\n".join(map(separator.join, lines)), encoding="utf-8")
-    layer = read(path, reader, id_field="id", x_field="lon", y_field="lat")
+    layer = read(
+        "\n".join(map(separator.join, lines)), by, id_field="id", x_field="lon", y_field="lat"
+    )
     assert layer.table.geometry.to_wkt().tolist() == ["POINT (2.5 48.5)"]
     assert layer.table.source_id.tolist() == ["7"]
 
@@ -109,30 +103,23 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("name", ["WKT", "geom", "geometry", "the_geom", " wkt "])
-def test_geometry_in_well_known_text(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "a.csv"
+def test_geometry_in_well_known_text(tmp_path: Path, read: Read, name: str) -> None:
     rows = "".join(f'{number};"{text}"\n' for number, text in enumerate(SHAPES))
-    path.write_text(f"id;{name}\n{rows}99;here\n", encoding="utf-8")
-    layer = read(path)
+    layer = read(f"id;{name}\n{rows}99;here\n")
     assert [shape and shape.wkt for shape in layer.table.geometry] == list(SHAPES.values())
     assert layer.errors == (f"row 8: {name.strip()} 'here' is not well-known text",)
-    (info,) = list_layers(path)
+    (info,) = list_layers(tmp_path / "a.csv")
     assert (info.geometry, info.rows, info.crs) == ("Unknown", 8, "EPSG:4326")
 
 
-def test_crs_of_well_known_text(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(
-        "the_geom\nSRID=2154;POINT(770000 6280000)\nSRID=4326;POINT(2 48)\nPOINT(1 2)\n",
-        encoding="utf-8",
-    )
-    layer = read(path, crs=None)
+def test_crs_of_well_known_text(read: Read) -> None:
+    text = "the_geom\nSRID=2154;POINT(770000 6280000)\nSRID=4326;POINT(2 48)\nPOINT(1 2)\n"
+    layer = read(text, crs=None)
     assert layer.table.crs == "EPSG:2154"
     assert layer.table.geometry.to_wkt().tolist() == ["POINT (770000 6280000)", "POINT (1 2)"]
     assert layer.errors == ("row 2: the_geom has SRID=4326, and rows before it have 2154",)
-    path.write_text("geom\nSRID=999999;POINT(2 48)\n", encoding="utf-8")
     with refused(SourceError, "SRID=999999", "unknown"):
-        read(path)
+        read("geom\nSRID=999999;POINT(2 48)\n")
 
 
 NUMBERS: dict[str, float | None] = {
@@ -167,12 +154,10 @@ def test_decimal_reads_usual_notations(text: str) -> None:
         assert decimal(text) == expected
 
 
-def test_ambiguous_comma_is_an_error(tmp_path: Path) -> None:
+def test_ambiguous_comma_is_an_error(read: Read) -> None:
     assert decimal("770,123") == 770.123
     assert decimal("2,3488", english=True) == 2.3488
-    path = tmp_path / "a.csv"
-    path.write_text('x,y\n"770,123","6,280,000.5"\n"770,123.5","6,280,000"\n', encoding="utf-8")
-    layer = read(path, crs="EPSG:2154")
+    layer = read('x,y\n"770,123","6,280,000.5"\n"770,123.5","6,280,000"\n', crs="EPSG:2154")
     assert layer.errors == ("row 1: x '770,123' is not a number",)
     assert layer.table.geometry.to_wkt().tolist() == ["POINT (770123.5 6280000)"]
 

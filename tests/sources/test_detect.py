@@ -33,7 +33,7 @@ def write(folder: Path, name: str, *, rows: int = 1) -> Path:
     if name.endswith(".osm"):
         return write_osm(path, *street_town())
     if name.endswith(".json"):
-        path.write_text(json.dumps({"elements": []}))
+        path.write_text(json.dumps({"version": 0.6, "elements": []}))
         return path
     columns = {key: values * rows for key, values in columns.items()}
     frame = gpd.GeoDataFrame(columns, geometry=[shapely.Point(2, 48)] * rows, crs="EPSG:4326")

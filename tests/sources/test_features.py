@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import geopandas as gpd
 import pytest
 import shapely
+from geojson import collection, feature, point
 from sentences import refused
 
 from semsig_gis.core import SourceError
@@ -81,12 +82,9 @@ def test_elements_are_recognized_by_their_columns(columns: dict[str, list[Any]])
 def test_geojson_is_read_like_a_table(tmp_path: Path, name: str) -> None:
     columns = {key.replace("at_", "@"): values for key, values in FORMS[name].items()}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    features = [
-        {"type": "Feature", "properties": row, "geometry": {"type": "Point", "coordinates": [2, n]}}
-        for n, row in enumerate(rows)
-    ]
+    features = [feature(point(2, n), row) for n, row in enumerate(rows)]
     path = tmp_path / "some.geojson"
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    path.write_text(json.dumps(collection(features)))
     assert file_reader(path) == "osm_features"
     assert ids(read_layers(path, SPECS)) == [["node/1"], ["node/2"]]
 
@@ -160,11 +158,3 @@ def test_file_without_tags_is_refused(tmp_path: Path) -> None:
     damaged.write_text("PAR1")
     with refused(SourceError, "damaged.parquet", "download it again"):
         find_files(SPECS, [damaged])
-
-
-def test_overpass_answer_is_recognized_by_its_content(tmp_path: Path) -> None:
-    answer = {"version": 0.6, "elements": [{"type": "node", "id": 1, "lat": 48, "lon": 2,
-                                            "tags": {"amenity": "bench"}}]}  # fmt: skip
-    path = tmp_path / "some.json"
-    path.write_text(json.dumps(answer))
-    assert file_reader(path, sure=True) == "overpass"

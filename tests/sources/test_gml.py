@@ -8,10 +8,9 @@ import pytest
 import shapely
 
 from semsig_gis.sources import LayerSpec, parse_xml
-from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
     from semsig_gis.sources import RawLayer
 
@@ -38,17 +37,6 @@ TWO = "".join(f"<gml:Point><gml:pos>{xy}</gml:pos></gml:Point>" for xy in ("1 2"
 SPEC = LayerSpec(name="a", class_name="bench", id_field="n", where=(("many", ("a b",)),))
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "a.gml"
-
-
-def read(path: Path, text: str) -> RawLayer:
-    path.write_text(text)
-    (layer,) = read_layers(path, [SPEC])
-    return layer
-
-
 @pytest.mark.parametrize(
     ("shape", "text"),
     [
@@ -67,8 +55,10 @@ def read(path: Path, text: str) -> RawLayer:
         ("<gml:Curve><gml:segments><gml:Arc/></gml:segments></gml:Curve>", None),
     ],
 )
-def test_gml_geometries_are_read(path: Path, shape: str, text: str | None) -> None:
-    layer = read(path, GML.format("EPSG:4326", shape))
+def test_gml_geometries_are_read(
+    read_as: Callable[..., RawLayer], shape: str, text: str | None
+) -> None:
+    layer = read_as("a.gml", GML.format("EPSG:4326", shape), SPEC)
     assert layer.counts.unreadable == (text is None)
     if text is None:
         assert "is not valid GML" in layer.errors[0]
@@ -88,8 +78,10 @@ def test_gml_geometries_are_read(path: Path, shape: str, text: str | None) -> No
         ("urn:ogc:def:crs:EPSG::25833", "EPSG:25833", False),
     ],
 )
-def test_crs_name_decides_the_axis_order(path: Path, name: str, crs: str, *, turned: bool) -> None:
-    layer = read(path, GML.format(name, POINT.format(name)))
+def test_crs_name_decides_the_axis_order(
+    read_as: Callable[..., RawLayer], *, name: str, crs: str, turned: bool
+) -> None:
+    layer = read_as("a.gml", GML.format(name, POINT.format(name)), SPEC)
     assert layer.table.crs == crs
     assert layer.table.geometry.tolist() == [shapely.Point((48, 2) if turned else (2, 48))]
 

@@ -18,10 +18,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import shapely
+from geojson import collection, feature
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from raw_layers import ids, xy
 from sentences import refused
 from servers import Answer, published
+from stand_ins import sent
 
 from semsig_gis.core import CatalogError, CrsError, SourceError
 from semsig_gis.sources import Area, ClassBy, LayerSpec, find_field, fold
@@ -63,34 +66,6 @@ def read(path: Path, spec: LayerSpec = TREES, **options: Any) -> RawLayer:  # no
     (layer,) = read_layers(path, [spec], **options)
     assert layer.counts.kept == len(layer.table)
     return layer
-
-
-@pytest.fixture
-def read_as(tmp_path: Path) -> Read:
-    """Read a layer from a file of this name and content: text, bytes, or what becomes JSON."""
-
-    def call(
-        name: str,
-        content: object,
-        spec: LayerSpec = PLAIN,
-        **options: Any,  # noqa: ANN401
-    ) -> RawLayer:
-        text = content if isinstance(content, str | bytes) else json.dumps(content)
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read(path, spec, **options)
-
-    return call
-
-
-def ids(layer: RawLayer) -> list[str]:
-    texts: list[str] = layer.table["source_id"].tolist()
-    return texts
-
-
-def xy(layer: RawLayer) -> list[tuple[float, float]]:
-    points = shapely.get_coordinates(shapely.centroid(layer.table.geometry.array))
-    return [(x, y) for x, y in points.round(9).tolist()]
 
 
 def shape(lon: float, lat: float, kind: str = "Point") -> dict[str, Any]:
@@ -220,7 +195,7 @@ def test_shape_is_preferred_to_point_and_point_to_coordinates(read_as: Read) -> 
 def test_alias_names_the_point_field(read_as: Read) -> None:
     text = "id;geopoint;geopoint_datagouv\n1;48.85, 2.35;2.35, 48.85\n"
     with refused(SourceError, "layer 'a'", "geopoint", "geo_point_2d", "alias"):
-        read_as("taxi.csv", text)
+        read_as("taxi.csv", text, PLAIN)
     with_alias = replace(PLAIN, aliases=(("geo_point_2d", ("geopoint",)),))
     assert xy(read_as("taxi.csv", text, with_alias)) == [(2.35, 48.85)]
 
@@ -364,7 +339,8 @@ def test_spellings_of_a_point_give_one_position(
     read_as: Read, places: list[tuple[float, float]]
 ) -> None:
     rows = [spelling(x, y) for x, y in places for spelling in SPELLINGS]
-    layer = read_as("a.json", [{"geo_shape": None, "geo_point_2d": None} | row for row in rows])
+    rows = [{"geo_shape": None, "geo_point_2d": None} | row for row in rows]
+    layer = read_as("a.json", rows, PLAIN)
     points = shapely.get_coordinates(layer.table.geometry.array)
     assert points.tolist() == [[x, y] for x, y in places for _ in SPELLINGS]
 
@@ -384,7 +360,7 @@ ROWS = [{"geo_point_2d": {"lon": 2.3, "lat": 48.8}}] * 2
 def test_single_page_of_a_dataset_is_noted(
     read_as: Read, page: dict[str, Any], rest: str | None
 ) -> None:
-    layer = read_as("page.json", page)
+    layer = read_as("page.json", page, PLAIN)
     assert layer.counts.read == 2
     assert len(layer.notes) == (rest is not None)
     assert rest is None or rest in layer.notes[0]
@@ -426,10 +402,8 @@ def exported(request: Request) -> Answer:
     for row in json.loads(FILES["v21.json"]):
         if all(holds(text, row) for text in conditions):
             properties = {name: row[name] for name in names}
-            geometry = properties.pop("geo_shape")["geometry"]
-            features.append({"type": "Feature", "geometry": geometry, "properties": properties})
-    content = {"type": "FeatureCollection", "features": features}
-    return Answer(json.dumps(content).encode(), type="application/geo+json", chunked=True)
+            features.append(feature(properties.pop("geo_shape")["geometry"], properties))
+    return sent(collection(features), type="application/geo+json", chunked=True)
 
 
 @pytest.fixture
@@ -510,7 +484,7 @@ LOG_IN = Answer(b'{"message": "Log in"}', status=403)
 
 
 @pytest.mark.parametrize(
-    ("change", "answers", "error", "words"),
+    "case",
     [
         ({"dataset": "arbres"}, {}, CatalogError, UNKNOWN_DATASET),
         (
@@ -530,14 +504,9 @@ LOG_IN = Answer(b'{"message": "Log in"}', status=403)
     ],
 )
 def test_error_of_a_portal_names_the_cause(
-    server: Server,
-    fetched: Fetch,
-    *,
-    change: dict[str, Any],
-    answers: dict[str, Answer],
-    error: type[Exception],
-    words: list[str],
+    server: Server, fetched: Fetch, case: tuple[Any, ...]
 ) -> None:
+    change, answers, error, words = case
     for path, answer in answers.items():
         server.on(path, answer)
     with refused(error, *words):

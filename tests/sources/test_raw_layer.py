@@ -27,11 +27,11 @@ from semsig_gis.sources import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import pandas as pd
 
-    from semsig_gis.sources import FilteredRows
+    from semsig_gis.sources import FilteredRows, RawLayer
 
 
 DATA = Path(__file__).with_name("data")
@@ -100,16 +100,11 @@ def test_unlisted_values_of_class_by_are_left_out_and_noted() -> None:
     values = "'bin' 9, 'box' 2, no value 2, '\\x1b[31m' 1"
     assert layer.notes == (f"left out, unlisted in class_by 'kind': {values}",)
     spec = LayerSpec(name="things", class_name="bench", class_by=by)
-    assert (
-        apply(spec, kind=kinds)
-        .notes[0]
-        .endswith('; write otherwise = "class" to take them as bench')
-    )
+    note = apply(spec, kind=kinds).notes[0]
+    assert note.endswith('; write otherwise = "class" to take them as bench')
     spec = replace(spec, class_by=replace(by, otherwise=True))
-    assert apply(spec, kind=kinds).table["class_name"].tolist() == ["bench"] * 14 + [
-        "bus_stop",
-        "bench",
-    ]
+    names = table(spec, kind=kinds)["class_name"].tolist()
+    assert names == [*["bench"] * 14, "bus_stop", "bench"]
     many = apply(LayerSpec(name="things", class_name="", class_by=by), kind=[*map(str, range(20))])
     assert many.notes[0].endswith("'7' 1, and 12 others")
 
@@ -198,39 +193,29 @@ def test_implausible_width_is_unknown(value: Any) -> None:  # noqa: ANN401
         ("opendatasoft", "streets.geojson"),
     ],
 )
-def test_every_reader_returns_widths(name: str, file: str) -> None:
+def test_every_reader_returns_widths_and_names_of_streets(name: str, file: str) -> None:
     bare = street(geometry="line", tags=((("highway", ("*",)),),))
     unknown = replace(bare, width_field="width")
-    spec = replace(unknown, width_by=BY_CLASS)
+    spec = replace(unknown, width_by=BY_CLASS, name_field="highway")
     whole, half, none = (reader(name)(DATA / file, [s])[0] for s in (spec, unknown, bare))
     assert whole.table["half_width"].tolist() == [12.0, 4.0]
     assert (whole.notes, whole.table["half_width"].dtype) == ((), "float64")
     assert half.notes == ("1 of 2 streets have no known width",)
-    assert "half_width" not in none.table
+    assert [bool(name) for name in whole.table["name"]] == [True, True]
+    assert not {"half_width", "name"} & {*none.table}
 
 
-@pytest.mark.parametrize(
-    ("name", "file"), [("vector_file", "streets.geojson"), ("osm_file", "streets.osm")]
-)
-def test_every_reader_returns_names_of_streets(name: str, file: str) -> None:
-    bare = street(geometry="line", tags=((("highway", ("*",)),),))
-    with_names, plain = (
-        reader(name)(DATA / file, [s])[0] for s in (replace(bare, name_field="highway"), bare)
-    )
-    assert [bool(name) for name in with_names.table["name"]] == [True, True]
-    assert "name" not in plain.table
-    missing = table(replace(bare, name_field="name"), name=["Rue É", None, " "], highway=[""] * 3)
-    assert missing["name"].tolist() == ["Rue É", "", ""]
+def test_missing_name_of_a_street_is_empty() -> None:
+    names = table(street(name_field="name"), name=["Rue É", None, " "], highway=[""] * 3)["name"]
+    assert names.tolist() == ["Rue É", "", ""]
 
 
-def test_portal_fields_may_have_other_spellings(tmp_path: Path) -> None:
-    path = tmp_path / "voies.csv"
-    path.write_text(
+def test_portal_fields_may_have_other_spellings(read_as: Callable[..., RawLayer]) -> None:
+    text = (
         'Largeur (m);TYPE VOIE;geo_shape\n;Rue;"{""type"": ""LineString"", '
-        '""coordinates"": [[2.3, 48.8], [2.4, 48.8]]}"\n',
-        encoding="utf-8",
+        '""coordinates"": [[2.3, 48.8], [2.4, 48.8]]}"\n'
     )
     by = WidthBy("type_voie", (("Rue", 13.0),))
     spec = street(geometry="line", width_field="largeur_m", width_by=by)
-    (layer,) = reader("opendatasoft")(path, [spec])
+    layer = read_as("voies.csv", text, spec)
     assert layer.table["half_width"].tolist() == [6.5]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 import shapely
+from geojson import collection
+from raw_layers import ids, xy
 from sentences import refused
 from servers import Answer
 from stand_ins import (
@@ -25,13 +26,11 @@ from stand_ins import (
 )
 
 from semsig_gis.core import CatalogError, SourceError
-from semsig_gis.sources import Area, HttpError, LayerSpec, PagingError, parse_area, reader
+from semsig_gis.sources import Area, HttpError, LayerSpec, PagingError, parse_area
 from semsig_gis.sources.services.fetch import fetch_layers
-from semsig_gis.sources.services.layers import read_layers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from servers import Server
     from stand_ins import StandIn
@@ -61,15 +60,6 @@ def fetched(cache: Cache, quick: HttpSpec) -> Fetch:
         return download
 
     return call
-
-
-def ids(layer: RawLayer) -> list[str]:
-    texts: list[str] = layer.table["source_id"].tolist()
-    return texts
-
-
-def xy(layer: RawLayer) -> list[tuple[float, float]]:
-    return [(x, y) for x, y in shapely.get_coordinates(layer.table.geometry.array).round(9)]
 
 
 def test_pages_become_one_layer_and_are_cached(
@@ -173,14 +163,20 @@ def test_only_needed_fields_are_requested(service: StandIn, fetched: Fetch) -> N
         fetched(service, replace(LAMPS, select=("noot",)))
 
 
+def test_service_filters_rows_and_states_its_terms(service: StandIn, fetched: Fetch) -> None:
+    lamps = replace(LAMPS, server_where=service.only_lamps)
+    layer = fetched(service, lamps).read()
+    assert (ids(layer), layer.spec.terms) == (["11", "13", "15"], service.terms)
+    if service.cuts:
+        near = fetched(service, lamps, area=NEAR).read()
+        assert (ids(near), near.counts.read) == (["13"], 1)
+
+
 # --- ArcGIS -----------------------------------------------------------------------------------
 
 
-def test_arcgis_filters_and_states_its_terms(server: Server, fetched: Fetch) -> None:
+def test_terms_of_the_catalogue_have_priority(server: Server, fetched: Fetch) -> None:
     service = ArcGIS(server)
-    layer = fetched(service, replace(LAMPS, server_where="KIND='lamp'")).read()
-    assert ids(layer) == ["11", "13", "15"]
-    assert layer.spec.terms == "City of Somewhere (unknown)"
     ours = replace(LAMPS, license="CC0", attribution="Us")
     assert fetched(service, ours).read().spec.terms == "Us (CC0)"
     with refused(HttpError, "layer 'lamps'", "Invalid query parameters", "'where' clause is"):
@@ -197,8 +193,6 @@ def test_old_arcgis_server_sends_esri_json(server: Server, fetched: Fetch) -> No
 def test_arcgis_server_without_paging_sends_one_page(server: Server, fetched: Fetch) -> None:
     service = ArcGIS(server)
     service.paging = False
-    with refused(SourceError, "'lamps'", "sends 2 rows at most", "smaller area"):
-        fetched(service)
     few = Area(shapely.box(2.355, 48.8, 2.375, 48.9), "a box")
     assert ids(fetched(service, area=few).read()) == ["12", "13"]
 
@@ -218,12 +212,11 @@ def test_arcgis_server_without_paging_sends_one_page(server: Server, fetched: Fe
     ],
 )
 def test_esri_geometries_are_read(
-    tmp_path: Path, geometry: dict[str, Any], text: str | None
+    read_as: Callable[..., RawLayer], geometry: dict[str, Any], text: str | None
 ) -> None:
     rows = [{"attributes": {"a": 1}, "geometry": geometry}]
     content = {"spatialReference": {"wkid": 102100, "latestWkid": 3857}, "features": rows}
-    (tmp_path / "a.json").write_text(json.dumps(content))
-    (layer,) = read_layers(tmp_path / "a.json", [LayerSpec(name="a", class_name="bench")])
+    layer = read_as("a.json", content, replace(LAMPS, id_field=None))
     assert layer.table.crs == "EPSG:3857"
     (shape,) = layer.table.geometry
     assert (shape is None) == (text is None)
@@ -247,7 +240,7 @@ def test_arcgis_may_be_busy_and_send_an_empty_page_before_the_last(
     path = "/arcgis/rest/services/Street/FeatureServer/0/query"
     busy = sent({"error": {"code": 503, "message": "Service is busy"}})
     empty = sent({"features": [], "exceededTransferLimit": True})
-    rest = sent({"type": "FeatureCollection", "features": features(ROWS)})
+    rest = sent(collection(features(ROWS)))
     server.on(path, sent({"count": 5}), busy, empty, rest)
     assert ids(fetched(service).read()) == ["11", "12", "13", "14", "15"]
     assert (len(slept), service.page_requests()[-1].query["resultOffset"]) == (1, "2")
@@ -255,28 +248,19 @@ def test_arcgis_may_be_busy_and_send_an_empty_page_before_the_last(
 
 # --- WFS --------------------------------------------------------------------------------------
 
-LAMP = (
-    "<fes:PropertyIsEqualTo><fes:ValueReference>KIND</fes:ValueReference>"
-    "<fes:Literal>lamp</fes:Literal></fes:PropertyIsEqualTo>"
-)
-
 
 @pytest.mark.parametrize("kind", [Wfs, WfsOfGml])
-def test_wfs_combines_filter_and_area(server: Server, fetched: Fetch, kind: type[Wfs]) -> None:
-    service = kind(server)
-    lamps = replace(LAMPS, server_where=LAMP)
-    layer = fetched(service, lamps, area=NEAR).read()
-    assert (ids(layer), layer.counts.read) == (["13"], 1)
-    assert ids(fetched(service, lamps).read()) == ["11", "13", "15"]
-    assert layer.spec.terms == "City of Somewhere (CC BY 4.0)"
+def test_refused_filter_of_a_wfs_is_an_error(
+    server: Server, fetched: Fetch, kind: type[Wfs]
+) -> None:
     with refused(HttpError, "layer 'lamps'", "400", "(No such property)"):
-        fetched(service, replace(LAMPS, server_where=LAMP.replace("lamp<", "x<")))
+        fetched(kind(server), replace(LAMPS, server_where=Wfs.only_lamps.replace("lamp<", "x<")))
 
 
-def test_wfs_without_natural_order_needs_an_id_field(server: Server, fetched: Fetch) -> None:
+def test_wfs_without_natural_order_and_id_field_may_send_one_page(
+    server: Server, fetched: Fetch
+) -> None:
     service = Wfs(server)
-    with refused(HttpError, "layer 'lamps'", "(Cannot do natural order, Add a key)"):
-        fetched(service, replace(LAMPS, id_field=None))
     service.rows = service.rows[:2]  # which fit in one page
     assert len(fetched(service, replace(LAMPS, id_field=None), area=NEAR).read().table) == 1
 
@@ -316,54 +300,21 @@ def test_answer_that_is_not_a_wfs_is_an_error(server: Server, fetched: Fetch) ->
 # --- OGC API - Features -----------------------------------------------------------------------
 
 
-def test_ogc_features_filters_rows(server: Server, fetched: Fetch) -> None:
-    service = OgcFeatures(server)
-    lamps = replace(LAMPS, server_where="KIND = 'lamp'")
-    layer = fetched(service, lamps, area=NEAR).read()
-    assert (ids(layer), layer.spec.license) == (["13"], "https://licence.example/by")
-    assert ids(fetched(service, replace(lamps, id_field="id")).read()) == ["11", "13", "15"]
-
-
-@pytest.mark.parametrize(
-    ("change", "layer", "error", "words"),
-    [
-        ({"filters": ""}, {"server_where": "KIND = 'lamp'"}, CatalogError, ["accepts no filter"]),
-        ({"conforms": ()}, {}, SourceError, ["OGC API - Features", "address", "/ogc"]),
-        ({"next_host": "http://elsewhere.example/x"}, {}, SourceError, ["elsewhere", "endpoints"]),
-    ],
-)
-def test_unsupported_request_to_ogc_features_is_an_error(
-    server: Server,
-    fetched: Fetch,
-    *,
-    change: dict[str, Any],
-    layer: dict[str, Any],
-    error: type[Exception],
-    words: list[str],
-) -> None:
-    service = OgcFeatures(server)
-    for name, value in change.items():
-        setattr(service, name, value)
-    with refused(error, "127.0.0.1", *words):
-        fetched(service, replace(LAMPS, **layer))
+def test_ogc_features_have_ids_of_their_own(server: Server, fetched: Fetch) -> None:
+    layer = fetched(OgcFeatures(server), replace(LAMPS, id_field="id")).read()
+    assert ids(layer) == ["11", "12", "13", "14", "15"]
 
 
 # --- CKAN -------------------------------------------------------------------------------------
 
 
-def test_ckan_datastore_filters_rows(server: Server, fetched: Fetch) -> None:
-    layer = fetched(Ckan(server), replace(LAMPS, server_where='{"KIND": "lamp"}')).read()
-    assert ids(layer) == ["11", "13", "15"]
-    assert layer.spec.terms == "City of Somewhere (CC0)"
-
-
-FILE = {"type": "FeatureCollection", "features": features(ROWS)}
+FILE = collection(features(ROWS))
 CSV = {"format": "csv", "url": "files/lamps_2023.csv", "created": "2023-05-01T00:00:00"}
 NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T00:00:00"}
 
 
 @pytest.mark.parametrize(
-    ("resources", "files", "expected"),
+    "case",
     [
         ([CSV, {"format": "GeoJSON", "url": "/files/lamps.geojson"}], (), "lamps.geojson"),
         ([CSV, {"format": "", "url": "/files/lamps.geojson?a=b"}], ("*.CSV",), "lamps_2023.csv"),
@@ -372,15 +323,10 @@ NEWER = {"format": "CSV", "url": "files/lamps_2024.csv", "created": "2024-05-01T
     ],
 )
 def test_ckan_file_has_the_best_format(
-    server: Server,
-    fetched: Fetch,
-    *,
-    resources: list[dict[str, Any]],
-    files: tuple[str, ...],
-    expected: str,
+    server: Server, fetched: Fetch, case: tuple[Any, ...]
 ) -> None:
     service = Ckan(server)
-    service.resources = resources
+    service.resources, files, expected = case
     table = "OBJECTID,KIND,lon,lat\n" + "".join(
         f"{row['OBJECTID']},{row['KIND']},{row['xy'][0]},{row['xy'][1]}\n" for row in ROWS
     )
@@ -407,30 +353,38 @@ def test_file_may_be_on_another_host_of_the_catalogue(server: Server, fetched: F
     assert len(fetched(service, direct, endpoints=both).read().table) == 5
 
 
+LIMITED = {"server_where": "KIND = 'lamp'"}
 PDF = {"format": "PDF", "url": "/files/map.pdf"}
+FAR = {**CSV, "url": "http://far.example/a.csv"}
+# A service, its attributes, those of the layer, and the error.
+UNUSABLE: list[tuple[type[StandIn], dict[str, Any], dict[str, Any], type[Exception], list[str]]] = [
+    (OgcFeatures, {"filters": ""}, LIMITED, CatalogError, ["127.0.0.1", "accepts no filter"]),
+    (OgcFeatures, {"conforms": ()}, {}, SourceError,
+     ["127.0.0.1", "OGC API - Features", "address", "/ogc"]),
+    (OgcFeatures, {"next_host": "http://elsewhere.example/x"}, {}, SourceError,
+     ["127.0.0.1", "elsewhere", "endpoints"]),
+    (Ckan, {"resources": [PDF]}, {}, CatalogError, ["'lamps'", "no resource", "map.pdf"]),
+    (Ckan, {"resources": [CSV, NEWER]}, {}, CatalogError,
+     ["several", "lamps_2023.csv", "`files`"]),
+    (Ckan, {"resources": [CSV]}, {"server_where": "{}"}, CatalogError,
+     ["'lamps'", "datastore", "`where`"]),
+    (Ckan, {"resources": [CSV]}, {}, SourceError, ["a web page", "/files/lamps_2023.csv"]),
+    (Ckan, {"resources": [FAR]}, {}, SourceError, ["far.example", "endpoi"]),
+    (ArcGIS, {"paging": False}, {}, SourceError,
+     ["'lamps'", "sends 2 rows at most", "smaller area"]),
+    (Wfs, {}, {"id_field": None}, HttpError,
+     ["layer 'lamps'", "(Cannot do natural order, Add a key)"]),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("resources", "layer", "error", "words"),
-    [
-        ([PDF], {}, CatalogError, ["'lamps'", "no resource", "map.pdf"]),
-        ([CSV, NEWER], {}, CatalogError, ["several", "lamps_2023.csv", "`files`"]),
-        ([CSV], {"server_where": "{}"}, CatalogError, ["'lamps'", "datastore", "`where`"]),
-        ([CSV], {}, SourceError, ["a web page", "/files/lamps_2023.csv"]),
-        ([{**CSV, "url": "http://far.example/a.csv"}], {}, SourceError, ["far.example", "endpoi"]),
-    ],
-)
-def test_unusable_ckan_dataset_is_an_error(
-    server: Server,
-    fetched: Fetch,
-    *,
-    resources: list[dict[str, Any]],
-    layer: dict[str, Any],
-    error: type[Exception],
-    words: list[str],
+@pytest.mark.parametrize("case", UNUSABLE)
+def test_unsupported_request_or_unusable_dataset_is_an_error(
+    server: Server, fetched: Fetch, case: tuple[Any, ...]
 ) -> None:
-    service = Ckan(server)
-    service.resources = resources
+    kind, change, layer, error, words = case
+    service = kind(server)
+    for name, value in change.items():
+        setattr(service, name, value)
     server.on("/files/lamps_2023.csv", Answer(b"<html>Moved</html>", type="text/html"))
     with refused(error, *words):
         fetched(service, replace(LAMPS, **layer))
@@ -443,10 +397,9 @@ def test_unusable_ckan_dataset_is_an_error(
 def test_socrata_positions_are_read(server: Server, fetched: Fetch, place: str) -> None:
     service = Socrata(server)
     service.place = place
-    lamps = replace(LAMPS, server_where="KIND = 'lamp'")
+    lamps = replace(LAMPS, server_where=service.only_lamps)
     layer = fetched(service, lamps, area=NEAR).read()
     assert (ids(layer), xy(layer), layer.counts.read) == (["13"], [PLACES[2]], 1)
-    assert layer.spec.terms == "City of Somewhere (PDDL)"
     selection = replace(LAMPS, select=("KIND",), x_field="LON", y_field="LAT")
     assert xy(fetched(service, selection).read()) == PLACES
     with_alias = replace(LAMPS, aliases=(("geo_shape", ("the_place",)),))
@@ -464,9 +417,7 @@ def test_socrata_positions_are_read(server: Server, fetched: Fetch, place: str) 
         '{"features": [{"attributes": {"OBJECTID": 7}, "geometry": {"x": 2.35, "y": 48.85}}]}',
     ],
 )
-def test_file_downloaded_by_hand_is_read(tmp_path: Path, text: str) -> None:
-    path = tmp_path / ("a.csv" if text[0] == "O" else "a.json")
-    path.write_text(text)
+def test_file_downloaded_by_hand_is_read(read_as: Callable[..., RawLayer], text: str) -> None:
     spec = replace(LAMPS, aliases=(("geo_point_2d", ("location",)),))
-    (layer,) = reader("socrata")(path, [spec])
+    layer = read_as("a.csv" if text[0] == "O" else "a.json", text, spec, by="socrata")
     assert (ids(layer), xy(layer), layer.notes) == (["7"], [(2.35, 48.85)], ())

@@ -219,17 +219,17 @@ def associate(
     # By detection: the density of clutter, and of objects that come into range in any direction,
     # as many as leave it.
     used_rows, row = np.unique(rows, return_inverse=True)
-    named = table.named[used_rows] @ photos.scores
+    name_chances = table.named[used_rows] @ photos.scores
     leaving = np.zeros((len(views), len(table.codes)))
     np.add.at(leaving, (owners, kinds), near * table.leaving[kinds, units])
-    names = named[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]
+    names = name_chances[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]
     arriving = (leaving[photos.photo_rows] * names).sum(axis=1)
     clutter = table.clutter @ photos.scores
     floor = (clutter + arriving) * photos.disc / FULL_TURN
     # By pair: the odds of detection, times the densities of bearing, name and range over the floor.
     objects, detections = pairs.objects, pairs.detections
     weights = (detection / missed)[objects] * _bearing_densities(pairs.away, spreads[objects])
-    weights *= named[row[owners[objects]], kinds[objects], detections] / floor[detections]
+    weights *= name_chances[row[owners[objects]], kinds[objects], detections] / floor[detections]
     ranged = np.flatnonzero(~np.isnan(photos.ranges[detections]))
     if len(ranged):
         rows_with_range, metres = detections[ranged], distances[objects[ranged]]
@@ -286,7 +286,7 @@ def associate_pairs(
 
     Returns the chance that each pair is one thing, and the logarithm of the sum of each problem.
     """
-    from semsig_gis.localization.likelihood.association_kernels import associate  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.association_kernels import associate  # noqa: PLC0415 - numba, 0.25 s
 
     chances = np.empty(len(weights))
     log_sums = np.empty(len(pairs.starts) - 1)
@@ -410,7 +410,7 @@ def _replace_best(
     `rank` returns log-likelihoods and turns of cells: it is called for the `first` cells, then for
     more and more up to `count`. The others are shifted by a `sample` of them.
     """
-    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.kernels import promising_cells  # noqa: PLC0415 - numba, 0.25 s
 
     total = old if log_prior is None else old + log_prior
     count = min(count, len(old))
@@ -483,7 +483,7 @@ def _score_cells(
     off_centre: bool,
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
     """Return the log-likelihood of some cells, and the likeliest turns of the photos in each."""
-    from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba loads slowly
+    from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba, 0.25 s
 
     models, points = index.observer_offsets if off_centre else (index.models, np.zeros((1, 2)))
     views = (

@@ -15,12 +15,8 @@ from semsig_gis.core import BEARING_UNITS, FULL_TURN, compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from semsig_gis.localization.likelihood.records import (
-        NoiseModels,
-        PhotoArrays,
-        PlaceObjects,
-        TurnGrid,
-    )
+    from semsig_gis.localization.likelihood.records import PhotoArrays, PlaceObjects, TurnGrid
+    from semsig_gis.localization.noise.table import NoiseModels
 
 _ROOT = math.sqrt(2.0 * math.pi)
 _UNIT = FULL_TURN / BEARING_UNITS  # degrees of a bearing unit

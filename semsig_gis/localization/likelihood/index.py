@@ -198,7 +198,7 @@ class LikelihoodIndex(Displayed):
         Each of the four points is scored as in `scores`, but an observer off the centre sees every
         object shifted by the same offset.
         """
-        from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba takes 250 ms
+        from semsig_gis.localization.likelihood.off_centre import visible_objects_off_centre  # noqa: PLC0415 - numba, 0.25 s
 
         levels, points = self._quarters
         scorers = [
@@ -225,7 +225,7 @@ class LikelihoodIndex(Displayed):
 
     def _scores_by_counts(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the scores of a query without bearings, given the class rows of its objects."""
-        from semsig_gis.localization.likelihood.kernels import count_types  # noqa: PLC0415
+        from semsig_gis.localization.likelihood.kernels import count_types  # noqa: PLC0415 - numba, 0.25 s
 
         types = self.database.type_sequences
         distinct = np.empty(len(types), np.float32)
@@ -254,7 +254,7 @@ def photo_scorer(
 
     For a photo of uncertain north, the scores go on from those `before`, and fill `after`.
     """
-    from semsig_gis.localization.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - numba takes 250 ms
+    from semsig_gis.localization.likelihood.kernels import scan, scan_turned  # noqa: PLC0415 - numba, 0.25 s
 
     table = levels.table
     detections = PhotoTable.of(photo, table)
@@ -317,7 +317,7 @@ def own_sigma(photo: View, north_sigma: float) -> float:
 
 def _turned(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return rows, shape (..., bins), with the values of all turns as neighbours."""
-    from semsig_gis.localization.likelihood.kernels import turned_rows  # noqa: PLC0415 - numba takes 250 ms
+    from semsig_gis.localization.likelihood.kernels import turned_rows  # noqa: PLC0415 - numba, 0.25 s
 
     turned = np.empty((*rows.shape[:-1], BINS // TURNS, 2 * TURNS), np.float32)
     turned_rows(
@@ -360,6 +360,8 @@ class NoiseLevels:
     @classmethod
     def of(cls, table: NoiseTable) -> NoiseLevels:
         """Return the levels of a table."""
+        metres, detected = table.distances, table.detected
+        remaining, leaving = table.remaining, table.leaving
         # Levels are spaced by the logarithm of the distance; a level is the mean of its units.
         units = np.maximum(np.arange(DISTANCE_UNITS + 1), 1)
         logs = (DISTANCE_LEVELS - 1) * np.log(units) / math.log(DISTANCE_UNITS)
@@ -369,7 +371,7 @@ class NoiseLevels:
         def by_level(values: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.bincount(level_of, values, DISTANCE_LEVELS) / count
 
-        distances = np.exp(by_level(np.log(table.distances)))
+        distances = np.exp(by_level(np.log(metres)))
         # Classes with the same errors share their rows.
         errors = np.stack([table.sigma, table.range_sigma], axis=1)
         groups, group_of = np.unique(errors, axis=0, return_inverse=True)
@@ -383,7 +385,6 @@ class NoiseLevels:
         fine /= sigma[..., None] * math.sqrt(2.0 * math.pi)
         fine[fine < LEAST_DENSITY] = 0.0
         # If the chances do not depend on the length of a signature, one row does for all lengths.
-        detected = table.detected
         same = (detected == detected[0]).all() and (table.misnamed == table.misnamed[0]).all()
         return cls(
             table=table,
@@ -396,8 +397,8 @@ class NoiseLevels:
             model=LevelModel(
                 group_of=group_of.reshape(-1),
                 detected=(detected[:1] if same else detected).astype(np.float32),
-                remaining=np.stack([by_level(row) for row in table.remaining]).astype(np.float32),
-                leaving=np.stack([by_level(row) for row in table.leaving]).astype(np.float32),
+                remaining=np.stack([by_level(row) for row in remaining]).astype(np.float32),
+                leaving=np.stack([by_level(row) for row in leaving]).astype(np.float32),
             ),
         )
 
@@ -417,7 +418,7 @@ class NoiseLevels:
 
     def rows(self, photo: PhotoTable) -> NDArray[np.float32]:
         """Return the density of each detection by group, level and bearing of an object."""
-        from semsig_gis.localization.likelihood.kernels import profile_rows  # noqa: PLC0415 - numba takes 250 ms
+        from semsig_gis.localization.likelihood.kernels import profile_rows  # noqa: PLC0415 - numba, 0.25 s
 
         near = np.ones((*self.sigma.shape, len(photo.bearings)))
         ranged = ~np.isnan(photo.ranges)
@@ -436,7 +437,7 @@ class NoiseLevels:
 
     def masses(self, photo: PhotoTable) -> NDArray[np.float32]:
         """Return the chance that an object is in the sectors, by group, level and bearing."""
-        from semsig_gis.localization.likelihood.association_kernels import mass_rows  # noqa: PLC0415
+        from semsig_gis.localization.likelihood.association_kernels import mass_rows  # noqa: PLC0415 - numba, 0.25 s
 
         levels = DISTANCE_LEVELS if len(photo.sectors) else 0
         masses = np.empty((len(self.sigma), levels, BINS), np.float32)

@@ -64,11 +64,11 @@ def _add_up(  # noqa: PLR0917 - a kernel takes no keywords
 ) -> None:
     """Fill `sums` (LANES,) with 1 plus what the objects of a place add to a block of detections.
 
-    `objects` are the odds of detection and the shares out of range of `count` objects, `starts`
-    where each begins in a block of the rows and in the names. `photo` has the rows, of which the
-    block is `above` the first, the names and the disc, of which it begins at `first`. This is a
-    function of its own, and written out, so that the sums stay in one register: a loop over the
-    lanes takes 2.5 times as long.
+    By object, `objects` has the odds of detection and the share out of range, `starts` the first
+    index of the object in the rows and in the names. `photo` has the rows, the names and the disc;
+    the block begins at `above` in the rows and at `first` in the others. This is a function of its
+    own, and written out, so that the sums stay in one register: a loop over the lanes takes 2.5
+    times as long.
     """
     odds, leaving = objects
     row_starts, name_starts = starts

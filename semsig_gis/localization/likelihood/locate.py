@@ -290,8 +290,12 @@ class LikelihoodLocator:
             seconds = time.perf_counter() - start
             answer, estimate = location.answer, location.estimate
             scores = -location.loglik.astype(np.float32)
-            first = [answer.cell] if self.refined else _best_places(location)
-            scores[first] = scores.min() - 1.0
+            best = [answer.cell]
+            if not self.refined:  # all cells that are as good an answer
+                equal = np.flatnonzero(location.chances == location.chances[answer.cell])
+                masses = location.posterior.mass_within(self.rule.radius, equal)
+                best = equal[np.round(masses, 9) == answer.mass]
+            scores[best] = scores.min() - 1.0
             yield Ranking(
                 scores=scores,
                 best_score=-float(location.loglik[answer.cell]),
@@ -573,14 +577,6 @@ def _columns(scores: CellScores, posterior: Posterior, count: int) -> dict[str, 
     if scores.heading is not None:
         columns["heading"] = scores.heading[listed].astype(np.float64)
     return columns
-
-
-def _best_places(location: Location) -> NDArray[np.intp]:
-    """Return the cells that are as good an answer as the answer, and the answer."""
-    chances, answer = location.chances, location.answer
-    equal = np.flatnonzero(chances == chances[answer.cell])
-    masses = location.posterior.mass_within(location.rule.radius, equal)
-    return np.asarray(equal[np.round(masses, 9) == answer.mass])
 
 
 def _with_parts(

@@ -34,11 +34,11 @@ from semsig_gis.core import (
     share_rows,
 )
 from semsig_gis.localization.likelihood.records import (
-    NoiseModels,
     PhotoArrays,
     PlaceObjects,
     TurnGrid,
 )
+from semsig_gis.localization.noise.table import stack_models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,9 +85,8 @@ class PhotoTable:
         ranged = ~np.isnan(ranges)
         disc = np.where(ranged, 2.0 * (np.where(ranged, ranges, 1.0) / table.reach) ** 2, 1.0)
         if photo.scores is None:
-            if size:
-                table.query_rows(photo)  # raises for unknown classes
             codes = np.zeros(size, np.uint8) if photo.codes is None else photo.codes
+            table.class_rows(codes)  # raises for unknown classes
             scores = (table.codes[:, None] == codes) | (codes == WILDCARD)
         else:
             any_class = photo.scores[:, WILDCARD]
@@ -151,7 +150,7 @@ def photo_loglik(
     turns, or only the sum over the `whole`, in which likely places come first, then terms that are
     negligible in the sum (`LOST_SHARE`) are not computed: they get an upper bound.
     """
-    from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba takes 250 ms
+    from semsig_gis.localization.likelihood.association_kernels import sum_associations  # noqa: PLC0415 - numba, 0.25 s
 
     first = tables[0]
     bearing_units = np.minimum(views.bearings * (BEARING_UNITS / FULL_TURN), BEARING_UNITS - 1)
@@ -166,7 +165,7 @@ def photo_loglik(
     )
     prior = np.zeros(turns.shape) if log_prior is None else np.ascontiguousarray(log_prior)
     grid = TurnGrid(np.ascontiguousarray(turns, dtype=np.float64), prior)
-    arrays, models = photo.arrays(tables), _noise_models(tables, weights)
+    arrays, models = photo.arrays(tables), stack_models(tables, weights)
     logliks = np.empty((len(tables), *turns.shape))
     summed = len(tables) * turns.shape[1] * (len(turns) if whole else group)
     margin = math.log(summed / LOST_SHARE)
@@ -182,22 +181,3 @@ def photo_loglik(
         reached = float((logliks[:, :ahead] + prior[:ahead]).max(initial=reached))
     share_rows(lambda part: fill(part + ahead, reached), groups - ahead, least=least)
     return np.asarray(np.logaddexp.reduce(logliks, axis=0))
-
-
-def _noise_models(tables: Sequence[NoiseTable], weights: NDArray[np.float64]) -> NoiseModels:
-    """Return the tables of a mixture as the kernel takes them."""
-
-    def stacked(name: str) -> NDArray[np.float64]:
-        return np.stack([getattr(table, name) for table in tables])
-
-    return NoiseModels(
-        log_weights=np.log(weights),
-        detected=stacked("detected"),
-        misnamed=stacked("misnamed"),
-        clutter=np.array([table.clutter.sum() for table in tables]),
-        remaining=stacked("remaining"),
-        leaving=stacked("leaving"),
-        sigma=stacked("sigmas"),
-        blur=stacked("position_sigma"),
-        distances=tables[0].distances,
-    )

@@ -192,7 +192,7 @@ def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:
     >>> bool(np.allclose(again.chances, location.chances, atol=1e-6))
     True
     """
-    from semsig_gis.storage import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+    from semsig_gis.storage import raster_at_cells  # noqa: PLC0415 - GDAL, 0.08 s
 
     chances = raster_at_cells(
         path,

@@ -313,7 +313,7 @@ def raster_prior(
     >>> round(float(chances.max() / chances.min()), 6)
     3.0
     """
-    from semsig_gis.storage import raster_at_cells  # noqa: PLC0415 - GDAL loads slowly
+    from semsig_gis.storage import raster_at_cells  # noqa: PLC0415 - GDAL, 0.08 s
 
     weights = raster_at_cells(
         path,

@@ -91,27 +91,6 @@ class PhotoArrays(NamedTuple):
     width: float
 
 
-class NoiseModels(NamedTuple):
-    """The models of a noise mixture, for `association_kernels.sum_associations`.
-
-    By model, `log_weights` are the logarithms of their chances, `clutter` the expected number of
-    false detections and `blur` the metres that the observer may be off. By model, length and class,
-    `detected` and `misnamed` are chances. By model, class and distance unit, `remaining` and
-    `leaving` are the shares of the detections of an object that is in range of the observer and
-    that is not, and `sigma` is the deviation of its bearing. `distances` are by distance unit.
-    """
-
-    log_weights: NDArray[np.float64]
-    detected: NDArray[np.float64]
-    misnamed: NDArray[np.float64]
-    clutter: NDArray[np.float64]
-    remaining: NDArray[np.float64]
-    leaving: NDArray[np.float64]
-    sigma: NDArray[np.float64]
-    blur: NDArray[np.float64]
-    distances: NDArray[np.float64]
-
-
 class TurnGrid(NamedTuple):
     """Turns of a photo at n places in degrees, shape (n, turns), and the log of their priors."""
 

@@ -1,1 +1,1 @@
-"""How detectors fail: models, tables, fits."""
+"""Noise models: how detectors and people fail, as parameters and as arrays."""

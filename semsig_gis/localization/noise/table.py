@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -133,18 +133,44 @@ class NoiseTable:
 
     def query_rows(self, query: Signature) -> NDArray[np.int64]:
         """Return the class row of each object of a query, k if unknown; InputError without any."""
-        if not len(query):
+        count = len(query)
+        if not count:
             raise InputError("the query has no objects; give at least one type or bearing.")
         if query.codes is None:
-            return np.full(len(query), len(self.codes))
-        rows = self.row_of[query.codes]
+            return np.full(count, len(self.codes))
+        return self.class_rows(query.codes)
+
+    def class_rows(self, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
+        """Return the row of each class code of a query; InputError if no cell sees a class."""
+        rows = self.row_of[codes]
         if (rows < 0).any():
             raise InputError(
-                f"the query has an object of class code {int(query.codes[rows < 0][0])}, which no "
+                f"the query has an object of class code {int(codes[rows < 0][0])}, which no "
                 "cell of the database sees; leave it out, or give its class as not known "
                 f"(code {WILDCARD})."
             )
         return rows
+
+
+class NoiseModels(NamedTuple):
+    """The models of a noise mixture, for `association_kernels.sum_associations`.
+
+    By model, `log_weights` are the logarithms of their chances, `clutter` the expected number of
+    false detections and `blur` the metres that the observer may be off. By model, length and class,
+    `detected` and `misnamed` are chances. By model, class and distance unit, `remaining` and
+    `leaving` are the shares of the detections of an object that is in range of the observer and
+    that is not, and `sigma` is the deviation of its bearing. `distances` are by distance unit.
+    """
+
+    log_weights: NDArray[np.float64]
+    detected: NDArray[np.float64]
+    misnamed: NDArray[np.float64]
+    clutter: NDArray[np.float64]
+    remaining: NDArray[np.float64]
+    leaving: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    blur: NDArray[np.float64]
+    distances: NDArray[np.float64]
 
 
 def noise_tables(
@@ -184,8 +210,8 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
     The models are for the same classes and lengths; weights sum to one.
     """
     names = np.stack([table.misnamed.mean(axis=0)[:, None] * table.others for table in tables])
-    named = np.tensordot(weights, names, axes=1)
-    totals = named.sum(axis=1, keepdims=True)
+    mean_names = np.tensordot(weights, names, axes=1)
+    totals = mean_names.sum(axis=1, keepdims=True)
     plain = np.tensordot(weights, np.stack([table.others for table in tables]), axes=1)
     position = sum(
         weight * table.position_sigma**2 for weight, table in zip(weights, tables, strict=True)
@@ -199,7 +225,7 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
         codes=tables[0].codes,
         missed=mean("missed"),
         misnamed=mean("misnamed"),
-        others=np.divide(named, totals, out=plain, where=totals > 0),
+        others=np.divide(mean_names, totals, out=plain, where=totals > 0),
         clutter=mean("clutter"),
         sigma=mean("sigma", 2),
         range_sigma=mean("range_sigma", 2),
@@ -207,6 +233,25 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
         ranges=tables[0].ranges,
         fading=mean("fading"),
         reach=tables[0].reach,
+    )
+
+
+def stack_models(tables: Sequence[NoiseTable], weights: NDArray[np.float64]) -> NoiseModels:
+    """Stack the tables of a mixture as compiled kernels take them."""
+
+    def stacked(name: str) -> NDArray[np.float64]:
+        return np.stack([getattr(table, name) for table in tables])
+
+    return NoiseModels(
+        log_weights=np.log(weights),
+        detected=stacked("detected"),
+        misnamed=stacked("misnamed"),
+        clutter=np.array([table.clutter.sum() for table in tables]),
+        remaining=stacked("remaining"),
+        leaving=stacked("leaving"),
+        sigma=stacked("sigmas"),
+        blur=stacked("position_sigma"),
+        distances=tables[0].distances,
     )
 
 

@@ -7,7 +7,7 @@ import functools
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from semsig_gis.core import (
     MAX_HEIGHT_M,
@@ -43,6 +43,39 @@ class Meaning:
     classes: tuple[tuple[str, float], ...]
     height: tuple[float, float] | None = None
     part: bool = False
+
+    @classmethod
+    def parse(cls, value: object, where: str, classes: set[str]) -> Self:
+        """Parse an entry of a map; CatalogError if it is not valid."""
+        item: Mapping[str, Any] = value if isinstance(value, dict) else {"class": value}
+        check_keys(item, MEANING_KEYS, where, ("class",))
+        entry = item["class"]
+        shares = {entry: 1.0} if isinstance(entry, str) else entry
+        numbers = isinstance(shares, dict) and all(
+            isinstance(share, int | float) and not isinstance(share, bool) and 0 < share <= 1
+            for share in shares.values()
+        )
+        if not shares or not numbers or sum(shares.values()) > 1 + ROUNDING:
+            raise CatalogError(
+                f"{where} has class = {entry!r}; write the name of a class, or a table of classes "
+                "with their chances, which sum to 1 at most."
+            )
+        for name in shares:
+            if name not in classes:
+                raise CatalogError(
+                    f"{where} has the class {name!r}, which is unknown"
+                    f"{nearest_name(name, classes)}."
+                )
+        height, sigma = (
+            metres(item[key], key, where, most=MAX_HEIGHT_M) if key in item else None
+            for key in ("height_m", "height_sigma")
+        )
+        check_height(height, sigma, where)
+        return cls(
+            tuple((name, float(share)) for name, share in shares.items()),
+            None if height is None or sigma is None else (height, sigma),
+            part=item.get("part", False),
+        )
 
 
 NO_OBJECT = Meaning(())
@@ -84,8 +117,35 @@ class LabelMap:
         sources = list(maps) or list(label_maps())
         taxonomies = taxonomy, built_in_taxonomy()
         classes = {item.name for part in taxonomies for item in part.classes}
-        meanings = tuple(pair for source in sources for pair in _meanings(source, classes))
-        return cls(meanings, taxonomies)
+        meanings: list[tuple[str, Meaning]] = []
+        built_in = _built_in_maps()
+        for source in sources:
+            name = str(source)
+            try:
+                if name in built_in:
+                    text = built_in[name].read_text(encoding="utf-8")
+                elif Path(source).suffix.lower() == ".toml":
+                    text = read_text(source)
+                else:
+                    raise UnknownNameError(
+                        f"label map {name!r} is unknown{nearest_name(name, built_in)}; give "
+                        f"{', '.join(built_in)} or a TOML file."
+                    )
+            except (OSError, UnicodeDecodeError) as error:
+                reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+                raise InputError(
+                    f"label map {name} cannot be read ({reason}); give a TOML file."
+                ) from error
+            where = f"label map {name}"
+            content = parse_toml(text, where)
+            check_keys(content, MAP_KEYS, where)
+            meanings += [
+                (label, Meaning.parse(value, f"{where}, label {label!r}", classes))
+                for label, value in content.get("labels", {}).items()
+            ]
+            left_out = texts(content.get("left_out", []), "left_out", where)
+            meanings += [(label, NO_OBJECT) for label in left_out]
+        return cls(tuple(meanings), taxonomies)
 
     def find(self, label: str) -> Meaning | None:
         """Return the meaning of a label; None if it is unknown."""
@@ -135,64 +195,3 @@ def _built_in_maps() -> dict[str, Traversable]:
 
 def _plain(label: str) -> str:
     return re.sub(r"[\s_]+", " ", label).strip().casefold()
-
-
-def _meanings(source: str | Path, classes: set[str]) -> list[tuple[str, Meaning]]:
-    """Return the labels of a map, given by name or file, and their meanings."""
-    name, built_in = str(source), _built_in_maps()
-    try:
-        if name in built_in:
-            text = built_in[name].read_text(encoding="utf-8")
-        elif Path(source).suffix.lower() == ".toml":
-            text = read_text(source)
-        else:
-            raise UnknownNameError(
-                f"label map {name!r} is unknown{nearest_name(name, built_in)}; give "
-                f"{', '.join(built_in)} or a TOML file."
-            )
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(
-            f"label map {name} cannot be read ({reason}); give a TOML file."
-        ) from error
-    where = f"label map {name}"
-    content = parse_toml(text, where)
-    check_keys(content, MAP_KEYS, where)
-    meanings = [
-        (label, _meaning(value, f"{where}, label {label!r}", classes))
-        for label, value in content.get("labels", {}).items()
-    ]
-    left_out = texts(content.get("left_out", []), "left_out", where)
-    return meanings + [(label, NO_OBJECT) for label in left_out]
-
-
-def _meaning(value: object, where: str, classes: set[str]) -> Meaning:
-    """Return the meaning of an entry of a map."""
-    item: Mapping[str, Any] = value if isinstance(value, dict) else {"class": value}
-    check_keys(item, MEANING_KEYS, where, ("class",))
-    entry = item["class"]
-    shares = {entry: 1.0} if isinstance(entry, str) else entry
-    numbers = isinstance(shares, dict) and all(
-        isinstance(share, int | float) and not isinstance(share, bool) and 0 < share <= 1
-        for share in shares.values()
-    )
-    if not shares or not numbers or sum(shares.values()) > 1 + ROUNDING:
-        raise CatalogError(
-            f"{where} has class = {entry!r}; write the name of a class, or a table of classes with "
-            "their chances, which sum to 1 at most."
-        )
-    for name in shares:
-        if name not in classes:
-            raise CatalogError(
-                f"{where} has the class {name!r}, which is unknown{nearest_name(name, classes)}."
-            )
-    height, sigma = (
-        metres(item[key], key, where, most=MAX_HEIGHT_M) if key in item else None
-        for key in ("height_m", "height_sigma")
-    )
-    check_height(height, sigma, where)
-    return Meaning(
-        tuple((name, float(share)) for name, share in shares.items()),
-        None if height is None or sigma is None else (height, sigma),
-        part=item.get("part", False),
-    )

@@ -239,19 +239,22 @@ class ViewBuilder:
         scale = np.array([camera.width, camera.height] * 2, dtype=float)
         corners = np.array([box.corners for box, _ in boxes], dtype=float).reshape(-1, 4)
         corners = np.clip(corners * (scale if picture.shares else 1.0), 0.0, scale)
-        bearings, ranges, errors = locate_boxes(
-            camera,
-            corners,
-            heights=np.array([self._height(meaning) for _, meaning in boxes]).reshape(-1, 2),
-            whole=np.array([box.whole for box, _ in boxes], dtype=bool),
-        )
-        # The probability of each class; the rest is any class.
+        # The probability of each class, the rest is any class; the height and its deviation.
         scores = np.zeros((len(boxes), CLASSES))
-        for row, (box, meaning) in zip(scores, boxes, strict=True):
+        heights = np.full((len(boxes), 2), math.nan)
+        for row, height, (box, meaning) in zip(scores, heights, boxes, strict=True):
             for name, share in meaning.classes:
                 row[self._code(name)] += round(share * box.score, SCORE_DIGITS)
             row[WILDCARD] = 0.0
             row[WILDCARD] = max(round(1.0 - row.sum(), SCORE_DIGITS), 0.0)
+            if meaning.height is not None:
+                height[:] = meaning.height
+            elif not meaning.part and len(meaning.classes) == 1:
+                item = self.taxonomy.by_name(meaning.classes[0][0])
+                if item.height_m is not None and item.height_sigma is not None:
+                    height[:] = item.height_m, item.height_sigma
+        whole = np.array([box.whole for box, _ in boxes], dtype=bool)
+        bearings, ranges, errors = locate_boxes(camera, corners, heights=heights, whole=whole)
         tally.photos += 1
         tally.objects += len(boxes)
         tally.ranges += int(np.isfinite(ranges).sum())
@@ -317,15 +320,6 @@ class ViewBuilder:
             return self.taxonomy.by_name(name).code
         except UnknownNameError:
             return WILDCARD
-
-    def _height(self, meaning: Meaning) -> tuple[float, float]:
-        """Return the height of the objects of a label and its standard deviation, or NaN."""
-        height = meaning.height
-        if height is None and not meaning.part and len(meaning.classes) == 1:
-            item = self.taxonomy.by_name(meaning.classes[0][0])
-            if item.height_m is not None and item.height_sigma is not None:
-                height = item.height_m, item.height_sigma
-        return height or (math.nan, math.nan)
 
 
 def field_of_view(shot: Shot) -> float | None:

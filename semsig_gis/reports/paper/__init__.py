@@ -1,1 +1,1 @@
-"""The report that compares our figures with the paper's."""
+"""The report of the paper's experiments, with our figures and the paper's."""

@@ -1,4 +1,4 @@
-"""Select evaluations of the paper's experiments; adjust for its share of unambiguous queries."""
+"""Evaluations of the paper's experiments by name, and shares that are adjusted to the paper's."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def case_of(
     results: Reproduction, experiment: str, method: str, distortion: str = "", *, top: int = 1
 ) -> Evaluation:
-    """Return an evaluation; by default, the distortion has the name of the experiment."""
+    """Return an evaluation; by default, the distortion is named like the experiment."""
     return results.experiments[experiment][f"{distortion or experiment}/{method}-top{top}"]
 
 
@@ -30,15 +30,16 @@ def level_case(results: Reproduction, name: str) -> Evaluation:
 
 
 def is_unambiguous(case: Evaluation) -> NDArray[np.bool_]:
-    """Return whether no other cell has the types of the true cell, for each query."""
+    """Whether no other cell has the types of the true cell, for each query."""
     return np.asarray(case.queries["type_group"] == 1)
 
 
 def reweighted(case: Evaluation, figure: Figure) -> Share:
-    """Return a share, weighted as if the share of unambiguous queries were that of the paper."""
+    """Return a share, weighted so that the share of unambiguous queries is that of the paper."""
     values, unambiguous = share_values(case, figure), is_unambiguous(case)
     if unambiguous.all() or not unambiguous.any():
         return Share.of(values)
+    # The mean and the interval of a stratified sample.
     strata = (
         (paris.UNAMBIGUOUS, values[unambiguous]),
         (1.0 - paris.UNAMBIGUOUS, values[~unambiguous]),

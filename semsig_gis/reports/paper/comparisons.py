@@ -1,4 +1,4 @@
-"""Sections of the paper's report that compare methods: measures, fusions and two stages."""
+"""Sections of the report that compare methods: measures, fusions and two stages."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A section that compares some methods.
+    """A section that compares several methods.
 
     `figures` are the columns: distortion, metres and per cent. `best` are rows that compare the
-    best of some methods with the paper's best: row, methods, distortion, metres and the paper's
-    share. `plots` are a distortion, a kind of plot and the paper's points. `top` candidates count,
-    except for recalls.
+    best of several methods with the paper's best: row, methods, distortion, metres and the paper's
+    share. `plots` are a distortion, a kind of plot and the paper's points. A query succeeds if one
+    of its `top` candidates does, except for recalls.
     """
 
     name: str

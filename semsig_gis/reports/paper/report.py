@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 JUST_5 = "recall@10 %, just 5 % kept"
 GROUP_KEYS = ("count", "mean", "std", "min", "25%", "50%", "75%", "max")
-# By our names of figures: label, unit and decimals.
+# Label, unit and decimals of facts of a database, by key.
 FACTS = {
     "radius_m": ("visibility range", "m", 0),
     "signatures": ("signatures", "", 0),
@@ -52,14 +52,16 @@ FACTS = {
     "file_mb": ("storage", "MB", 1),
 }
 TIMED_COLUMNS = ("types", "angles", "types and angles, 5 %")
-MIDDLING = (10, 19)
-MIDDLING_SEEN = f"{COLUMNS[P50]} of queries that see {MIDDLING[0]} to {MIDDLING[1]} objects"
-# Of the recommended method at medium distortion.
+MIDDLE_LENGTHS = (10, 19)
+MIDDLE_COLUMN = (
+    f"{COLUMNS[P50]} of queries that see {MIDDLE_LENGTHS[0]} to {MIDDLE_LENGTHS[1]} objects"
+)
+# The paper's figures of the recommended method at medium distortion.
 PARIS_P50, PARIS_RECALL10 = paris.ACCURACY[30.0, 16]
 
 
 def reproduction_report(results: Reproduction, *, command: str = "") -> Report:
-    """Return the report: the paper's figures, its possible readings and the likelihood method.
+    """Return the report of the paper's experiments, its interpretations and the likelihood method.
 
     `command` is the command line of the run.
     """
@@ -149,7 +151,7 @@ def _shares(
 
 
 def _just_5(results: Reproduction, experiment: str, row: str, column: str) -> Number:
-    """Return the recall at 10 % if exactly 5 % of the cells are kept, without tied ones.
+    """Return the recall at 10 % if exactly 5 % of the cells are kept, without further tied cells.
 
     Then the best 10 % are those of the first stage.
     """
@@ -187,9 +189,9 @@ def _database_section(results: Reproduction) -> Section:
         Number(row, "", facts[key], paper=paris.DATABASE[key], unit=unit, decimals=decimals)
         for key, (row, unit, decimals) in FACTS.items()
     ]
-    for place, part in enumerate(("type", "angle")):
+    for column, part in enumerate(("type", "angle")):
         for key in GROUP_KEYS:
-            paper = float(paris.GROUPS[key][place].replace(",", ""))
+            paper = float(paris.GROUPS[key][column].replace(",", ""))
             decimals = 1 if key in {"mean", "std"} else 0
             ours = facts["groups"][part][key]
             row = f"groups by {part}: {key}"
@@ -352,7 +354,7 @@ def _unambiguous_section(results: Reproduction) -> Section:
 
 
 def _range_sections(results: Reproduction) -> Iterator[Section]:
-    """Yield the section about visibility ranges, if there are databases of other ranges."""
+    """Yield the section about visibility ranges, if there are databases with other ranges."""
     if not results.variants:
         return
     spec = results.database.spec
@@ -363,12 +365,12 @@ def _range_sections(results: Reproduction) -> Iterator[Section]:
         case = case_of(results, name, BEST, "medium")
         p50, recall10 = paris.ACCURACY.get((radius, spec.levels), (None, None))
         row = f"R = {radius:g} m"
-        middling = case.queries["length"].between(*MIDDLING).to_numpy()
+        middle = case.queries["length"].between(*MIDDLE_LENGTHS).to_numpy()
         numbers += [
             *_shares(case, row, {P50: p50, RECALL10: recall10}),
             _just_5(results, name, row, JUST_5),
             Number(row, "mean length", facts[radius]["mean_length"], decimals=2),
-            share_of(case, P50, middling).number(row, MIDDLING_SEEN),
+            share_of(case, P50, middle).number(row, MIDDLE_COLUMN),
         ]
     ranges = {f"R = {radius:g} m": radius for radius in sorted(names)}
     yield _section(
@@ -446,8 +448,8 @@ def _reading_section(results: Reproduction) -> Section:
             numbers += _shares(case, f"{level}, {scale}", paper)
     medium = level_case(results, "medium")
     row = "as the first, with the paper's share of unambiguous queries"
-    for figure, theirs in paper.items():
-        numbers.append(reweighted(medium, figure).number(row, COLUMNS[figure], theirs))
+    for figure, share in paper.items():
+        numbers.append(reweighted(medium, figure).number(row, COLUMNS[figure], share))
     row = "as the first, but just 5 % of the cells are kept, not all that tie"
     numbers.append(_just_5(results, "medium", row, COLUMNS[RECALL10]))
     errors = [n for n in numbers if n.column == COLUMNS[P50] and n.difference is not None]

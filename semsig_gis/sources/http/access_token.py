@@ -53,7 +53,13 @@ class AccessToken:
         return re.sub(pattern, REDACTED, text)
 
     def redact_blocks(self, blocks: Iterable[bytes]) -> Iterator[bytes]:
-        """Yield a body without the token, which may start in one block and end in another."""
+        """Remove the token from a body; it may start in one block and end in another.
+
+        Yields
+        ------
+        bytes
+            The next part of the body.
+        """
         longest = LONGEST_SPELLING * len(self.value)
         rest = ""
         for block in blocks:

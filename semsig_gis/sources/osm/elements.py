@@ -199,6 +199,6 @@ class ElementLayer:
     def raw(self, crs: str | None) -> RawLayer:
         """Return the layer in WGS 84; another `crs` of the user only causes a note."""
         system, notes = choose_crs(
-            WGS84, implicit=False, expected=self.spec.crs, requested=crs, where=self.rules.file
+            WGS84, expected=self.spec.crs, requested=crs, where=self.rules.file
         )
         return raw_layer(self.rows, self.rules, system, by_file=True, notes=notes)

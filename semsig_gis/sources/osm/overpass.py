@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from semsig_gis.core import InputError, SourceError
-from semsig_gis.sources.area import Area, join_areas, tiles_of
+from semsig_gis.sources.area import Area, fetch_tiles, join_areas, tiles_of
 from semsig_gis.sources.filters import ANY_VALUE
 from semsig_gis.sources.http.fetch import (
     DEFAULT_HTTP,
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from semsig_gis.sources.area import Tile
     from semsig_gis.sources.http.cache import Cache
     from semsig_gis.sources.http.fetch import HttpSpec
     from semsig_gis.sources.layer import RawLayer
@@ -317,18 +318,12 @@ def fetch_layers(
     addresses = [address.rstrip("/").removesuffix("/interpreter") for address in endpoints]
     servers = _Servers(addresses, cache, spec)
     remedy = "give a smaller one, or load an extract of OpenStreetMap"
-    waiting = collections.deque(tiles_of(area, tile_deg, remedy=remedy))
-    paths: list[Path] = []
-    while waiting:
-        tile = waiting.popleft()
-        path = servers.answer(overpass_query(specs, tile.bounds), last=tile.splits == MOST_SPLITS)
-        if path is None:
-            waiting.extendleft(reversed(tile.quarters(area)))
-            continue
-        paths.append(path)
-        if progress is not None:
-            progress(len(paths), len(paths) + len(waiting))
-    return paths
+
+    def fetch_tile(tile: Tile) -> Path | None:
+        last = tile.splits == MOST_SPLITS
+        return servers.answer(overpass_query(specs, tile.bounds), last=last)
+
+    return fetch_tiles(tiles_of(area, tile_deg, remedy=remedy), area, fetch_tile, progress)
 
 
 class _Servers:
@@ -412,7 +407,6 @@ class _Servers:
             cache=self._cache,
             spec=self._spec,
             accept=JSON,
-            suffix=".json",
             identity="overpass",
             check=check,
             before=wait_for_slot,

@@ -35,28 +35,37 @@ def fetch_layer(client: Client, area: Area | None) -> Download:
     """
     dataset = quote(client.dataset, safe="")
     address = f"{client.endpoint}/api/explore/v2.1/catalog/datasets/{dataset}"
+
+    def field_types(reply: bytes) -> dict[str, str]:
+        try:
+            content: Any = parse_json(reply)
+            return {field["name"]: field["type"] for field in content["fields"]}
+        except (KeyError, TypeError, ValueError) as error:
+            raise SourceError(
+                "the portal does not describe its dataset as the Explore API v2.1 does; "
+                "check that the address is that of an Opendatasoft portal."
+            ) from error
+
+    def check_complete(path: Path) -> None:
+        # A whole file starts and ends as GeoJSON does.
+        with path.open("rb") as stream:
+            start = stream.read(16).lstrip()
+            stream.seek(max(0, path.stat().st_size - 16))
+            end = stream.read().rstrip()
+        if not (start.startswith(b"{") and end.endswith(b"}")):
+            raise SourceError("what the portal sent is not whole geojson; try again later.")
+
     types = client.description(
-        ServiceQuery(address), _parse_description, page="explore", accept=("application/json",)
+        ServiceQuery(address), field_types, page="explore", accept=("application/json",)
     )
     file = client.file(
         ServiceQuery(f"{address}/exports/geojson", _query(client, types, area)),
-        _check_complete,
+        check_complete,
         accept=GEOJSON,
         suffix=".geojson",
         progress=client.progress,
     )
     return Download(spec=client.layer, files=(file,))
-
-
-def _parse_description(reply: bytes) -> dict[str, str]:
-    try:
-        content: Any = parse_json(reply)
-        return {field["name"]: field["type"] for field in content["fields"]}
-    except (KeyError, TypeError, ValueError) as error:
-        raise SourceError(
-            "the portal does not describe its dataset as the Explore API v2.1 does; "
-            "check that the address is that of an Opendatasoft portal."
-        ) from error
 
 
 def _query(client: Client, types: Mapping[str, str], area: Area | None) -> dict[str, str | float]:
@@ -97,13 +106,3 @@ def _outline(polygon: BaseGeometry) -> str:
         text = shapely.to_wkt(polygon, rounding_precision=7)
         tolerance *= 2
     return text
-
-
-def _check_complete(path: Path) -> None:
-    """Raise SourceError for a file that does not start and end as GeoJSON does."""
-    with path.open("rb") as stream:
-        start = stream.read(16).lstrip()
-        stream.seek(max(0, path.stat().st_size - 16))
-        end = stream.read().rstrip()
-    if not (start.startswith(b"{") and end.endswith(b"}")):
-        raise SourceError("what the portal sent is not whole geojson; try again later.")

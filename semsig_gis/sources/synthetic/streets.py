@@ -250,7 +250,20 @@ def furnish(
         return _joined(*_lights(network, rng), _on_ground(squares, SQUARE_LIGHT_SPACING_M, rng))
     if class_name == "traffic_light":
         return _joined(*_signals(network, rng))
-    return _scattered(network, RATES[class_name], rng)
+    # Other classes are scattered over all streets; the rate is per kilometre of avenue.
+    free = np.maximum(network.length - network.clear.sum(axis=1), 0.0)
+    rate = RATES[class_name] / 1000.0
+    per_metre = rate / np.where(network.avenue, 1.0, AVENUE_TO_STREET_RATE)
+    # Expected number of objects up to each edge.
+    expected = np.concatenate([[0.0], np.cumsum(free * per_metre)])
+    count = int(expected[-1] + rng.uniform())
+    # One object in each of `count` equal parts of the sum.
+    position = (np.arange(count) + rng.uniform(size=count)) * (expected[-1] / max(count, 1))
+    edge = np.searchsorted(expected, position, side="right") - 1
+    t = network.clear[edge, 0] + (position - expected[edge]) / per_metre[edge]
+    number = expand_counts(np.bincount(edge, minlength=len(network)))[1]
+    side = rng.choice([-1.0, 1.0], size=count)
+    return _Row(edge, number, t).objects(network, side, SETBACK_M)
 
 
 def _joined(*parts: Furniture) -> Furniture:
@@ -358,22 +371,6 @@ def _signals(network: Network, rng: np.random.Generator) -> list[Furniture]:
         row = _Row(edge, np.full(len(edge), end), t)
         parts.append(row.objects(network, np.full(len(edge), side), SETBACKS_M["traffic_light"]))
     return parts
-
-
-def _scattered(network: Network, rate: float, rng: np.random.Generator) -> Furniture:
-    """Scatter objects over all streets; `rate` is objects per kilometre of avenue."""
-    free = np.maximum(network.length - network.clear.sum(axis=1), 0.0)
-    per_metre = rate / 1000.0 / np.where(network.avenue, 1.0, AVENUE_TO_STREET_RATE)
-    # Expected number of objects up to each edge.
-    expected = np.concatenate([[0.0], np.cumsum(free * per_metre)])
-    count = int(expected[-1] + rng.uniform())
-    # One object in each of `count` equal parts of the sum.
-    position = (np.arange(count) + rng.uniform(size=count)) * (expected[-1] / max(count, 1))
-    edge = np.searchsorted(expected, position, side="right") - 1
-    t = network.clear[edge, 0] + (position - expected[edge]) / per_metre[edge]
-    number = expand_counts(np.bincount(edge, minlength=len(network)))[1]
-    side = rng.choice([-1.0, 1.0], size=count)
-    return _Row(edge, number, t).objects(network, side, SETBACK_M)
 
 
 def _on_ground(grounds: NDArray[np.object_], spacing: float, rng: np.random.Generator) -> Furniture:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import contextvars
 import itertools
 import logging
@@ -18,7 +17,7 @@ from semsig_gis.sources.rows import BadFeatureError, Rows
 from semsig_gis.sources.vector.member import GEOJSON, NOT_UTF8, OUT_OF_REACH, unreadable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from semsig_gis.sources.rows import Position
     from semsig_gis.sources.vector.member import Member
@@ -47,23 +46,14 @@ for _name in LOGGERS:
     logging.getLogger(_name).addFilter(_capture)
 
 
-@contextlib.contextmanager
-def _captured_records() -> Iterator[list[logging.LogRecord]]:
-    """Collect the log records of the block in a list."""
-    records: list[logging.LogRecord] = []
-    token = _records.set(records)
-    try:
-        yield records
-    finally:
-        _records.reset(token)
-
-
 def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, tuple[str, ...]]:
     """Return the rows of a layer of `count` rows with errors of bad rows, and notes."""
     options: dict[str, Any] = {"enabled_drivers": [member.driver]}
     if member.driver != GEOJSON:  # its driver cannot select fields
         options["include_fields"] = list(fields)
-    with _captured_records() as records:
+    records: list[logging.LogRecord] = []
+    token = _records.set(records)
+    try:
         try:
             source = fiona.open(member.address, layer=member.layer, **options)
         except Exception as error:
@@ -71,6 +61,8 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
         with source:
             # GDAL parses a GeoJSON file as a whole, so that its messages do not belong to a row.
             rows = _rows(source, fields, count, records if member.driver != GEOJSON else [])
+    finally:
+        _records.reset(token)
     undecoded = any(record.getMessage().startswith("Failed to decode") for record in records)
     return rows, (NOT_UTF8,) if undecoded else ()
 

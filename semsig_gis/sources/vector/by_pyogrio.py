@@ -155,7 +155,13 @@ def read_each(member: Member, fields: Sequence[str], count: int) -> tuple[Rows, 
     """
     rows = Rows()
     undecoded: list[str] = []
-    null_rows = _null_shapes(member)
+    null_rows: set[int] | None = None  # of a shapefile, which states them
+    if member.driver == SHAPEFILE:
+        with member.open() as stream, member.sibling(".shx").open() as index:
+            content, starts = stream.read(), np.frombuffer(index.read()[100:], dtype=">i4")[::2]
+        # The geometry type follows the 8 bytes of the header of a record; 0 is null.
+        kinds = ((row, content[8 + 2 * at : 12 + 2 * at]) for row, at in enumerate(starts, 1))
+        null_rows = {row for row, kind in kinds if kind == bytes(4)}
     step, failures = count, 0
     while rows.read < count:
         step = min(step, count - rows.read)
@@ -295,14 +301,3 @@ def _place(rows: Rows, shape: bytes, *, null: bool) -> Position | str:
             return f"its {GEOMETRY_TYPES.get(_kind(shape), 'geometry')} is not valid ({error})"
         rows.closed += 1
         return shapely.force_2d(closed)
-
-
-def _null_shapes(member: Member) -> set[int] | None:
-    """Return the rows of a shapefile with a null geometry; None for other formats."""
-    if member.driver != SHAPEFILE:
-        return None
-    with member.open() as stream, member.sibling(".shx").open() as index:
-        content, starts = stream.read(), np.frombuffer(index.read()[100:], dtype=">i4")[::2]
-    # The geometry type follows the 8 bytes of the header of a record; 0 is null.
-    kinds = ((row, content[8 + 2 * start : 12 + 2 * start]) for row, start in enumerate(starts, 1))
-    return {row for row, kind in kinds if kind == bytes(4)}

@@ -144,9 +144,7 @@ def read_tables(
     for member, layer in layers:
         if names := choose(layer.fields):
             fields = tuple(field for field in layer.fields if field in names)
-            yield _read_member(
-                member, layer, fields, expected=None, requested=crs, where=str(member)
-            )
+            yield _read_member(member, layer, fields, requested=crs, where=str(member))
 
 
 def spatial_layers(path: Path) -> tuple[tuple[Member, LayerDescription], ...]:
@@ -167,7 +165,7 @@ def _read_member(
     layer: LayerDescription,
     fields: tuple[str, ...],
     *,
-    expected: str | None,
+    expected: str | None = None,
     requested: str | None,
     where: str,
 ) -> TableRows:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from semsig_gis.core import WILDCARD, Displayed, InputError, ObjectIndex, cell_ids
 from semsig_gis.database import SignatureDatabase, visible_objects_at, visible_objects_in
-from semsig_gis.localization.noise.fit import (
+from semsig_gis.localization.learning.fit import (
     ALL,
     KNOTS,
     LEAST,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature, Taxonomy
     from semsig_gis.database import Footprints, VisibleObjects
-    from semsig_gis.localization.noise.fit import Evidence
+    from semsig_gis.localization.learning.fit import Evidence
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.objects import StreetObjects
     from semsig_gis.storage import Row
@@ -227,12 +227,12 @@ def learn_noise(
     The rate of a class with n samples and its own rate r is
     ``(n * r + 8 * overall) / (n + 8)``, so the overall rate counts for eight samples; the same
     holds for squares of deviations. A row of the confusion has eight samples added that are
-    misnamed at the overall rate, each other class equally often. See `localization.noise.fit` for
-    the intervals.
+    misnamed at the overall rate, each other class equally often. See `localization.learning.fit`
+    for the intervals.
 
     Examples
     --------
-    >>> from semsig_gis.localization.noise.learn import Sample
+    >>> from semsig_gis.localization.learning.learn import Sample
     >>> cells = demo_database.cell_ids[:50].tolist()
     >>> seen = [
     ...     Sample(signature=demo_database.signature(row), cell_id=cell)
@@ -299,7 +299,14 @@ def _true_views(
         )
     photos = np.array([len(View.of(sample.signature).photos) for sample in samples])
     if isinstance(city, SignatureDatabase):
-        true_ids = np.array([_cell_id(sample, city) for sample in samples])
+        true_ids = np.array(
+            [
+                cell_ids(*city.grid.cells_at(np.array([sample.xy])))[0]
+                if sample.cell_id is None
+                else sample.cell_id
+                for sample in samples
+            ]
+        )
         cells = np.minimum(np.searchsorted(city.cell_ids, true_ids), len(city) - 1)
         used = np.flatnonzero(city.cell_ids[cells] == true_ids)
         views = visible_objects_in(city, np.repeat(cells[used], photos[used]))
@@ -323,12 +330,6 @@ def _true_views(
             "cell ids."
         )
     return views, used.tolist()
-
-
-def _cell_id(sample: Sample, database: SignatureDatabase) -> int:
-    if sample.cell_id is not None:
-        return sample.cell_id
-    return int(cell_ids(*database.grid.cells_at(np.array([sample.xy])))[0])
 
 
 def _spec(

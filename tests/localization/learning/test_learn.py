@@ -4,7 +4,7 @@ import json
 import math
 import random
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -147,8 +147,7 @@ def test_rates_of_a_rare_class_are_shrunk_to_the_overall_rate() -> None:
     codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
     estimate = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
     name = TAXONOMY.by_code(rare).name
-    rates = estimate.rates.to_dict("records")
-    (row,) = (row for row in rates if (row["quantity"], row["class"]) == ("detection", name))
+    row: Any = estimate.rates.set_index(["quantity", "class"]).loc["detection", name]
     overall = estimate.spec.detection
     assert row["samples"] == 2
     assert abs(row["value"] - overall) < abs(row["own"] - overall) + 1e-9

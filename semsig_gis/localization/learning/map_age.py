@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from semsig_gis.core import Displayed, InputError
-from semsig_gis.localization.noise.fit import LEAST, MOST, shrunk_rates
+from semsig_gis.localization.learning.fit import LEAST, MOST, shrunk_rates
 from semsig_gis.objects import ClassChange
 from semsig_gis.sources import data_folder
 from semsig_gis.storage import parse_toml, read_values
