@@ -258,7 +258,7 @@ def update_database(
             f"the object store lacks the {' and '.join(lacking)} that the database was built with; "
             "build the database again."
         )
-    merged, kept, notes = replace_layers(store.objects, objects)
+    merged, other_layers, notes = replace_layers(store.objects, objects)
     streets = store.streets if database.viewpoints.mode == "streets" else None
     new = replace(
         database,
@@ -273,7 +273,7 @@ def update_database(
             f"class {furthest.name!r} is seen from {new.reach:g} m, further than any class of the "
             f"database ({database.reach:g} m), which affects every cell; build the database again."
         )
-    change = _find_change(new, store.objects, merged, kept=kept, notes=notes)
+    change = _find_change(new, store.objects, merged, other_layers=other_layers, notes=notes)
     after = replace(store, objects=merged)
     stale = np.isin(database.cell_ids, change.cell_ids)
     recomputed = _recompute(new, after, change, progress=progress)
@@ -349,8 +349,8 @@ def update_tiles(
     before = open_database(next(iter(files.values()))).select(slice(0))
     inputs = stored_inputs(folder)
     old, new = open_objects(inputs.pop("objects")), open_objects(objects)
-    merged, kept, notes = replace_layers(old, new)
-    result = merged if kept else new
+    merged, other_layers, notes = replace_layers(old, new)
+    result = merged if other_layers else new
     facts: dict[str, Any] = {
         "taxonomy": result.taxonomy,
         "licenses": (*map(str, result.licenses), *before.licenses[len(old.licenses) :]),
@@ -364,14 +364,14 @@ def update_tiles(
             f"{before.reach:g} m, which affects every cell; build the database again."
         )
     ranged = replace(after, taxonomy=merged.taxonomy)
-    change = _find_change(ranged, old, merged, kept=kept, notes=notes)
+    change = _find_change(ranged, old, merged, other_layers=other_layers, notes=notes)
     side = int(manifest.recipe["tile"]["cells"])
     tiles = np.unique(np.stack(split_ids(change.cell_ids), axis=1) // side, axis=0)
     stale: set[Tile] = {(column, row) for column, row in tiles.tolist()}
     target = Path(path if out is None else out)
     with working_folder(target) as work:
         source = Path(objects)
-        if kept:
+        if other_layers:
             source = work / "objects.parquet"
             save_objects(merged, source)
         plan = plan_tiles(
@@ -446,7 +446,7 @@ def _find_change(
     old: StreetObjects,
     new: StreetObjects,
     *,
-    kept: tuple[str, ...],
+    other_layers: tuple[str, ...],
     notes: tuple[str, ...],
 ) -> _Change:
     """Compare objects, and find the cells in range of a change; ranges are of the `database`."""
@@ -468,8 +468,8 @@ def _find_change(
         places=places,
         cell_ids=ids,
         classes=changes.classes,
-        replaced=tuple(sorted(layers - {*kept})),
-        kept=kept,
+        replaced=tuple(sorted(layers - {*other_layers})),
+        kept=other_layers,
         notes=notes,
     )
 

@@ -91,12 +91,12 @@ def compare_objects(old: StreetObjects, new: StreetObjects) -> ObjectChanges:
     candidates = [_unique_ids(*pair) for pair in zip(remaining, tables, strict=True)]
     linked = _equal_rows(*candidates)
     equal_class = old.codes[linked[:, 0]] == new.codes[linked[:, 1]]
-    moved, changed = linked[equal_class], linked[~equal_class]
+    same_class, other_class = linked[equal_class], linked[~equal_class]
     removed, added = (
         _without(table, linked[:, side]).index.to_numpy() for side, table in enumerate(remaining)
     )
     changes = ObjectChanges(
-        same=same, moved=moved, changed=changed, removed=removed, added=added, classes=()
+        same=same, moved=same_class, changed=other_class, removed=removed, added=added, classes=()
     )
     return replace(changes, classes=tuple(_by_class(old, new, changes)))
 

@@ -232,10 +232,10 @@ def comparison_sentence(
         return f"{second} places as many {within} as {first}."
     more, low, high = (f"{round(point, 1) + 0.0:.1f}" for point in points)  # no -0
     chance = "" if points[1] > 0.0 else ", which may be chance"
-    gained, lost = changed
+    gains, losses = changed
     return (
         f"{second} places {more} points {word} {within} than {first}{chance} "
-        f"(95 %: {low} to {high}): {gained:,} queries gained, {lost:,} lost."
+        f"(95 %: {low} to {high}): {gains:,} queries gained, {losses:,} lost."
     )
 
 

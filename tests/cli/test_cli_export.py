@@ -21,7 +21,7 @@ from semsig_gis.cli.localize import print_localization
 from semsig_gis.database import ObjectStore, open_database, save_database, save_with_store
 from semsig_gis.evaluation import save_evaluation, save_identifiability
 from semsig_gis.exports import cell_errors
-from semsig_gis.localization import localize
+from semsig_gis.localization import Localization, localize
 from semsig_gis.objects import open_objects, save_objects
 from semsig_gis.observation import parse_view
 
@@ -114,6 +114,7 @@ def test_number_of_ties_is_printed(
     database, _ = small_city()
     query = parse_view({"types": "D"}, taxonomy=database.taxonomy, radius=30.0)
     answer = localize(database, query, method="types:edit", top=1)
+    assert isinstance(answer, Localization)
     print_localization(dataclasses.replace(answer, tied_beyond=tied))
     assert f"\n{words}" in capsys.readouterr().out
 

@@ -219,17 +219,17 @@ def associate(
     # By detection: the density of clutter, and of objects that come into range in any direction,
     # as many as leave it.
     used_rows, row = np.unique(rows, return_inverse=True)
-    named = table.named[used_rows] @ photos.scores
+    name_chances = table.named[used_rows] @ photos.scores
     leaving = np.zeros((len(views), len(table.codes)))
     np.add.at(leaving, (owners, kinds), near * table.leaving[kinds, units])
-    names = named[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]
+    names = name_chances[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]
     arriving = (leaving[photos.photo_rows] * names).sum(axis=1)
     clutter = table.clutter @ photos.scores
     floor = (clutter + arriving) * photos.disc / FULL_TURN
     # By pair: the odds of detection, times the densities of bearing, name and range over the floor.
     objects, detections = pairs.objects, pairs.detections
     weights = (detection / missed)[objects] * _bearing_densities(pairs.away, spreads[objects])
-    weights *= named[row[owners[objects]], kinds[objects], detections] / floor[detections]
+    weights *= name_chances[row[owners[objects]], kinds[objects], detections] / floor[detections]
     ranged = np.flatnonzero(~np.isnan(photos.ranges[detections]))
     if len(ranged):
         rows_with_range, metres = detections[ranged], distances[objects[ranged]]

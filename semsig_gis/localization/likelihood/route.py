@@ -83,14 +83,14 @@ def moved_chances(
     up, up_share = _axis_shares(leg.dy / database.grid.step, leg.sigma / database.grid.step)
     ids = database.cell_ids
     source = np.flatnonzero(chances > _LEAST_MOVED_CHANCE * chances.max(initial=0.0))
-    moved = np.zeros(len(chances))
+    result = np.zeros(len(chances))
     for column, column_share in zip(across, across_share, strict=True):
         for row, row_share in zip(up, up_share, strict=True):
             target = ids[source] + (int(column) * ROW_SPAN + int(row))
             rows = np.minimum(np.searchsorted(ids, target), len(ids) - 1)
             inside = ids[rows] == target
-            moved[rows[inside]] += column_share * row_share * chances[source[inside]]
-    return moved
+            result[rows[inside]] += column_share * row_share * chances[source[inside]]
+    return result
 
 
 def _axis_shares(length: float, sigma: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -210,8 +210,8 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
     The models are for the same classes and lengths; weights sum to one.
     """
     names = np.stack([table.misnamed.mean(axis=0)[:, None] * table.others for table in tables])
-    named = np.tensordot(weights, names, axes=1)
-    totals = named.sum(axis=1, keepdims=True)
+    mean_names = np.tensordot(weights, names, axes=1)
+    totals = mean_names.sum(axis=1, keepdims=True)
     plain = np.tensordot(weights, np.stack([table.others for table in tables]), axes=1)
     position = sum(
         weight * table.position_sigma**2 for weight, table in zip(weights, tables, strict=True)
@@ -225,7 +225,7 @@ def mean_table(tables: tuple[NoiseTable, ...], weights: NDArray[np.float64]) -> 
         codes=tables[0].codes,
         missed=mean("missed"),
         misnamed=mean("misnamed"),
-        others=np.divide(named, totals, out=plain, where=totals > 0),
+        others=np.divide(mean_names, totals, out=plain, where=totals > 0),
         clutter=mean("clutter"),
         sigma=mean("sigma", 2),
         range_sigma=mean("range_sigma", 2),

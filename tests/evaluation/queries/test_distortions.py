@@ -296,9 +296,9 @@ def test_missing_and_known_classes_are_complementary(
     original: Sight, names: set[str], seed: int
 ) -> None:
     missing = distorted_sight(MissingClasses(classes=tuple(names)), original, seed)
-    known = distorted_sight(MissingClasses(classes=tuple(names), others=True), original, seed)
+    sight = distorted_sight(MissingClasses(classes=tuple(names), others=True), original, seed)
     assert rows(missing) == [row for row in rows(original) if NAMES[row[0]] not in names]
-    assert rows(known) == [row for row in rows(original) if NAMES[row[0]] in names]
+    assert rows(sight) == [row for row in rows(original) if NAMES[row[0]] in names]
 
 
 @settings(max_examples=30)

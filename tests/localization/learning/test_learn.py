@@ -4,7 +4,7 @@ import json
 import math
 import random
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -147,7 +147,7 @@ def test_rates_of_a_rare_class_are_shrunk_to_the_overall_rate() -> None:
     codes[np.flatnonzero(codes == 1)[:2]] = rare  # which is never detected below
     estimate = learn_noise(simulated(DATABASE, 200), replace(DATABASE, codes=codes))
     name = TAXONOMY.by_code(rare).name
-    row = estimate.rates.set_index(["quantity", "class"]).loc["detection", name]
+    row: Any = estimate.rates.set_index(["quantity", "class"]).loc["detection", name]
     overall = estimate.spec.detection
     assert row["samples"] == 2
     assert abs(row["value"] - overall) < abs(row["own"] - overall) + 1e-9
@@ -363,8 +363,8 @@ def test_intervals_of_certain_associations_equal_the_textbook() -> None:
         for row in range(300)
     ]
     evidence = gather_evidence(views, signatures, taxonomy=TAXONOMY)
-    known = {"missed": np.array([[0.1]]), "clutter": np.array([1e-6]), "sigma": np.ones(1)}
-    model = replace(evidence.start, **known)
+    missed, clutter = np.array([[0.1]]), np.array([1e-6])
+    model = replace(evidence.start, missed=missed, clutter=clutter, sigma=np.ones(1))
     rates = estimated_rates(evidence, expected_counts(evidence, model), model)
     rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
     detection = rows["detection"]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def save(folder: Path, **groups: Mapping[Any, Any]) -> Path:
+def save(folder: Path, **groups: Any) -> Path:  # noqa: ANN401 - tags of any kind
     """Write a picture with EXIF tags of the groups ``image``, ``exif`` and ``gps``."""
     (folder / "a.jpg").write_bytes(picture(**groups))
     return folder / "a.jpg"
