@@ -106,6 +106,15 @@ class MapPage(BrowserPage):
         self.browser.get(address)
         self.ask_later(READY)
 
+    def follow(self, address: str) -> None:
+        """Open an address like a link on another page, without stored colours."""
+        self.browser.get("about:blank")
+        storage = {"origin": "file://", "storageTypes": "local_storage"}
+        self.browser.execute_cdp_cmd("Storage.clearDataForOrigin", storage)
+        for log in ("browser", "performance"):
+            self.browser.get_log(log)
+        self.visit(address)
+
     def ask_later(self, script: str, *arguments: Any) -> Any:  # noqa: ANN401
         """Return what a script passes to its last argument, a callback."""
         return self.browser.execute_async_script(ASK + script, *arguments)
@@ -154,9 +163,13 @@ class MapPage(BrowserPage):
         """Wait until arrays are unpacked, canvases are drawn, and the map is at rest."""
         self.ask_later("unpacked().then(() => atRest(arguments[0]))")
 
+    def until(self, condition: Callable[[], Any]) -> Any:  # noqa: ANN401
+        """Wait until a condition has a true value, and return it."""
+        return WebDriverWait(self.browser, PATIENCE_S, 0.02).until(lambda _: condition())
+
     def until_gone(self, selector: str) -> None:
         """Wait until the last such element has faded away."""
-        WebDriverWait(self.browser, PATIENCE_S).until(lambda _: self.all(selector) == [])
+        self.until(lambda: self.all(selector) == [])
 
     def panel(self) -> str:
         """Return the text of the panel, empty if it is closed."""

@@ -100,14 +100,14 @@ def decompression_bomb() -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data)
 
 
-def picture(form: str = "JPEG", **sections: Mapping[Any, Any]) -> bytes:
-    """Return a picture with EXIF tags in the sections ``image``, ``exif`` and ``gps``."""
+def picture(**sections: Mapping[Any, Any]) -> bytes:
+    """Return a JPEG picture with EXIF tags in the sections ``image``, ``exif`` and ``gps``."""
     exif = Image.Exif()
     exif.update(sections.get("image", {}))
     exif.get_ifd(IFD.Exif).update(sections.get("exif", {}))
     exif.get_ifd(IFD.GPSInfo).update(sections.get("gps", {}))
     content = io.BytesIO()
-    Image.new("RGB", (400, 300)).save(content, form, exif=exif)
+    Image.new("RGB", (400, 300)).save(content, "JPEG", exif=exif)
     return content.getvalue()
 
 

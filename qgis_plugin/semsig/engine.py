@@ -201,9 +201,13 @@ class Engine:
         line += ["--disable-pip-version-check", "--progress-bar=off", f"--constraint={CONSTRAINTS}"]
         if wishes.wheels:
             line += ["--no-index", f"--find-links={wishes.wheels}"]
+        # The wheel in the plugin if there is one, else the package index.
+        wheels = sorted(HERE.glob("semsig_gis-*.whl"))
+        extras = "[raster,serve]"
+        package = f"{wheels[-1]}{extras}" if wheels else f"semsig_gis{extras}=={self.version}"
         watcher.progress(CREATED, "gathering packages")
         step.run(
-            [*line, _requirement(self.version)],
+            [*line, package],
             "The packages cannot be installed",
             hear=packages.hear,
             look=packages.look,
@@ -304,12 +308,6 @@ def _program(folder: Path, name: str) -> Path:
     return folder / "bin" / name
 
 
-def _requirement(version: str) -> str:
-    """Return the requirement for pip: the wheel in the plugin if there is one, else by version."""
-    wheels = sorted(HERE.glob("semsig_gis-*.whl"))
-    return f"{wheels[-1]}[raster,serve]" if wheels else f"semsig_gis[raster,serve]=={version}"
-
-
 def _remove(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -338,7 +336,9 @@ def find_python(setting: str, environment: Mapping[str, str], *, wheels: str = "
     """
     incomplete = ""
     versions: list[str] = []
-    fitting = _versions(wheels) if wheels else set()
+    # Versions of Python in the names of the wheels.
+    names = [wheel.name for wheel in Path(wheels).glob("*.whl")] if wheels else []
+    fitting = {(3, int(tag[1])) for tag in map(WHEEL_TAG.search, names) if tag is not None}
     others = False
     for program in [setting] if setting else _pythons(environment):
         answer = _probe(program, environment)
@@ -377,12 +377,6 @@ def find_python(setting: str, environment: Mapping[str, str], *, wheels: str = "
             f"from python.org or your system's packages, then press Install in {ENGINE}"
         )
     raise CommandError(message)
-
-
-def _versions(wheels: str) -> set[tuple[int, int]]:
-    """Return the versions of Python in the names of wheels in a folder."""
-    tags = (WHEEL_TAG.search(wheel.name) for wheel in Path(wheels).glob("*.whl"))
-    return {(3, int(tag[1])) for tag in tags if tag is not None}
 
 
 def _pythons(environment: Mapping[str, str]) -> Iterator[str]:

@@ -103,7 +103,8 @@ def _run() -> int:
     if supervised():
         stop_with_supervisor()
     with warnings.catch_warnings():
-        warnings.showwarning = _show_warning
+        # One sentence, without its line of code.
+        warnings.showwarning = lambda message, *_, **__: _remark(str(message))
         code = run()
     if sys.stdout is not None:
         sys.stdout.flush()
@@ -162,11 +163,6 @@ def _interrupt_again(hook_ended: threading.Event) -> None:
         signal.pthread_kill(main_thread, signal.SIGINT)  # also ends system calls that wait
     else:
         _thread.interrupt_main()
-
-
-def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    """Print a warning as one sentence, without its line of code."""
-    _remark(str(message))
 
 
 def _remark(text: str) -> None:

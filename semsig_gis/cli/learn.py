@@ -35,7 +35,6 @@ from semsig_gis.core import percent
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
 
-    import pandas as pd
     from numpy.typing import NDArray
 
     from semsig_gis.database import City, SignatureDatabase
@@ -68,7 +67,7 @@ def learn(
     from dataclasses import replace
 
     from semsig_gis.database import open_city
-    from semsig_gis.localization import check_map_age, fresh_noise, read_samples, save_noise
+    from semsig_gis.localization import ALL, check_map_age, fresh_noise, read_samples, save_noise
 
     keep_inputs(out, read=(database, samples, objects, drift_report))
     check_map_age(map_age)
@@ -91,7 +90,12 @@ def learn(
         f"Learnt from {estimate.detections:,} detections at {estimate.samples:,} places that see "
         f"{estimate.objects:,} objects{skipped_text}",
         ("quantity", "class", "value", "own samples only", "95% interval", "samples"),
-        _rates(estimate.rates),
+        [
+            _rate(row)
+            for row in estimate.rates.to_dict("records")
+            # Fading by class is only in the file.
+            if row["quantity"] != "fading" or row["class"] == ALL
+        ],
     )
     if map_age:
         say(
@@ -139,14 +143,6 @@ def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[A
         for sample in samples
     ]
     return np.array(places)
-
-
-def _rates(rates: pd.DataFrame) -> list[list[str]]:
-    """Return rates as rows of a table; fading by class is only in the file."""
-    from semsig_gis.localization import ALL
-
-    selected = rates[(rates["quantity"] != "fading") | (rates["class"] == ALL)]
-    return [_rate(row) for row in selected.to_dict("records")]
 
 
 def _rate(row: dict[Hashable, Any]) -> list[str]:

@@ -326,17 +326,17 @@ def print_location(location: Location) -> None:
     """Print an answer by likelihood."""
     ranks = location.columns["rank"].tolist()
     _print_candidates(location, f"likelihood ({location.noise} noise)", ranks, "chance")
-    known = location.known
-    if near := known.get("near"):
+    knowledge = location.known
+    if near := knowledge.get("near"):
         say(
             f"Known: near {near['lat']:.6f}, {near['lon']:.6f} (lat, lon), x {near['x']:.1f}, "
             f"y {near['y']:.1f}, ± {near['sigma']:g} m, read as {near['read_as']}."
         )
-    if area := known.get("area"):
+    if area := knowledge.get("area"):
         say(f"Known: in the area {area['file']}, which has {area['cells']:,} cells.")
-    if popularity := known.get("popularity"):
+    if popularity := knowledge.get("popularity"):
         say(f"Known: places are weighted by {popularity['file']}.")
-    if require := known.get("require"):
+    if require := knowledge.get("require"):
         say(f"Known: {require['text']} is in sight, as in {require['cells']:,} cells.")
     for rank, explanation in enumerate(location.explanations, 1):
         _print_explanation(rank, explanation, location.north)
@@ -393,9 +393,9 @@ def print_query(answer: Answer) -> None:
             north = "; north unknown"
         of = f" of photo {number + 1}" if len(view.photos) > 1 else ""
         say(f"Seen{of}: {objects}{looked}{north}.")
-    known: Mapping[str, Any] = getattr(answer, "known", {})
+    knowledge: Mapping[str, Any] = getattr(answer, "known", {})
     for name, label in (("seen", "Seen somewhere"), ("absent", "Not there")):
-        if titles := known.get(name):
+        if titles := knowledge.get(name):
             say(f"{label}: {', '.join(titles)}.")
 
 

@@ -21,8 +21,6 @@ from semsig_gis.cli.console import (
 from semsig_gis.core import InputError
 
 if TYPE_CHECKING:
-    from collections import Counter
-
     from semsig_gis.core import Taxonomy
     from semsig_gis.observation import Tally
 
@@ -214,7 +212,10 @@ def _print_remarks(tally: Tally) -> None:
     ):
         if labels:
             boxes = _many(labels.total(), "box", "boxes")
-            remark(f"left out: {boxes} {what}: {_listed(labels)}")
+            frequent = labels.most_common(MOST_NAMES)
+            names = ", ".join(f"{label} {count:,}" for label, count in frequent)
+            more = f" and {len(labels) - MOST_NAMES:,} more" if len(labels) > MOST_NAMES else ""
+            remark(f"left out: {boxes} {what}: {names}{more}")
     if tally.unknown_heading:
         pictures = _many(tally.unknown_heading, "picture")
         remark(
@@ -229,10 +230,3 @@ def _print_remarks(tally: Tally) -> None:
 def _many(number: int, noun: str, plural: str = "") -> str:
     """Return a number with a noun: 1 box, 2 boxes."""
     return f"{number:,} {noun if number == 1 else plural or noun + 's'}"
-
-
-def _listed(labels: Counter[str]) -> str:
-    """Return labels with their counts, the most frequent first."""
-    shown = ", ".join(f"{label} {count:,}" for label, count in labels.most_common(MOST_NAMES))
-    more = len(labels) - MOST_NAMES
-    return f"{shown} and {more:,} more" if more > 0 else shown

@@ -157,8 +157,8 @@ def test_equal_cells_are_lookalikes_with_half_of_the_probability() -> None:
     database = random_database(6, cells=60, longest=14)
     twins = database.select(np.array([*range(60), *range(30)]))
     order = np.arange(90)
-    places = {"columns": (order * 20).astype(np.int32), "rows": np.zeros(90, np.int32)}
-    apart = dataclasses.replace(twins, **places)
+    columns, rows = (order * 20).astype(np.int32), np.zeros(90, np.int32)
+    apart = dataclasses.replace(twins, columns=columns, rows=rows)
     result = identify(build_index(apart, named_noise("light")), trials=500, class_trials=2)
     rich = np.flatnonzero(apart.lengths[:30] >= 8)
     assert len(rich) > 5

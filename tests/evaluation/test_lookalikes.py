@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -104,11 +104,8 @@ def test_nearer_cell_is_selected_of_equal_ones() -> None:
     database = random_database(2, cells=1)
     many = np.arange(30)
     repeated = database.select(np.zeros(30, np.int64))
-    places: dict[str, Any] = {
-        "columns": np.zeros(30, np.int32),
-        "rows": (many * 10).astype(np.int32),
-    }
-    row = dataclasses.replace(repeated, **places)
+    zeros, rows = np.zeros(30, np.int32), (many * 10).astype(np.int32)
+    row = dataclasses.replace(repeated, columns=zeros, rows=rows)
     columns = symbol_columns(build_index(row, named_noise("light")))
     result = find_lookalikes(columns, temperature=0.5, radius=20.0, places=2)
     assert sorted(result.cells[10].tolist()) == [9, 11]

@@ -8,7 +8,7 @@ import pytest
 from map_pages import MapPage, assert_quiet
 from small_city import small_city, small_evaluation
 
-from semsig_gis.maps import evaluation_map, save_map
+from semsig_gis.maps import ambiguity_map, evaluation_map, save_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,4 +36,11 @@ def evaluation_address(tmp_path_factory: pytest.TempPathFactory) -> str:
 def evaluation_page(page: MapPage, evaluation_address: str) -> MapPage:
     """Return the page with the map of an evaluation."""
     page.visit(evaluation_address)
+    return page
+
+
+@pytest.fixture
+def ambiguity_page(page: MapPage) -> MapPage:
+    """Return the page with the map of the cells of a small city that look the same."""
+    page.open(ambiguity_map(small_city()[0]))
     return page

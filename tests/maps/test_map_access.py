@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 from axe_core_python.selenium import Axe
-from machine import PATIENCE_S
 from map_pages import maps_of
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.ui import WebDriverWait
 from small_city import small_city, small_evaluation
 
 from semsig_gis.localization import named_noise
@@ -84,5 +82,4 @@ def test_map_has_a_name_and_works_by_keyboard(page: MapPage) -> None:
     map_.send_keys("c")
     status = page.one("[role=status].semsig-status")
     # The clipboard answers later.
-    WebDriverWait(page.browser, PATIENCE_S).until(lambda _: status.text)
-    assert status.text.startswith("Copied: ")
+    assert page.until(lambda: status.text).startswith("Copied: ")

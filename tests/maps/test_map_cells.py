@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import shapely
 from folium.raster_layers import ImageOverlay
-from machine import PATIENCE_S
 from map_pages import IMAGES, LEGEND
-from selenium.webdriver.support.wait import WebDriverWait
 from small_city import chances_of
 from worlds import CODES, TAXONOMY, random_town
 
@@ -50,13 +49,13 @@ LARGEST = int(CITY.type_group_sizes.argmax())
 SAME_TYPES_CELLS = group(LARGEST)
 
 
-def test_click_counts_cells_that_look_the_same(page: MapPage) -> None:
+def test_click_describes_a_cell_and_counts_those_that_look_the_same(page: MapPage) -> None:
     page.open(ambiguity_map(CITY))
     assert page.browser.title == "Cells that look the same"
     assert len(page.all(IMAGES)) == 1
     page.ask("map.setZoom(19, {animate: false})")
     sample = np.random.default_rng(3).choice(len(CITY), 6, replace=False).tolist()
-    for cell in (LARGEST, *sample):
+    for cell in (LARGEST, int(CITY.lengths.argmax()), *sample):
         facts = page.click(CITY, cell)
         assert facts["title"] == "Cells that look the same"
         assert facts["It sees"].startswith(CITY.types(cell))
@@ -70,6 +69,15 @@ def test_click_counts_cells_that_look_the_same(page: MapPage) -> None:
             else:
                 at = members.index(cell) + 1
                 assert f"{label}: {at} of {len(members)}" in text
+        # The wheel has the exact bearings and distances.
+        part = slice(*CITY.offsets[cell : cell + 2])
+        wheel = page.one(".semsig-wheels svg").get_attribute("aria-label")
+        entries = re.findall(r"(\w) (\d+)° (\d+) m", str(wheel))
+        assert [entry[0] for entry in entries] == list(CITY.types(cell))
+        off = [float(entry[1]) for entry in entries] - CITY.bearings[part]
+        assert np.abs((off + 180.0) % 360.0 - 180.0).max() <= 1.5
+        metres = [float(entry[2]) for entry in entries]
+        assert metres == pytest.approx(CITY.distances[part], abs=1.1)
 
 
 def test_buttons_step_through_the_group(page: MapPage) -> None:
@@ -109,8 +117,8 @@ def test_three_lookalikes_are_listed_with_places(page: MapPage) -> None:
         page.click(CITY, cell)
         lines = choices(page)
         assert len(lines) == 3
-        wait = WebDriverWait(page.browser, PATIENCE_S)  # the numbers of the previous cell fade out
-        wait.until(lambda _: len(page.all(".semsig-number")) == 3)
+        # The numbers of the previous cell fade out.
+        page.until(lambda: len(page.all(".semsig-number")) == 3)
         for line in lines:
             latlon = [float(number) for number in line.split("; ")[-1].split(", ")]
             away = np.hypot(*(to_latlon(CITY.xy, CITY.crs) - latlon).T)
@@ -124,19 +132,6 @@ def test_three_lookalikes_are_listed_with_places(page: MapPage) -> None:
             )
             assert ("more or less" in line) == (count > 0)
             assert count == 0 or f"{count} object" in line
-
-
-@pytest.mark.parametrize("cell", [LARGEST, int(CITY.lengths.argmax())])
-def test_panel_shows_exact_bearings_and_distances(page: MapPage, cell: int) -> None:
-    page.open(ambiguity_map(CITY))
-    page.click(CITY, cell)
-    part = slice(*CITY.offsets[cell : cell + 2])
-    wheel = page.one(".semsig-wheels svg").get_attribute("aria-label")
-    entries = re.findall(r"(\w) (\d+)° (\d+) m", str(wheel))
-    assert [entry[0] for entry in entries] == list(CITY.types(cell))
-    off = [float(entry[1]) for entry in entries] - CITY.bearings[part]
-    assert np.abs((off + 180.0) % 360.0 - 180.0).max() <= 1.5
-    assert [float(entry[2]) for entry in entries] == pytest.approx(CITY.distances[part], abs=1.1)
 
 
 def test_click_on_a_sign_goes_to_its_cell(page: MapPage) -> None:
@@ -183,7 +178,7 @@ def whole_percent(chance: float) -> str:
     return "above 99 %" if percent > 99 else f"{percent} %"
 
 
-def test_identifiability_map_describes_cells(page: MapPage) -> None:
+def test_identifiability_map_describes_cells_and_goes_to_lookalikes(page: MapPage) -> None:
     page.open(identifiability_map(CHANCES))
     assert page.browser.title == "Where a query can be placed"
     assert len(page.all(IMAGES)) == 1
@@ -199,12 +194,9 @@ def test_identifiability_map_describes_cells(page: MapPage) -> None:
         assert len(confusions) == int((CHANCES.lookalike_chances[cell] >= 0.01).sum())
     facts = page.click(CITY, int(CHANCES.bits.argmin()))
     assert facts["Looks like"] == "about 1 cell (0.0 bits are left)"
-
-
-def test_click_on_a_lookalike_goes_to_its_cell(page: MapPage) -> None:
-    page.open(identifiability_map(CHANCES))
+    # A click on a lookalike goes to its cell.
     cell = int(np.flatnonzero((CHANCES.lookalike_chances > 0.1).all(axis=1))[0])
-    assert page.click(CITY, cell)["Cell"] == str(CITY.cell_ids[cell])
+    page.click(CITY, cell)
     page.ask("shown((layer) => layer.getTooltip && layer.getTooltip())[1].fire('click')")
     other = int(CHANCES.lookalikes[cell, 1])
     assert page.facts()["Cell"] == str(CITY.cell_ids[other])
@@ -256,12 +248,9 @@ def test_drift_map_compares_cells(page: MapPage) -> None:
         assert (facts["title"], facts["Cell"]) == (title, str(city.cell_ids[cell]))
         assert facts["Before"].startswith(first)
         assert facts["Now"].startswith(then)
-    difference = {
-        (part[-1], int(part[1:].split("\u00a0")[0])) for part in facts["Difference"].split(", ")
-    }
-    assert difference == {
-        (part, OLD.types(vanished).count(part)) for part in set(OLD.types(vanished))
-    }
+    parts = facts["Difference"].split(", ")
+    difference = {(part[-1], int(part[1:].split("\u00a0")[0])) for part in parts}
+    assert difference == set(Counter(OLD.types(vanished)).items())
     legend = page.one(LEGEND).text
     for rows, title in (
         (CELLS.same, "see what they saw"),

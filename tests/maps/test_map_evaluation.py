@@ -182,26 +182,20 @@ def test_panel_draws_signatures_as_wheels(evaluation_page: MapPage) -> None:
         degrees = [f"{symbol} {round(float(bearing)) % 360}°"
                    for symbol, bearing in zip(types, bearings, strict=True)]  # fmt: skip
         description = str(wheel.find_element(By.TAG_NAME, "svg").get_attribute("aria-label"))
-        assert (
-            re.sub(r" \d+ m", "", description)
-            == f"{label}, clockwise from north: {', '.join(degrees)}"
-        )
+        objects = f"{label}, clockwise from north: {', '.join(degrees)}"
+        assert re.sub(r" \d+ m", "", description) == objects
         places = evaluation_page.ask("return signPlaces(arguments[0])", wheel)
         for (x, y), bearing in zip(places, bearings, strict=True):
             turn = (np.degrees(np.arctan2(x, -y)) - bearing + 180.0) % 360.0 - 180.0
             assert abs(turn) <= 0.51  # north up, clockwise, whole degrees
             assert np.hypot(x, y) < 54.0
     # Every object of both has one verdict, and the key counts them.
-    kinds = (
-        "return [...arguments[0].querySelectorAll('.object')].map(({classList}) => classList[1])"
+    kinds = "[...arguments[0].querySelectorAll('.object')].map(({classList}) => classList[1])"
+    query_counts, cell_counts = (
+        Counter(evaluation_page.ask(f"return {kinds}", wheel)) for wheel in wheels
     )
-    counts = [Counter(evaluation_page.ask(kinds, wheel)) for wheel in wheels]
-    query_counts, cell_counts = counts
-    assert (
-        query_counts["matched"]
-        == cell_counts["matched"]
-        <= (Counter(expected[0][1]) & Counter(expected[1][1])).total()
-    )
+    common = Counter(expected[0][1]) & Counter(expected[1][1])
+    assert query_counts["matched"] == cell_counts["matched"] <= common.total()
     assert query_counts["misnamed"] == cell_counts["misnamed"]
     assert (query_counts["missed"], cell_counts["false"]) == (0, 0)
     key = evaluation_page.texts(".semsig-key span")

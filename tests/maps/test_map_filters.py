@@ -141,17 +141,11 @@ def test_selection_is_downloaded_as_files(filters_page: MapPage) -> None:
         points = np.stack([expected.geometry.x, expected.geometry.y], axis=1)
         assert np.abs(np.array(places) - points).max() < 1e-6
         for row, (_, query) in zip(rows, expected.iterrows(), strict=True):
-            infinite = np.isinf(query["error_m"])
-            assert (
-                row["error_m"] == ("" if kind == "csv" else None)
-                if infinite
-                else (float(row["error_m"]) == query["error_m"])
-            )
-            assert str(row["cell_id"]).strip('"') == str(query["cell_id"])
-            assert str(row["types"]).strip('"') == query["types"]
-            assert str(row["outcome"]).strip('"') == (
-                "failed" if query["p50"] < 0.5 else "successful"
-            )
+            missing = row["error_m"] in {"", None}
+            assert (np.inf if missing else float(row["error_m"])) == query["error_m"]
+            values = [str(row[name]).strip('"') for name in ("cell_id", "types", "outcome")]
+            outcome = "failed" if query["p50"] < 0.5 else "successful"
+            assert values == [str(query["cell_id"]), query["types"], outcome]
     # Texts that look like formulas are quoted.
     formula = "return semsig.files.csv({types: () => arguments[0]}, [0])[1]"
     assert filters_page.ask(formula, '=1+"2"') == 'types\r\n"\'=1+""2"""\r\n'
@@ -172,14 +166,8 @@ def test_filters_are_stored_in_the_address(filters_page: MapPage) -> None:
     filters_page.one(".semsig-filters select").send_keys(CITY.taxonomy.by_symbol("D").title)
     selection = filters_page.ask(SELECTION)
     edge = filters_page.ask("return semsig.errorEdges([...semsig.layerSets.queries.data.error])[8]")
-    assert filters_page.ask_later(
-        "setTimeout(() => arguments[0]((() => {" + STATE + "})()), 400)"
-    ) == (f"error:~{edge},seen:6~,class:D")
-    address = filters_page.browser.current_url
-    filters_page.browser.get("about:blank")
-    for log in ("browser", "performance"):
-        filters_page.browser.get_log(log)
-    filters_page.visit(f"{address}&told=query:1")
+    filters_page.until(lambda: filters_page.ask(STATE) == f"error:~{edge},seen:6~,class:D")
+    filters_page.follow(f"{filters_page.browser.current_url}&told=query:1")
     assert filters_page.facts()["title"].startswith("Query 1")
     assert filters_page.ask(SELECTION) == selection
     assert filters_page.one(".semsig-filters select").get_attribute("value") == "D"

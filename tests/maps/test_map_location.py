@@ -9,6 +9,7 @@ import folium
 import numpy as np
 import pytest
 from map_pages import IMAGES, LEGEND
+from noisy_cells import parts_of
 from selenium.webdriver.common.by import By
 from worlds import random_town
 
@@ -27,18 +28,18 @@ WORLD = random_town()
 CITY = WORLD.database
 STORE = ObjectStore.of(WORLD.street_objects)
 LONGEST = int(CITY.lengths.argmax())
+CELL = CITY.signature(LONGEST)
+CODES, BEARINGS = parts_of(CELL)
 
 
 def answer_with_errors() -> Location:
     """Return the answer to a query from the cell with most objects, with an error of each kind."""
-    query = CITY.signature(LONGEST)
-    assert query.codes is not None
-    assert query.bearings is not None
-    signature = query.codes.copy()
-    signature[1] = next(code for code in CITY.present_codes if code != signature[1])
-    gap = (query.bearings[-1] + 360.0 + query.bearings[0]) / 2.0 % 360.0
-    codes = np.append(np.delete(signature, 3), signature[0])
-    query = Signature(codes, np.append(np.delete(query.bearings, 3), gap))
+    codes = CODES.copy()
+    codes[1] = next(code for code in CITY.present_codes if code != codes[1])
+    gap = (BEARINGS[-1] + 360.0 + BEARINGS[0]) / 2.0 % 360.0
+    query = Signature(
+        np.append(np.delete(codes, 3), codes[0]), np.append(np.delete(BEARINGS, 3), gap)
+    )
     index = build_index(CITY, cell_noise(named_noise("medium"), 10.0))
     return locate(index, query, explained=2, top=5, store=STORE, refined=True, north_sigma=math.inf)
 
@@ -102,12 +103,10 @@ def test_clicks_describe_places_and_objects(page: MapPage) -> None:
 
 
 def test_wheels_show_sectors_and_distances_of_a_view(page: MapPage) -> None:
-    signature = CITY.signature(LONGEST)
-    assert signature.bearings is not None
     metres = CITY.distances[CITY.offsets[LONGEST] : CITY.offsets[LONGEST + 1]]
-    photo = Photo.looking(heading=float(signature.bearings[0]), fov=120)
-    view = View.of(signature, ranges=np.append(metres[:-1], np.nan), photos=(photo,))
-    outside = ~photo.sees(signature.bearings)
+    photo = Photo.looking(heading=float(BEARINGS[0]), fov=120)
+    view = View.of(CELL, ranges=np.append(metres[:-1], np.nan), photos=(photo,))
+    outside = ~photo.sees(BEARINGS)
     assert 0 < outside.sum() < len(view)
     page.open(localization_map(localize(CITY, view, top=1, method=Method()), CITY))
     assert "Looked at: " in page.text(LEGEND)
@@ -130,11 +129,8 @@ def test_wheels_show_sectors_and_distances_of_a_view(page: MapPage) -> None:
 
 def test_explanation_shows_sectors_of_photos(page: MapPage) -> None:
     photos = tuple(Photo.looking(heading=heading, fov=70) for heading in (10, 200))
-    signature = CITY.signature(LONGEST)
-    assert signature.bearings is not None
-    owners = photos[1].sees(signature.bearings).astype(int)
-    view = View.of(signature, photo=owners, photos=photos)
-    view = view.select(photos[0].sees(signature.bearings) | photos[1].sees(signature.bearings))
+    first, second = (photo.sees(BEARINGS) for photo in photos)
+    view = View.of(CELL, photo=second.astype(int), photos=photos).select(first | second)
     index = build_index(CITY, named_noise("light"))
     page.open(location_map(locate(index, view, explained=1)))
     outlines = """
@@ -146,7 +142,7 @@ def test_explanation_shows_sectors_of_photos(page: MapPage) -> None:
 
 
 def test_withheld_answer_shows_all_candidates(page: MapPage) -> None:
-    query = Signature(CITY.signature(LONGEST).codes[:1], None)  # type: ignore[index]
+    query = Signature(CODES[:1], None)
     index = build_index(CITY, named_noise("strong"))
     location = locate(index, query, top=7)
     assert not location.answer.given
@@ -155,27 +151,16 @@ def test_withheld_answer_shows_all_candidates(page: MapPage) -> None:
     assert "Cannot tell; the best place" in legend
     assert "matched" not in legend
     assert page.circles(ANSWERS["withheld"].colour) == 1
-    boxes = page.all(".leaflet-control-layers-overlays label")
-    on = [
-        element.text
-        for element in boxes
-        if element.find_element(By.TAG_NAME, "input").is_selected()
-    ]
-    assert [name.strip() for name in on if "Chance" in name] == ["Chance within 50 m"]
-    inside = (
-        "return circles('#ffffff').every((circle) => map.getBounds().contains(circle.getLatLng()))"
-    )
-    assert page.ask(inside)
+    names = page.texts(".leaflet-control-layers-overlays label:has(:checked)")
+    assert [name for name in names if "Chance" in name] == ["Chance within 50 m"]
+    inside = "circles('#ffffff').every((circle) => map.getBounds().contains(circle.getLatLng()))"
+    assert page.ask(f"return {inside}")
 
 
 def test_localization_map_describes_candidates(page: MapPage) -> None:
-    page.open(
-        localization_map(localize(CITY, CITY.signature(LONGEST), top=50, method=Method()), CITY)
-    )
+    page.open(localization_map(localize(CITY, CELL, top=50, method=Method()), CITY))
     assert page.browser.title == "Candidate places"
-    texts = """
-    return shown((layer) => layer instanceof L.CircleMarker).map((circle) => content(circle));
-    """
+    texts = "return shown((layer) => layer instanceof L.CircleMarker).map(content)"
     descriptions = page.ask(texts)
     assert len(descriptions) == 50
     best = descriptions[-1]  # drawn last, on top
@@ -200,14 +185,10 @@ def test_signs_are_drawn_on_a_map_with_svg(page: MapPage) -> None:
 
 
 def test_query_without_types_is_drawn_as_dots(page: MapPage) -> None:
-    signature = CITY.signature(LONGEST)
-    page.open(
-        localization_map(
-            localize(CITY, Signature(None, signature.bearings), top=1, method=Method()), CITY
-        )
-    )
+    bearings_only = Signature(None, BEARINGS)
+    page.open(localization_map(localize(CITY, bearings_only, top=1, method=Method()), CITY))
     page.panel_of(CANDIDATE_RAMP[0])
     query, cell = page.all(".semsig-wheels figure")
-    assert len(query.find_elements(By.CSS_SELECTOR, ".object .north")) == len(signature)
+    assert len(query.find_elements(By.CSS_SELECTOR, ".object .north")) == len(CELL)
     assert query.find_elements(By.TAG_NAME, "text") == []
-    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched text")) == len(signature)
+    assert len(cell.find_elements(By.CSS_SELECTOR, ".object.matched text")) == len(CELL)

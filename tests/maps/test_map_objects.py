@@ -12,11 +12,9 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
-from machine import PATIENCE_S
 from map_pages import HOSTILE, LEGEND, MapPage, assert_quiet
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.wait import WebDriverWait
 from worlds import random_town
 
 from semsig_gis.core import Taxonomy, class_signs
@@ -77,10 +75,13 @@ def test_objects_map_has_layers_and_legend_by_class(page: MapPage) -> None:
     assert page.drawn(SIGNS[CODE].colour, BOARD) > 0
 
 
-def test_click_describes_the_nearest_object(page: MapPage) -> None:
+def test_objects_are_at_their_places_and_a_click_describes_the_nearest(page: MapPage) -> None:
     table = OBJECTS.table.assign(count=3, merged="osm:node/9")
     objects = dataclasses.replace(OBJECTS, table=table)
     page.open(objects_map(objects))
+    places = page.ask_later("placesOfObjects(...arguments)", 40)
+    expected = np.array([place_of(number) for number in range(40)])
+    assert np.abs(np.array(places) - expected).max() < 4e-6  # a quarter of a metre
     text = click(page, NUMBER)
     assert text.startswith(TITLE)
     for words in ("world", "3 rows of its source", "osm:node/9"):
@@ -94,13 +95,6 @@ def test_click_describes_the_nearest_object(page: MapPage) -> None:
     corner = OBJECTS.xy.min(axis=0) - 50.0
     page.click_at(to_latlon(corner[None], OBJECTS.crs)[0].tolist())
     assert page.facts()["title"] == "A place on the map"
-
-
-def test_objects_are_at_their_places(page: MapPage) -> None:
-    page.open(objects_map(OBJECTS))
-    places = page.ask_later("placesOfObjects(...arguments)", 40)
-    expected = np.array([place_of(number) for number in range(40)])
-    assert np.abs(np.array(places) - expected).max() < 4e-6  # a quarter of a metre
 
 
 def test_search_finds_names_cells_and_places(page: MapPage) -> None:
@@ -341,10 +335,9 @@ def test_search_finds_streets_by_name(page: MapPage) -> None:
     marked = page.ask("return lines(({options}) => options.weight === 6)[0].getLatLngs().length")
     assert marked == 2
     page.browser.get_log("performance")
-    wait = WebDriverWait(page.browser, PATIENCE_S)
-    wait.until(lambda _: "told=" in page.browser.current_url)
+    page.until(lambda: "told=" in page.browser.current_url)
     page.browser.refresh()  # with the street in the address
-    wait.until(lambda _: "Rue de" in page.panel())
+    page.until(lambda: "Rue de" in page.panel())
     assert page.facts()["title"] == "Rue de l'Église"
     page.ask("semsig.openers.street(map, arguments[0])", HOSTILE)
     page.panel()

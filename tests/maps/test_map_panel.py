@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from machine import PATIENCE_S
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.wait import WebDriverWait
 from small_city import small_city, small_evaluation
 from worlds import random_town
 
@@ -53,7 +51,7 @@ def press(page: MapPage, x: float, y: float) -> None:
 
 def wait_for(page: MapPage, key: str | None) -> None:
     script = "return map.semsigPanel.selection?.key ?? null"
-    WebDriverWait(page.browser, PATIENCE_S, 0.02).until(lambda _: page.ask(script) == key, str(key))
+    page.until(lambda: page.ask(script) == key)
 
 
 @pytest.mark.parametrize("screen", SCREENS)
@@ -215,7 +213,7 @@ def test_object_is_highlighted_in_wheel_and_map(page: MapPage) -> None:
         sign = page.all(".semsig-object")[0]
         ActionChains(page.browser).move_to_element(sign).click().perform()
         script = "return map.semsigPanel.selection.key"
-        WebDriverWait(page.browser, PATIENCE_S).until(lambda _: page.ask(script) != key)
+        page.until(lambda: page.ask(script) != key)
         page.click(CITY, cell)
         objects = page.all(".semsig-wheels figure:first-child .object")
         # By keyboard, round and back.

@@ -363,12 +363,8 @@ def test_intervals_of_certain_associations_equal_the_textbook() -> None:
         for row in range(300)
     ]
     evidence = gather_evidence(views, signatures, taxonomy=TAXONOMY)
-    chances: dict[str, Any] = {
-        "missed": np.array([[0.1]]),
-        "clutter": np.array([1e-6]),
-        "sigma": np.ones(1),
-    }
-    model = replace(evidence.start, **chances)
+    missed, clutter = np.array([[0.1]]), np.array([1e-6])
+    model = replace(evidence.start, missed=missed, clutter=clutter, sigma=np.ones(1))
     rates = estimated_rates(evidence, expected_counts(evidence, model), model)
     rows = rates[rates["class"] == ALL].set_index("quantity").to_dict("index")
     detection = rows["detection"]
