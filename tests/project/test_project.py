@@ -178,11 +178,9 @@ def test_exported_functions_document_parameters_and_results(name: str) -> None:
 
 
 def test_allowed_lines_with_avoided_words_are_still_in_use() -> None:
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
     allowed = ROOT / ".ci/words/allowed.txt"
     lines: set[str] = set()
-    for name in listed.stdout.decode().splitlines():
-        path = ROOT / name
+    for path in tracked_files():
         if path.suffix in {".py", ".md", ".js", ".toml", ".ipynb", ".html", ".qml"}:
             lines |= {line.rstrip() for line in path.read_text("utf-8").splitlines()}
     assert set(allowed.read_text("utf-8").splitlines()) - lines == set()
