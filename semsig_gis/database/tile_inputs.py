@@ -77,7 +77,7 @@ def fingerprint(path: Path) -> str:
 def copy_with_bounds(
     name: Input, path: Path, crs: CRS, folder: Path, tell: Callable[[str], None] | None
 ) -> Path:
-    """Copy an input to a file that can be read by box, in a CRS, and return its path."""
+    """Copy an input to GeoParquet in `crs`, with the bounds of each row, and return its path."""
     copy = folder / INPUTS / f"{name}.parquet"
     if copy.exists():
         return copy

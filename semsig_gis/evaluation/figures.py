@@ -92,7 +92,7 @@ def grouped_means(
 
 
 def range_labels(sizes: NDArray[np.int64], ranges: Sequence[str]) -> list[str]:
-    """Return the range of each size, such as ``5-9`` or ``20+``; ``"0"`` below all ranges."""
+    """Return the bin label of each number, such as ``5-9`` or ``20+``; ``"0"`` below all bins."""
     starts = [int(label.rstrip("+").split("-")[0]) for label in ranges]
     places = np.searchsorted(starts, sizes, side="right")
     return [("0", *ranges)[place] for place in places.tolist()]

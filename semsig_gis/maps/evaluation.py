@@ -136,7 +136,7 @@ def _add_queries(
     places: NDArray[np.float64],
     best_places: NDArray[np.float64],
 ) -> None:
-    """Add a layer of queries for each outcome, a layer of lines to the best places, and filters."""
+    """Add layers of queries by outcome and of lines from true to best places, and add filters."""
     queries = evaluation.queries
     failed = ~evaluation.successful
     has_chances = evaluation.method.noise is not None

@@ -66,7 +66,7 @@ class LayerSample:
 
 
 def sample_layers(path: Path) -> tuple[LayerSample, ...]:
-    """Return samples of the layers of a file; SourceError if it cannot be drafted."""
+    """Return samples of the layers of a file; SourceError if no catalogue can be made of it."""
     suffix = path.suffix.lower()
     if path.name.lower().endswith(tuple(FORMATS)):
         raise SourceError(

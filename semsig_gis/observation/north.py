@@ -129,7 +129,7 @@ class North:
         return query.turned(self.turn) if self.turn else query
 
     def from_grid(self, bearing: float) -> float:
-        """Convert a bearing from grid north to one from this north, in [0, 360)."""
+        """Convert a bearing from grid north to a bearing from this north, in [0, 360)."""
         return (bearing - self.turn) % 360.0 if self.turn else bearing
 
     def to_dict(self) -> dict[str, Any]:

@@ -36,7 +36,7 @@ class Number:
 
     @property
     def difference(self) -> float | None:
-        """Our number minus the paper's, rounded to the decimals."""
+        """Our number minus the paper's, to `decimals` places; None if one is missing."""
         if self.ours is None or self.paper is None:
             return None
         return round(self.ours - self.paper, self.decimals)

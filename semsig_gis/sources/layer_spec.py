@@ -332,7 +332,7 @@ def _width_by(item: dict[str, Any], where: str) -> WidthBy:
 
 
 def conditions_of(item: dict[str, Any], key: str, where: str) -> Rules:
-    """Return the checked conditions of a table such as ``where`` or ``not``."""
+    """Check a TOML table of conditions, such as ``where`` or ``not``, and return its rules."""
     rules = []
     for field, accepted in item.items():
         values: list[Any] = accepted if isinstance(accepted, list) else [accepted]

@@ -30,7 +30,7 @@ PARTIAL = ".partial"
 
 @dataclass(frozen=True, kw_only=True)
 class RunKind:
-    """A kind of run, with the layout of its folders.
+    """Folder layout and messages of one kind of run that can be interrupted and resumed.
 
     `content` describes such a folder in messages, and `another` is the message for a folder with
     another recipe, with ``{folder}`` and ``{difference}`` in it. `read` returns the recipe in a

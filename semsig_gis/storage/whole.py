@@ -69,7 +69,7 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 
 
 def move_folder(new: Path, target: Path) -> None:
-    """Rename a folder to `target` next to it; an existing one is replaced only on success."""
+    """Rename a folder to `target`, and replace an existing `target` only if that succeeds."""
     with _temporary_next_to(target) as temporary:
         replace_folder(new, target, temporary=temporary)
 

@@ -121,7 +121,7 @@ def check_identifiability(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> IdentifiabilityCheck:
-    """Answer new simulated queries from random cells, and compare success and probabilities.
+    """Compare the predicted chances of cells with the outcomes of new simulated queries.
 
     Parameters
     ----------

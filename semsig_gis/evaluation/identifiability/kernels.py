@@ -222,7 +222,7 @@ def _high(sums: NDArray[np.uint32], rank: int, best: NDArray[np.int64]) -> int:
 def _clear_circle(
     middle: int, sums: NDArray[np.uint32], ids: NDArray[np.int64], circle: NDArray[np.int64]
 ) -> None:
-    """Set the sums of the cells in the circle around a cell id to zero."""
+    """Set the sums of all cells in the circle around the cell with the id `middle` to zero."""
     for line in range(len(circle)):
         last = middle + circle[line, 1]
         for cell in range(np.searchsorted(ids, middle + circle[line, 0]), len(ids)):
@@ -333,7 +333,7 @@ def _sum_circle(  # noqa: PLR0917 - a kernel takes no keywords
     powers: NDArray[np.float32],
     places: CellPlaces,
 ) -> float:
-    """Return the sum of the ratios in the circle of a cell, without that of an excluded cell."""
+    """Sum the likelihood ratios of the cells around a cell, except those around `excluded`."""
     top = len(powers) // 2
     total = 0.0
     for line in range(len(places.circle)):

@@ -200,7 +200,7 @@ def _spread(sums: NDArray[np.uint64], spread: NDArray[np.uint64], costs: NDArray
 def count_steps(
     first: NDArray[np.float32], counts: NDArray[np.int64], step: float, cells: NDArray[np.int64]
 ) -> None:
-    """Add to ``cells[i]`` the number of cells with a score of i steps.
+    """Add the cells of each sequence to a histogram of scores, where bin i is i steps.
 
     `first`, shape (d,), has the scores of distinct sequences, multiples of `step`, and `counts` the
     numbers of their cells.

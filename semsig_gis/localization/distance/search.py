@@ -117,7 +117,7 @@ class Localization(Answer):
 
 @dataclass(eq=False, kw_only=True)
 class DistanceLocator:
-    """A method by distance with the cells that it searches."""
+    """Locator that ranks the cells of a database by a distance method."""
 
     database: SignatureDatabase | PartitionedDatabase
     method: Method = FUSION

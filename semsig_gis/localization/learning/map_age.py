@@ -32,7 +32,7 @@ MEDIAN = math.sqrt(2.0 * math.log(2.0))  # of a distance, in standard deviations
 
 @dataclass(frozen=True, repr=False, slots=True, kw_only=True)
 class Drift(Displayed):
-    """The changes of the street objects of a city in some years.
+    """What changed among the street objects of a city within a number of years.
 
     Parameters
     ----------

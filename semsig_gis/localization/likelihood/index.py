@@ -436,7 +436,7 @@ class NoiseLevels:
         return rows
 
     def masses(self, photo: PhotoTable) -> NDArray[np.float32]:
-        """Return the chance that an object is in the sectors, by group, level and bearing."""
+        """Return the chance that the bearing of an object falls into the sectors of the photo."""
         from semsig_gis.localization.likelihood.association_kernels import mass_rows  # noqa: PLC0415 - numba, 0.25 s
 
         levels = DISTANCE_LEVELS if len(photo.sectors) else 0

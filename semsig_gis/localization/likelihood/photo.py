@@ -74,7 +74,7 @@ class PhotoTable:
 
     @classmethod
     def of(cls, photo: View, table: NoiseTable) -> PhotoTable:
-        """Return the table of a view of one photo; InputError if a class is not in `table`."""
+        """Return the detections of a photo as arrays; InputError if a class is not in `table`."""
         if photo.bearings is None:
             raise InputError(
                 "the query has no bearings, which the search between cells needs; give them."

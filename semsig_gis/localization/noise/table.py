@@ -141,7 +141,7 @@ class NoiseTable:
         return self.class_rows(query.codes)
 
     def class_rows(self, codes: NDArray[np.uint8]) -> NDArray[np.int64]:
-        """Return the row of each class code of a query; InputError if no cell sees a class."""
+        """Return the row of each class code; InputError if the database lacks a class."""
         rows = self.row_of[codes]
         if (rows < 0).any():
             raise InputError(

@@ -542,7 +542,7 @@ def _deadline_error(url: str, spec: HttpSpec, entry: CacheEntry | None = None) -
 
 
 def _unpacked(read: Callable[[int], bytes], encoding: str, host: str) -> Iterator[bytes]:
-    """Yield an uncompressed body in blocks of limited size."""
+    """Read a response body and yield it, decompressed if needed, in blocks of limited size."""
     if not encoding:
         while block := read(BLOCK_BYTES):
             yield block

@@ -142,7 +142,7 @@ def known_field(names: Sequence[str], fields: Sequence[str]) -> str | None:
 
 
 def known_coordinates(fields: Sequence[str]) -> tuple[str | None, str | None]:
-    """Return the fields of x and y by common names, or two None."""
+    """Return the first common pair of names for x and y among the fields, or two None."""
     for xs, ys in KNOWN_NAMES:
         x, y = known_field(xs, fields), known_field(ys, fields)
         if x and y:

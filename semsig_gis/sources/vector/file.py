@@ -140,7 +140,7 @@ def read_tables(
     *,
     crs: str | None = None,
 ) -> Iterator[TableRows]:
-    """Yield the rows of layers with the fields that `choose` returns; none if it returns none."""
+    """Yield each layer with the fields that `choose` selects; skip the layer if there are none."""
     for member, layer in layers:
         if names := choose(layer.fields):
             fields = tuple(field for field in layer.fields if field in names)

@@ -44,7 +44,7 @@ SIDE_SUFFIXES = frozenset({".csv", ".json"})
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A layer of a file, or of the file `inner` of an archive; None is the first layer."""
+    """A layer of a file, or of the file `inner` of an archive; `layer` None is the first one."""
 
     file: Path
     inner: str | None

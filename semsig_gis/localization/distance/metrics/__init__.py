@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Distances(Protocol):
-    """Distances of queries to the distinct sequences of a table; lower is more similar."""
+    """Function that returns the distances of queries to sequences; lower is more similar."""
 
     def __call__(
         self,
@@ -57,8 +57,8 @@ def metric(
     """
     if name not in METRICS:
         raise UnknownNameError(
-            f"measure {name!r} is unknown{nearest_name(name, METRICS)}; "
-            f"the measures are {', '.join(METRICS)}."
+            f"metric {name!r} is unknown{nearest_name(name, METRICS)}; "
+            f"the metrics are {', '.join(METRICS)}."
         )
     if name == "edit" and (weights is not None or wildcard is not None):
         return partial(edit.distances, weights=weights, wildcard=wildcard)
