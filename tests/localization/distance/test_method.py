@@ -83,7 +83,7 @@ def test_invalid_text_is_refused(text: str) -> None:
     ("text", "error", "words"),
     [
         ("edit+edti", UnknownNameError, "'edti' is unknown; the nearest is 'edit'"),
-        ("types:", UnknownNameError, "measure '' is unknown"),
+        ("types:", UnknownNameError, "metric '' is unknown"),
         ("edit+edit:alpha=1.5", InputError, "alpha of the types is 1.5; give a number from 0 to 1"),
         ("edit+edit:alpha=nan", InputError, "alpha of the types is nan"),
         ("edit+edit:0%", InputError, "above 0 and up to 100"),
