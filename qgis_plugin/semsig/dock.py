@@ -308,7 +308,7 @@ class SemsigDock(QgsDockWidget):
             self.dial.show_marks([*marks, Mark(entry.data(CLASS_ROLE), bearing)])
 
     def _remove_object(self, number: int) -> None:
-        marks = [*self.dial.marks[:number], *self.dial.marks[number + 1 :]]
+        marks = [mark for index, mark in enumerate(self.dial.marks) if index != number]
         self.dial.show_marks([Mark(mark.kind, mark.bearing) for mark in marks])
 
     def clear_view(self) -> None:

@@ -9,10 +9,10 @@ semsig.cellFacts.change = (city, cell) => {
   for (const symbol of before[0]) count[symbol] = (count[symbol] || 0) - 1;
   const differences = Object.entries(count).filter((entry) => entry[1] !== 0).map(
     ([symbol, more]) => `${more > 0 ? "+" : "\u2212"}${Math.abs(more)}\u00a0${symbol}`);
-  const valueOf = (signature) => (signature[0] ? signature : "nothing");
+  const shown = (signature) => (signature[0] ? signature : "nothing");
   return {title, kind: "dates", rows: [
-    ["Before", valueOf(before)],
-    ["Now", valueOf(after)],
+    ["Before", shown(before)],
+    ["Now", shown(after)],
     ["Difference", differences.join(", ") || "only in bearings or distances"],
   ]};
 };
