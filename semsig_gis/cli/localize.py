@@ -168,11 +168,11 @@ def localize(options: LocalizeOptions) -> None:
     """
     from semsig_gis.database import open_city
 
-    method = None
-    if options.ranking != LIKELIHOOD:
+    method, ranking = None, options.ranking
+    if ranking != LIKELIHOOD:
         from semsig_gis.localization import Method
 
-        method = Method.parse(options.ranking)
+        method = Method.parse(ranking)
     city = open_city(options.database)
     north = query_north(city, options.north, options.date)
     # The query is read before the index, so that an error in it is found early.
@@ -180,7 +180,7 @@ def localize(options: LocalizeOptions) -> None:
         query = options.query(city.dataset, others=", or --queries")
         others = options.unplaced(city.dataset)
         locator = _locator(options, city, method, north)
-        locator = _with_unplaced(locator, query, *others, ranking=options.ranking)
+        locator = _with_unplaced(locator, query, *others, ranking=ranking)
         _answer(options, city, locator, query)
         return
     queries = options.read_queries(city.dataset)

@@ -79,7 +79,7 @@ class PhotoTable:
             raise InputError(
                 "the query has no bearings, which the search between cells needs; give them."
             )
-        size = len(photo)
+        size = len(photo.bearings)
         unknown = np.full(size, math.nan)
         ranges = unknown if photo.ranges is None else photo.ranges
         ranged = ~np.isnan(ranges)

@@ -183,8 +183,8 @@ def noise_tables(
     chance of any name in `codes`.
     """
     # Values of other classes go to a row after the last, which is dropped.
-    rows = {item.name: len(codes) for item in taxonomy.classes}
-    rows |= {taxonomy.by_code(code).name: row for row, code in enumerate(codes.tolist())}
+    row_of = {code: row for row, code in enumerate(codes.tolist())}
+    rows = {item.name: row_of.get(item.code, len(codes)) for item in taxonomy.classes}
     ranges = taxonomy.ranges(radius)
     reach = float(ranges.max())
     tables = tuple(_table(spec, rows, codes, longest, ranges[codes], reach) for spec in noise.specs)
