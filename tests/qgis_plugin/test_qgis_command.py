@@ -261,7 +261,8 @@ def test_names_match_the_command() -> None:
     for method in arguments.METHODS:
         assert method == arguments.LIKELIHOOD or str(Method.parse(method))
     fusions = {method for method in arguments.METHODS if "+" in method and ":" not in method}
-    assert fusions == {f"{name}+{name}" for name in METRIC_NAMES}
+    # The dialog offers some of the metrics; each needs a sentence in three languages.
+    assert fusions <= {f"{name}+{name}" for name in METRIC_NAMES}
     assert all(fusion in arguments.METHOD_HELP for fusion in fusions)
     for name in arguments.DISTORTIONS:
         assert parse_chain(name)
