@@ -155,7 +155,7 @@ def _report_unraisable(unraisable: sys.UnraisableHookArgs) -> None:
 
 
 def _interrupt_again(hook_ended: threading.Event) -> None:
-    """Interrupt the main thread a moment after it ignored an interrupt."""
+    """Send the main thread another interrupt, because Python ignored the first in a callback."""
     hook_ended.wait()
     time.sleep(INTERRUPT_DELAY_S)
     main_thread = threading.main_thread().ident

@@ -248,7 +248,7 @@ class QueryOptions:
 
     @property
     def _sentence(self) -> str:
-        """The part of the view in words about objects with directions."""
+        """Objects with directions from the text of the view, as one sentence."""
         from semsig_gis.observation import unplaced_parts
 
         return unplaced_parts(self.seen or "")[0]

@@ -38,7 +38,7 @@ def run() -> int:
 
 
 def _out_of_range(error: typer.TyperException) -> str:
-    """Return a sentence on a number outside of its range; empty for any other error."""
+    """Return the message for an option value out of range; an empty text for other errors."""
     option: Any = getattr(error, "param", None)
     least, most = getattr(option, "min", None), getattr(option, "max", None)
     faults: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()  # of pydantic

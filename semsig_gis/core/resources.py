@@ -66,7 +66,7 @@ def free_address_space() -> int | None:
 
 
 def require_address_space(size: int, what: str) -> None:
-    """Raise MemoryError if a limit leaves fewer than `size` bytes to this process."""
+    """Raise MemoryError if the memory limit of this process leaves fewer than `size` bytes free."""
     free = free_address_space()
     if free is not None and free < size:
         raise MemoryError(

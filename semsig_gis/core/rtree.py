@@ -102,7 +102,10 @@ def checked_points(xy: ArrayLike) -> NDArray[np.float64]:
 
 
 def _padded(radius: float) -> float:
-    """Return a radius with a margin for rounding errors in a tree; `_within` is exact."""
+    """Return a slightly larger search radius, so that rounding in the tree misses no point.
+
+    `_within` removes the points beyond the exact radius.
+    """
     return radius * (1 + 1e-12) + ROUNDING_M
 
 

@@ -70,7 +70,7 @@ def log_interval(value: float, deviation: float, *, percent: float = 95.0) -> tu
 
 
 def quantile_ranks(size: int, share: float, *, percent: float = 95.0) -> tuple[int, int]:
-    """Return the ranks, from 1, of the sorted values that bound the interval of a quantile.
+    """Return the ranks (from 1) of the two sorted values that bound a quantile's interval.
 
     For small samples these are the first and the last rank. For any distribution, the number of
     values below the quantile is binomial; its normal approximation is used.
@@ -169,7 +169,10 @@ def fit_shares(features: ArrayLike, shares: ArrayLike) -> ShareFit:
 
 
 def _newton(terms: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights of the terms by Newton's method; the first term is constant."""
+    """Fit a logistic regression of `shares` on `terms` by Newton's method; return the weights.
+
+    The first term is constant and has no penalty.
+    """
     penalty = np.full(terms.shape[1], RIDGE * len(shares))
     penalty[0] = 0.0
     weights = np.zeros(terms.shape[1])

@@ -68,7 +68,7 @@ class Table:
 
     @property
     def spans(self) -> tuple[int, ...]:
-        """Rows that share the first label, at the first row of each run; 0 at the others."""
+        """Number of rows that share the first label, by row; 0 if it repeats the row above."""
         runs = (len(list(rows)) for _, rows in itertools.groupby(row[0] for row in self.rows))
         return tuple(span for run in runs for span in (run, *[0] * (run - 1)))
 

@@ -89,7 +89,7 @@ class ObjectClass:
 
 
 def check_height(height: float | None, sigma: float | None, what: str) -> None:
-    """Raise CatalogError if only one of height and deviation (metres) is given, or is not above 0.
+    """Raise CatalogError if a height and its deviation (metres) are incomplete or out of range.
 
     `what` names the object in the message.
     """

@@ -175,7 +175,7 @@ def _merged_store(first: ObjectStore, second: ObjectStore) -> tuple[ObjectStore,
 def _union(
     first: gpd.GeoDataFrame | None, second: gpd.GeoDataFrame | None
 ) -> gpd.GeoDataFrame | None:
-    """Return the shapes of both tables; equal shapes appear once."""
+    """Combine two tables of polygons or lines; of two rows with equal geometry, keep the first."""
     if first is None or second is None:
         return first if second is None else second
     shapes = pd.Index(first.geometry.to_wkb())

@@ -422,7 +422,7 @@ def _database_of(store: Path) -> str | None:
 
 
 def file_state(path: Path) -> tuple[int, ...] | None:
-    """Return values that change if another file or folder replaces one; None without any."""
+    """Return device, inode, size and time of a file, to detect a change; None if it is missing."""
     try:
         status = path.stat()
     except OSError:

@@ -104,7 +104,7 @@ class UpdateReport(Displayed):
 
     @property
     def share(self) -> float:
-        """Share of the cells before or after that changed, appeared or vanished."""
+        """Share of cells that changed, appeared or vanished, of all cells in either database."""
         drifted = self.changed + self.appeared + self.vanished
         return drifted / (self.cells_before + self.appeared)
 

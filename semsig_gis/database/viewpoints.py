@@ -118,7 +118,7 @@ def choose_viewpoints(
     streets: NDArray[np.object_] | Sequence[shapely.Geometry | None] | None = None,
     widths: ArrayLike | None = None,
 ) -> NDArray[np.bool_]:
-    """Return a mask of the cells that are viewpoints, by their centres.
+    """Return a mask of the cells with a centre that is allowed as a viewpoint by `spec`.
 
     A centre on the outline of a building is no viewpoint; one on the edge of a street or of the
     area is. Mode ``"outdoor"`` needs the footprints. Mode ``"streets"`` needs the centre lines in

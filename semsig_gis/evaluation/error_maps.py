@@ -154,7 +154,10 @@ def error_field(
 def _field(
     xy: NDArray[np.float64], values: NDArray[np.float64], grid: GridSpec, radius: float
 ) -> ErrorField:
-    """Return the weighted means of two values of queries: whether they failed, and their errors."""
+    """Return the failed share and the mean error of the queries around each pixel.
+
+    `values`, shape (n, 2), are whether each query failed (0 or 1), and its error in metres.
+    """
     # The pixels: a whole number of cells wide, and a margin of the radius around the queries.
     across = math.sqrt(float((np.ptp(xy, axis=0) + 2.0 * radius).prod()))
     finest = max(radius / RADIUS_PIXELS, across / MOST_PIXELS)

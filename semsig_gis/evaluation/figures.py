@@ -63,7 +63,7 @@ def figure_means(figures: pd.DataFrame) -> pd.DataFrame:
 
 
 def _share(values: NDArray[np.float64]) -> tuple[float, float, float, int]:
-    """Return the mean of the values without NaN, its interval, and their number."""
+    """Return mean, ends of the Wilson interval, and number of the values that are not NaN."""
     chances = values[~np.isnan(values)]
     if not chances.size:
         return math.nan, math.nan, math.nan, 0

@@ -183,7 +183,7 @@ class Evaluation(Displayed):
 
     @property
     def next_cell_ids(self) -> list[list[int]]:
-        """Ids of the best cells of each query after the answer."""
+        """Ids of the next best cells of each query, without the best candidate."""
         texts = self.queries["next_cell_ids"]
         return [[int(cell_id) for cell_id in text.split(",") if cell_id] for text in texts]
 

@@ -222,7 +222,7 @@ def make_evaluation(
     city: str | None = None,
     file_bytes: int | None = None,
 ) -> Evaluation:
-    """Return the `Evaluation` of a table of `scored_tables`."""
+    """Build an `Evaluation` from one table of scored queries, as `scored_tables` returns it."""
     points = gpd.points_from_xy(scored["x"], scored["y"], crs=database.crs)
     seconds = scored["seconds"].to_numpy(dtype=np.float64)
     timed = seconds[~np.isnan(seconds)]
@@ -246,7 +246,7 @@ def versions() -> dict[str, str]:
 
 
 class _QueryScores:
-    """The best cells of a ranking, with all that tie with the last of them, and their errors."""
+    """The best cells of a query and their errors, with all cells that tie with the last of them."""
 
     def __init__(
         self, database: SignatureDatabase, query: SimulatedQuery, ranking: Ranking, count: int
@@ -290,7 +290,7 @@ class _QueryScores:
         }
 
     def outcome(self, top: int) -> dict[str, Any]:
-        """Return the columns that depend on the number of candidates."""
+        """Return the expected smallest error of `top` candidates, and its chances within limits."""
         expected, within = expected_best(**self._cut(top))
         chances = {f"p{t}": float(p) for t, p in zip(THRESHOLDS, within, strict=True)}
         return {"error_m": expected, **chances}

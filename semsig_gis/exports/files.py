@@ -188,7 +188,7 @@ def feature_stream(
 
 @contextlib.contextmanager
 def write_errors(path: str | Path) -> Iterator[None]:
-    """Raise an error of GDAL or SQLite as a one-sentence `InputError` with it as the cause."""
+    """Convert errors of GDAL and SQLite while writing `path` into an `InputError`."""
     try:
         yield
     except (DataSourceError, DataLayerError, FeatureError, sqlite3.Error) as error:

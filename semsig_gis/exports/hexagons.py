@@ -96,7 +96,7 @@ def area_statistics(
     *,
     identifiability: Identifiability | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Return statistics of the cells of each area; `areas` has the number of each cell's area.
+    """Return statistics of the cells in each area; `areas` has the area number of each cell.
 
     ``cells`` is their number, ``mean_length`` the mean number of objects that they see,
     ``ambiguous`` the share of cells with the types of another cell, ``type_group_size`` the median,

@@ -147,7 +147,10 @@ def check_top(top: int) -> None:
 
 
 def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tuple[str, ...]:
-    """Return notes on a query; `present` are the class codes that occur in the database."""
+    """Return warnings about the objects of a query, such as classes that the database lacks.
+
+    `present` are the class codes that occur in the database.
+    """
     if not len(query):
         return ("nothing was seen, which says little about the place.",)
     notes: tuple[str, ...] = ()

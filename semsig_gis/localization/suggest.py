@@ -194,7 +194,7 @@ def with_unplaced(
     *,
     absent: Sequence[int] = (),
 ) -> LikelihoodLocator:
-    """Return the locator with the prior of `unplaced_prior` added to its own."""
+    """Return a locator with the evidence of undirected and absent objects added to its prior."""
     if not unplaced and not absent:
         return locator
     by_code = locator.index.database.taxonomy.by_code

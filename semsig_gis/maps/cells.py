@@ -183,7 +183,7 @@ def _visible_objects(database: SignatureDatabase) -> tuple[NDArray[np.int32], ND
 
 
 def _cells(database: SignatureDatabase) -> tuple[dict[str, list[str]], dict[str, Any]]:
-    """Return the packed places of the cells, and the settings to unpack them."""
+    """Return the positions of the cells, packed for the page, and the grid to unpack them."""
     lattices, columns = place_lattices(database), database.columns - database.columns[0]
     arrays = {
         "rows": steps(database.rows),

@@ -221,7 +221,7 @@ def _image(posterior: Posterior, levels: NDArray[np.integer], colours: list[str]
 
 
 class _LocationLayers:
-    """Layers of a location, as records for the script of the page."""
+    """Layers of the map of a location, as plain values for the script of the page."""
 
     def __init__(self, location: Location) -> None:
         self.location = location

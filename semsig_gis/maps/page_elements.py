@@ -98,7 +98,7 @@ class Call(MacroElement):
         )
 
     def render(self, **kwargs: Any) -> Any:  # noqa: ANN401 - as branca has it
-        """Add the styles and scripts to the page, then the call."""
+        """Add the style sheets and scripts to the header of the page, and the call to its body."""
         header = cast("Figure", self.get_root()).header
         for file in self.files:
             header.add_child(PageFile(file), name=file)
@@ -539,7 +539,7 @@ def query_text(query: Signature, taxonomy: Taxonomy) -> str:
 
 
 def swatch(colour: str, shape: str = "round") -> str:
-    """Return a small sign of a colour, as HTML."""
+    """Return a small patch of a colour for a legend, as HTML."""
     return f'<i class="{shape}" style="background:{colour}"></i>'
 
 

@@ -110,7 +110,7 @@ class _Towns:
         return np.column_stack([signed_degrees(degrees[:, 0] - self._middle), degrees[:, 1]])
 
     def _cells(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return the distinct rounded points, shape (c, 2), and the index of each point in them."""
+        """Round points to a grid; return distinct ones, shape (c, 2), and the row of each point."""
         ids = cell_ids(*np.rint(points / ROUNDING_DEGREES).T)
         distinct, cell = np.unique(ids, return_inverse=True)
         cells = np.column_stack(split_ids(distinct)) * np.float64(ROUNDING_DEGREES)

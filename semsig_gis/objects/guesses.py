@@ -278,7 +278,10 @@ def guess_position(sample: LayerSample, columns: Sequence[Column]) -> tuple[str,
 
 
 def _pair_rank(pair: tuple[Column, Column]) -> tuple[bool, bool]:
-    """Whether the names of x and y differ in one word only, and whether they may be degrees."""
+    """Criteria to rank a pair of coordinate columns: similar names, and values in degrees.
+
+    Names are similar if they differ in one word only.
+    """
     x, y = pair
     x_words, y_words = (words_of(column.name) for column in pair)
     differences = sum(map(operator.ne, x_words, y_words))

@@ -74,7 +74,7 @@ class LayerReport:
 
 @dataclass(frozen=True, slots=True)
 class UnreadLayer:
-    """A layer of objects that was not read, with its number of objects; None if not counted."""
+    """A layer of objects that was not read; `objects` is their number, None if not counted."""
 
     name: str
     classes: tuple[str, ...]
@@ -272,7 +272,7 @@ def _first_at_place(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Loaded(Displayed):
-    """Result of a load.
+    """Street objects, buildings and streets that were loaded, with the reports.
 
     Parameters
     ----------

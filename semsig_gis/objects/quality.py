@@ -112,7 +112,7 @@ def quality_report(
     *,
     notes: Sequence[str] = (),
 ) -> QualityReport:
-    """Return a quality report of a load.
+    """Build a report on the quality of loaded street objects.
 
     Parameters
     ----------

@@ -292,7 +292,10 @@ def _licences(specs: Mapping[str, Any], sources: Iterable[str]) -> tuple[Licence
 
 
 def _licence_of(line: str, sources: Collection[str]) -> Licence:
-    """Return the licence of a line, without layers if the line is ambiguous."""
+    """Split an attribution line into its terms and its layers.
+
+    If there is not exactly one way to split it, all of it is terms, and there are no layers.
+    """
     parts = line.split(BEFORE_LAYERS)
     readings = [
         Licence(BEFORE_LAYERS.join(parts[:mark]), names)

@@ -278,7 +278,10 @@ def unplaced_parts(text: str) -> tuple[str, list[str], list[str]]:
 
 
 def unplaced_codes(text: str, taxonomy: Taxonomy) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
-    """Return the result of `unplaced_parts` with class codes in place of words."""
+    """Return the sentence with directions, and class codes of undirected and of absent objects.
+
+    As `unplaced_parts`, with class codes in place of words.
+    """
     sentence, *others = unplaced_parts(text)
     unplaced, absent = (tuple(class_code(word, taxonomy) for word in words) for words in others)
     return sentence, unplaced, absent

@@ -33,7 +33,7 @@ def query_name(view: float) -> str:
 def identifiability_tables(
     identifiability: Identifiability, *, object_counts: Mapping[int, int] | None = None
 ) -> tuple[Table, ...]:
-    """Return tables of the mean cell with the bands of cells, and of the gain by each class.
+    """Return two tables: how well cells are found, and how much each class contributes to it.
 
     `object_counts` is by class code; without it the columns about objects are omitted.
     """

@@ -373,7 +373,7 @@ Keys = list[tuple[Line2D | Patch, str]]
 
 
 def _other_keys(plot: Plot) -> Keys:
-    """Return the keys of the legend below those of the curves."""
+    """Return legend entries for all but the curves: interval, diagonal, points of the paper."""
     keys: Keys = []
     if any(curve.low for curve in plot.curves):
         keys.append((Patch(color=SOFT, alpha=0.4, linewidth=0), "interval of 95 %"))

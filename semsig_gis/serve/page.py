@@ -14,11 +14,11 @@ LEAFLET_FILES = frozenset({"leaflet.js", "leaflet.css"})
 
 
 def workbench_page(nonce: str) -> str:
-    """Return the page, which needs no other server.
+    """Return the HTML page of the workbench with all scripts and style sheets included.
 
-    The scripts and style sheets that ``index.html`` links are included: ``leaflet.js`` and
-    ``leaflet.css``, ``maps/FILE`` of the maps, and the files of the workbench. InputError if the
-    package was built without Leaflet.
+    These are the files that ``index.html`` links: ``leaflet.js`` and ``leaflet.css``, ``maps/FILE``
+    of the maps, and the files of the workbench. `nonce` is that of the Content-Security-Policy.
+    InputError if the package was built without Leaflet.
     """
     attribute = f'nonce="{html.escape(nonce)}"'
 

@@ -136,7 +136,7 @@ def latlon(value: object) -> tuple[float, float]:
 
 
 def _near_text(value: object) -> str | None:
-    """Return a known place of latitude, longitude and metres as ``--near`` takes it."""
+    """Convert [latitude, longitude, metres] to text for ``--near``, such as ``48.9N,2.3E,50``."""
     if value is None:
         return None
     if not (isinstance(value, list) and len(value) == POINT_LENGTH + 1):

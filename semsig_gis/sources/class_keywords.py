@@ -88,7 +88,7 @@ class Keywords:
 
 
 def _end(words: tuple[str, ...], start: int, phrase: tuple[str, ...]) -> int | None:
-    """Return the end of a phrase that starts at a word of a text, or None without a match."""
+    """Return the index after `phrase` if it matches the words at `start`; None if not."""
     if len(phrase) > 1 and words[start].startswith("".join(phrase)):
         return start + 1  # written as one word
     end = start + len(phrase)
@@ -185,7 +185,7 @@ def _content() -> dict[str, Any]:
 
 @functools.lru_cache(maxsize=8)
 def _class_words(taxonomy: Taxonomy) -> Mapping[str, tuple[int, str]]:
-    """Return code and word of classes by the word in lower case without blanks."""
+    """Return class code and original word by normalized word (lower case, no blanks)."""
     lists = _content()["classes"]
     others = [
         (key, item.code, word)

@@ -158,7 +158,7 @@ class LayerSpec:
 
     @property
     def fields(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of a catalogue key and the field it names, without fields of coordinates."""
+        """Catalogue keys and the fields that they name, as pairs; coordinates are omitted."""
         uses = [("where", field) for field, _ in self.where]
         uses += [("not", field) for field, _ in self.exclusions]
         uses += [("class_by", self.class_by.field)] if self.class_by else []

@@ -66,7 +66,7 @@ def read_layers(
 
 
 def load_features(path: Path, *, where: str = "") -> list[dict[str, Any]]:
-    """Read map features in the form of an answer; SourceError if the file has none."""
+    """Read a JSON file of Mapillary map features as dictionaries; SourceError if it is not one."""
     try:
         content = parse_json(path.read_bytes())
         if "data" in content:

@@ -229,7 +229,9 @@ def fetch_layers(
     spec: HttpSpec = DEFAULT_HTTP,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Fetch the features of layers in an area from the first store, as files for `read_layers`.
+    """Download the Overture features of layers in an area as files for `read_layers`.
+
+    The first of `endpoints` is used.
 
     A store is ``s3://bucket/folder`` (with ``?region=``, ``endpoint_override=`` and ``scheme=``,
     read without credentials) or a local folder. It contains one or several releases; the latest is

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path to write, which replaces `path` if the block succeeds.
+    """Provide a temporary path to write to; it replaces `path` if the block succeeds.
 
     The temporary file has the same name, in a temporary folder next to `path`. Missing folders are
     created. InputError if the folder is not writable, or `path` is a folder, a device or a pipe.
@@ -76,7 +76,7 @@ def move_folder(new: Path, target: Path) -> None:
 
 @contextlib.contextmanager
 def _temporary_next_to(target: Path) -> Iterator[Path]:
-    """Give a temporary folder next to a folder that is being written."""
+    """Create a temporary folder in the parent folder of `target`; remove it at the end."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with temporary_folder(target.parent) as temporary:

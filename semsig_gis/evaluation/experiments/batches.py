@@ -157,7 +157,10 @@ class OpenExperiment:
     def _scored(
         self, names: Sequence[str], queries: Sequence[SimulatedQuery]
     ) -> Iterator[tuple[str, pd.DataFrame]]:
-        """Yield the scored answers of each of some methods, which share distances."""
+        """Yield the name of each method and the table of its scored answers.
+
+        Distances that several methods need are computed once.
+        """
         scores: dict[str, dict[int, list[dict[str, Any]]]] = {
             name: {top: [] for top in self.spec.top} for name in names
         }

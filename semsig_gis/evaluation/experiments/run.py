@@ -242,5 +242,5 @@ def _answer_in_worker(sources: Mapping[Path, tuple[str, Path, Path]], task: Task
 
 @lru_cache(maxsize=2)
 def _open_experiment(spec: str, folder: Path) -> OpenExperiment:
-    """Return an experiment with its files; a worker opens each once."""
+    """Open an experiment and its files; the result is cached in each worker process."""
     return OpenExperiment(parse_experiment(spec), folder)

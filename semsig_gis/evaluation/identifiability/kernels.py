@@ -56,7 +56,7 @@ def fill_columns(  # noqa: C901, PLR0912, PLR0917 - a kernel takes no keywords
     logs: NDArray[np.uint8],
     columns: NDArray[np.uint8],
 ) -> None:
-    """Write the columns of some cells: the log-likelihood that each symbol adds, in whole steps.
+    """Compute, for some cells, the log-likelihood that each detected symbol adds, in whole steps.
 
     Fills the cells of the lines from ``lines[0]`` to ``lines[1] - 1``, `LINE_CELLS` cells each, in
     `columns`, shape (blocks, k, bins, BLOCK_CELLS). `spread`, shape (levels, units, bins), is the
@@ -290,7 +290,7 @@ class Entries(NamedTuple):
 
 
 class BaseScores(NamedTuple):
-    """Scores of cells before the columns of a query are added, by direction (d).
+    """Scores of the cells for a query without detections, by direction of view (d).
 
     `levels` (d, n) are whole steps from 1, and `trims` (d, n) the tempered ratios of the rest.
     `lifts` are the tempered ratios of not having the objects of each class: (d, n, k), in a sample

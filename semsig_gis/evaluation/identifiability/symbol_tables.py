@@ -242,7 +242,10 @@ def _spreads(
 
 
 def _logs(step: float) -> NDArray[np.uint8]:
-    """Return a table of logarithms in steps, by the leading bits of a float32 of 1 or more."""
+    """Return a lookup table of natural logarithms, in units of `step`, for values of 1 or more.
+
+    The index is the leading bits of a float32, counted from those of 1.0.
+    """
     octaves = math.ceil(255 * step / math.log(2.0))
     octave, part = np.divmod(np.arange(octaves << MANTISSA_BITS), 1 << MANTISSA_BITS)
     value = np.log((1.0 + (part + 0.5) / (1 << MANTISSA_BITS)) * 2.0**octave)

@@ -183,7 +183,7 @@ def _outcome(  # noqa: PLR0917 - a private helper of one caller
     scores: CellScores,
     own: Callable[[NDArray[np.int64]], NDArray[np.float64]] | None = None,
 ) -> tuple[float, ...]:
-    """Return the outcome of one query, in the order of `Trials`."""
+    """Return the outcome of one simulated query: the fields of `Trials` from ``itself`` on."""
     loglik = rerank(
         index, query, scores, count=RERANKED, off_centre=False, sample=RERANKED_SAMPLE
     ).loglik

@@ -107,7 +107,7 @@ def expected_best(
 
 
 def chance_within(better: ArrayLike, tied: ArrayLike, *, slots: int, metres: float) -> float:
-    """Return the probability that the smallest error is at most `metres`.
+    """Return the probability that the nearest candidate is at most `metres` from the true place.
 
     It is the value of `expected_best` for one threshold; faster if `slots` is small.
     """

@@ -436,7 +436,7 @@ class _Quantity:
 
     @property
     def distance(self) -> float:
-        """The distance if it is the same for all classes, otherwise NaN."""
+        """Distance in metres of the quantity; NaN if it has none or differs by class."""
         first = float(self.distances[0])
         return first if (self.distances == first).all() else math.nan
 

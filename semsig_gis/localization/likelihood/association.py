@@ -282,9 +282,10 @@ def range_spreads(
 def associate_pairs(
     pairs: Pairs, weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sum over the one-to-one associations of each problem, given weights of 0 or more.
+    """Return the probability of each pair, summed over all one-to-one associations.
 
-    Returns the chance that each pair is one thing, and the logarithm of the sum of each problem.
+    `weights` has one weight of 0 or more for each pair of an object and a detection. Also returns
+    the logarithm of the sum over the associations of each problem.
     """
     from semsig_gis.localization.likelihood.association_kernels import associate  # noqa: PLC0415 - numba, 0.25 s
 

@@ -328,7 +328,7 @@ def _turned(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _padded(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return values, the last axis filled up to whole blocks with zeros."""
+    """Pad the last axis with zeros to a whole number of blocks; return float32."""
     size = values.shape[-1]
     more = [(0, 0)] * (values.ndim - 1) + [(0, _blocks(size) * LANES - size)]
     return np.pad(values, more).astype(np.float32)

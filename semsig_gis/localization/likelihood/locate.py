@@ -308,7 +308,7 @@ class LikelihoodLocator:
             )
 
     def _usable_objects(self, query: Signature) -> Signature:
-        """Return a query in the grid, without objects of classes that no cell sees."""
+        """Return a query with bearings from grid north, without classes that no cell sees."""
         query = self.north.to_grid(query)
         usable = query.among(self.index.database.present_codes)
         return query if usable.all() else query.select(usable)

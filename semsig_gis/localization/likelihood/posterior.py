@@ -70,7 +70,7 @@ class Posterior(Displayed):
 
     @cached_property
     def _powers(self) -> NDArray[np.int64]:
-        """The powers of two of the chances, from `LEAST_POWER` on; 0 where there is no chance."""
+        """Binary exponent of the chance of each cell, minus `LEAST_POWER`; 0 if the chance is 0."""
         return np.where(self.chances > 0, np.frexp(self.chances)[1] - LEAST_POWER, 0)
 
     def _top(self, amount: float, chances: NDArray[np.float64] | None = None) -> NDArray[np.int64]:
@@ -278,7 +278,7 @@ CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Refinement:
-    """The chances of places on and off the grid.
+    """Chances of square parts of cells, for a place that is more precise than a cell.
 
     By square part of a cell: `places`, shape (p, 2), are centres and `sizes` sides in metres;
     `loglik` is the mean over the part; `headings` are the mean degrees to add to the bearings of

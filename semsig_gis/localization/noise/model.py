@@ -289,7 +289,9 @@ def cell_noise(noise: Noise, step: float) -> Noise:
 
 
 def place_noise(noise: Noise, step: float) -> Noise:
-    """Return the noise model for a known place, the inverse of `cell_noise`.
+    """Return the model without the position uncertainty of a cell, the inverse of `cell_noise`.
+
+    The result is for queries from exactly known places; `step` is the side of a cell in metres.
 
     Raises `InputError` if the position uncertainty of the model is too small to subtract from.
     """

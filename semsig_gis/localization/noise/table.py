@@ -91,7 +91,7 @@ class NoiseTable:
 
     @cached_property
     def detected(self) -> NDArray[np.float64]:
-        """Chance of detection of a near object, shape (longest + 1, k)."""
+        """Chance to detect a near object, by signature length and class: (longest + 1, k)."""
         return 1.0 - self.missed
 
     @cached_property
@@ -153,7 +153,7 @@ class NoiseTable:
 
 
 class NoiseModels(NamedTuple):
-    """The models of a noise mixture, for `association_kernels.sum_associations`.
+    """The noise models of a mixture as arrays, for the kernel `sum_associations`.
 
     By model, `log_weights` are the logarithms of their chances, `clutter` the expected number of
     false detections and `blur` the metres that the observer may be off. By model, length and class,

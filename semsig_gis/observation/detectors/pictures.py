@@ -111,7 +111,7 @@ def bounds(points: Iterable[Iterable[Any]]) -> Corners:
 
 
 def turned(corners: Corners, degrees: float, about: tuple[float, float]) -> Corners:
-    """Return the bounding box of a box that is rotated clockwise about a point."""
+    """Rotate a box clockwise about a point; return the upright box that encloses it."""
     left, top, right, bottom = corners
     angle = math.radians(degrees)
     cosine, sine = math.cos(angle), math.sin(angle)

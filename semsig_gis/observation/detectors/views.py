@@ -106,7 +106,7 @@ class LocatedBoxes:
 
     @property
     def codes(self) -> NDArray[np.uint8]:
-        """The likeliest class of each box; any class if it has no other."""
+        """Code of the likeliest class of each box; `WILDCARD` if no class has a score."""
         by_class = self.scores[:, 1:]
         codes = np.where(by_class.any(axis=1), 1 + by_class.argmax(axis=1), WILDCARD)
         return codes.astype(np.uint8)
@@ -192,7 +192,7 @@ class ViewBuilder:
         return views, tally
 
     def _shot(self, picture: AnnotatedPicture) -> Shot:
-        """Return the data of a picture from all sources, in order of priority."""
+        """Combine camera data of a picture from options, annotations and EXIF, by priority."""
         own = next((self.shots[name] for name in _names(picture) if name in self.shots), Shot())
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)

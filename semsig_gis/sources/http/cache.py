@@ -100,7 +100,7 @@ class Cache:
         return CacheEntry(Path(self.folder), key)
 
     def forget(self, file: Fetched) -> None:
-        """Make the next request fetch a file again; the file itself stays for its readers."""
+        """Make a file invalid, so that it is fetched again; its readers can still read it."""
         self.entry(file.path.name.partition("-")[0]).sidecar.unlink(missing_ok=True)
 
     @contextlib.contextmanager
@@ -206,7 +206,7 @@ class CacheEntry:
         return (size, version) if version.if_range else (0, FileVersion())
 
     def start_part(self, version: FileVersion) -> None:
-        """Start an empty part."""
+        """Discard an incomplete download, and record the version of the one that begins."""
         self.drop_part()
         self._part_info.write_text(json.dumps(dataclasses.asdict(version)), encoding="utf-8")
 

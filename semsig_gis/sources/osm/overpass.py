@@ -100,7 +100,7 @@ def load_document(path: Path, *, where: str) -> Document:
 
 
 def _is_element(element: dict[str, Any]) -> bool:
-    """Whether an item is an element of the map; TypeError if it is a malformed element."""
+    """Whether an item is a node, way or relation; TypeError if it is a malformed one."""
     if element["type"] not in KIND_BY_LETTER.values():
         return False  # for example a count
     tags = element.get("tags", {})

@@ -219,9 +219,9 @@ class Client:
         page: str,
         accept: tuple[str, ...] = (),
     ) -> T:
-        """Fetch the description of the dataset; `page` of the portal is for searching datasets.
+        """Fetch and parse the description of the dataset.
 
-        CatalogError if the portal does not have the dataset.
+        CatalogError if the portal does not have the dataset; `page` is where users can search it.
         """
         try:
             return self.document(query, parse, accept=accept)

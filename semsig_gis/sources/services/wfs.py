@@ -90,7 +90,7 @@ class _Capabilities:
 
 
 def fetch_layer(client: Client, area: Area | None) -> Download:
-    """Fetch a feature type in WGS 84; its name may lack the prefix.
+    """Fetch a feature type in WGS 84; the catalogue may omit the namespace prefix of its name.
 
     ``server_where`` is a condition in XML (OGC Filter Encoding 2.0). Rows are ordered by the
     layer's `id_field` if the service supports it.

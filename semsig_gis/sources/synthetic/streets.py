@@ -156,7 +156,11 @@ def _scattered_lattice(reach: float, step: float, turn: float, rng: np.random.Ge
 
 
 def _shared_edges(faces: NDArray[np.object_]) -> tuple[Ints, Ints, Floats]:
-    """Return the corners and the faces of edges between two faces, and positions of corners."""
+    """Find the edges that two polygons share.
+
+    Returns the two corners and the two faces of each edge, as indices, and the coordinates of all
+    corners.
+    """
     # GEOS gives all faces at a corner exactly the same coordinates.
     ring, face = shapely.get_coordinates(faces, return_index=True)
     corners, number = np.unique(ring.view(np.complex128).ravel(), return_inverse=True)
@@ -282,7 +286,7 @@ class _Row:
     def objects(
         self, network: Network, side: Floats, setback: float, *, second: bool = False
     ) -> Furniture:
-        """Return objects outside the kerb, on the right if `side` is 1, on the left if -1."""
+        """Place objects `setback` metres outside the kerb; `side` is 1 for right, -1 for left."""
         offset = side * (network.kerb[self.edge] + setback)
         letters = np.where(side > 0, "R", "L").tolist()
         ids = [

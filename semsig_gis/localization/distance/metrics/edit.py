@@ -61,7 +61,9 @@ class BitPlanes:
 
     @classmethod
     def build(cls, values: NDArray[np.uint8], offsets: NDArray[np.int64]) -> BitPlanes:
-        """Return the planes of sequences in flat `values`, with `offsets` of shape (d + 1,).
+        """Build the bit planes of d sequences.
+
+        Sequence i is ``values[offsets[i]:offsets[i + 1]]``.
 
         The order does not change the distances, but sorting by length saves memory and time.
         """
