@@ -131,15 +131,15 @@ def print_rows(title: str, header: Iterable[str], rows: Iterable[Iterable[object
     from rich.table import Table
     from rich.text import Text
 
-    plain = [[title], [*header], *([_cell_text(cell) for cell in row] for row in rows)]
-    # Escape all texts in one call, which is faster.
-    shown = iter(visible_lines(text for row in plain for text in row))
-    (title,), names, *texts = ([next(shown) for _ in row] for row in plain)
-    table = Table(title=Text(title), title_justify="left")
-    for number, name in enumerate(names):
+    table = Table(title=Text(visible(title)), title_justify="left")
+    cells = [[_cell_text(cell) for cell in row] for row in rows]
+    # Escape all cells in one call, which is faster.
+    shown = iter(visible_lines(text for row in cells for text in row))
+    texts = [[next(shown) for _ in row] for row in cells]
+    for number, name in enumerate(header):
         column = [row[number] for row in texts if number < len(row) and row[number]]
         right = bool(column) and all(map(NUMBER.fullmatch, column))
-        table.add_column(Text(name), overflow="fold", justify="right" if right else "left")
+        table.add_column(Text(visible(name)), overflow="fold", justify="right" if right else "left")
     for row in texts:
         table.add_row(*map(Text, row))
     console = Console(file=sys.stdout)

@@ -364,7 +364,7 @@ _parse_catalog = functools.lru_cache(
 
 
 def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
-    fields = {}
+    classes = []
     for number, item in enumerate(items, start=1):
         place = f"{where}, class {number}"
         if not isinstance(item, dict):
@@ -375,11 +375,8 @@ def _classes(items: list[Any], where: str) -> tuple[ObjectClass, ...]:
             for key, most in MEASURES.items()
             if key in item
         }
-        fields[place] = {**item, **lengths}
-    classes = []
-    for place, values in fields.items():
         try:
-            classes.append(ObjectClass(**values))
+            classes.append(ObjectClass(**{**item, **lengths}))
         except CatalogError as error:
             raise CatalogError(f"{place}: {error}") from error
     return tuple(classes)
