@@ -32,8 +32,9 @@ def view(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Detections: COCO, Label Studio or Mapillary JSON, CVAT XML, YOLO "
-            ".txt with data.yaml; or a folder."
+            help="Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or "
+            "Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of "
+            "Roboflow; or a folder."
         ),
     ],
     *,
@@ -56,7 +57,7 @@ def view(
         Path | None,
         typer.Option(
             help="Folder of the pictures, to read focal length and heading from EXIF.  "
-            "[default: the folder of the files]"
+            "[default: the folder of the files, or the one of images next to it]"
         ),
     ] = None,
     photos: Annotated[
@@ -143,22 +144,16 @@ def view(
         roll=roll,
         size=_size(size),
     )
-    # Pictures are next to the detections, or in a folder "images" there or one level above.
-    folders = [file if file.is_dir() else file.parent for file in files]
-    default_folders = [
-        candidate
-        for folder in folders
-        for candidate in (folder, folder / "images", folder.parent / "images")
-    ]
     detector = ViewBuilder(
         labels=LabelMap.open(labels or (), taxonomy),
         taxonomy=taxonomy,
         min_score=min_score,
         shot=shot,
         shots={} if photos is None else read_shots(photos),
-        folders=default_folders if images is None else [images],
+        folders=None if images is None else [images],
     )
-    views, tally = detector.views(read_pictures(files), places=place)
+    pictures, unknown = read_pictures(files)
+    views, tally = detector.views(pictures, places=place)
     rows: list[dict[str, Any]] = []
     for name, built_view in views:
         time = {"time": tally.times[name]} if name in tally.times else {}
@@ -166,12 +161,16 @@ def view(
     lines = [json.dumps(row) + "\n" for row in rows]
     write_whole(out, "".join(lines))
     if as_json:
-        print_json({"views": len(views), **tally.to_dict()})
+        passed = [str(file) for file in unknown]
+        print_json({"views": len(views), **tally.to_dict(), "unknown_files": passed})
         return
     say(
         f"{out}: {_many(len(views), 'view')} of {_many(tally.photos, 'picture')} with "
         f"{_many(tally.objects, 'object')}, {tally.ranges:,} with a range."
     )
+    if unknown:
+        more = f" and {len(unknown) - 1:,} more" if len(unknown) > 1 else ""
+        remark(f"left out: {unknown[0]}{more}, in no format of detections")
     _print_remarks(tally)
 
 
@@ -200,6 +199,9 @@ def _size(text: str | None) -> tuple[int, int] | None:
 
 def _print_remarks(tally: Tally) -> None:
     """Print what was left out and which headings are unknown."""
+    if tally.unusable:
+        pictures = _many(len(tally.unusable), "picture")
+        remark(f"left out: {pictures}: {next(iter(tally.unusable.values()))}")
     if tally.below_min_score:
         remark(f"left out: {_many(tally.below_min_score, 'box', 'boxes')} below --min-score")
     if tally.no_boxes:

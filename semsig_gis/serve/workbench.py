@@ -249,7 +249,7 @@ class Workbench:
             if names := body.get("classes"):
                 Path(folder, "classes.txt").write_text(str(names), encoding="utf-8")
             try:
-                pictures = read_pictures([file])
+                pictures, _ = read_pictures([file])
             except SemsigError as error:
                 raise InputError(str(error).replace(f"{folder}/", "")) from error
         tally = Tally()
@@ -261,7 +261,7 @@ class Workbench:
         marks: dict[str, list[dict[str, Any]]] = {}
         for picture in pictures:
             # Files of detectors name pictures with other folders and suffixes.
-            key = stems.get(PurePosixPath(picture.name).stem)
+            key = next((stems[name] for name in picture.names if name in stems), None)
             if key is not None:
                 marks.setdefault(key, []).extend(self._marks(builder, picture, tally))
         if not marks:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from semsig_gis.core import InputError
@@ -16,6 +18,12 @@ if TYPE_CHECKING:
 
 Corners = tuple[float, float, float, float]
 """Left, top, right and bottom."""
+
+FOLDERS = {"labels": "images", "label_2": "image_2", "ann": "img", "Annotations": "JPEGImages"}
+"""Folders of pictures of data sets, by the folder of their labels."""
+
+# Roboflow names its copy of street.jpg "street_jpg.rf.0a1b2c.jpg".
+ROBOFLOW = re.compile(r"(?i)(.+)_(jpe?g|png|webp|tiff?)\.rf\.\w+(\.\w+)?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +80,8 @@ class AnnotatedPicture:
     """A picture with its name, its boxes, and the shot data of its file.
 
     With `shares`, corners are shares of its width and height, otherwise pixels. `others` is the
-    number of shapes that are not boxes, such as points.
+    number of shapes that are not boxes, such as points. `folder` is the folder of its file of
+    detections.
     """
 
     name: str
@@ -80,6 +89,29 @@ class AnnotatedPicture:
     shares: bool = False
     others: int = 0
     shot: Shot = field(default_factory=Shot)
+    folder: Path | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its file, best first: as given, without folders, without the suffix."""
+        path = PurePosixPath(self.name.replace("\\", "/"))
+        names = [self.name, str(path), path.name, path.stem]
+        if original := ROBOFLOW.fullmatch(path.name):
+            names += [f"{original[1]}.{original[2]}", original[1]]
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """The folders where its file may be, best first: next to the file of detections."""
+        if self.folder is None:
+            return ()
+        parts = self.folder.absolute().parts
+        same_set = [
+            Path(*parts[:number], FOLDERS[part], *parts[number + 1 :])
+            for number, part in enumerate(parts)
+            if part in FOLDERS
+        ]
+        return (self.folder, *same_set[::-1], self.folder / "images", self.folder.parent / "images")
 
 
 def box_of(
@@ -102,6 +134,11 @@ def box_of(
     if not 0 <= value <= 1:
         raise InputError(f"{where} has the score {value:g}; give a number from 0 to 1.")
     return Box(label=str(label), corners=numbers, score=value, whole=whole)
+
+
+def size_of(width: Any, height: Any) -> tuple[int, int] | None:  # noqa: ANN401 - any JSON
+    """Return width and height in pixels; None if they are missing or 0."""
+    return (round(float(width)), round(float(height))) if width and height else None
 
 
 def bounds(points: Iterable[Iterable[Any]]) -> Corners:

@@ -42,7 +42,9 @@ Places = Literal["each", "gps", "all"]
 
 SAME_PLACE_M = 5.0
 METRES_PER_DEGREE = 111_320.0
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".JPG", ".JPEG", ".PNG")
+PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff")
+# Boxes are of another picture if the ratio of its sides differs by more.
+SAME_SHAPE = 0.05
 
 # A box this near to the edge of the picture is cut off: pixels, and share of the side.
 EDGE_PIXELS, EDGE_SHARE = 1.0, 0.002
@@ -66,6 +68,8 @@ class Tally:
     not_in_city: Counter[str] = field(default_factory=Counter)
     unknown_heading: int = 0
     north: Counter[str] = field(default_factory=Counter)
+    unusable: dict[str, str] = field(default_factory=dict)
+    """Why pictures were left out, by name."""
     times: dict[str, str] = field(default_factory=dict)
     """Time of the first picture of a view, by the name of the view, if it is known."""
 
@@ -78,6 +82,7 @@ class Tally:
             "unknown_heading": self.unknown_heading,
             "headings_from_north": dict(self.north),
             "left_out": {
+                "pictures": dict(self.unusable),
                 "below_min_score": self.below_min_score,
                 "no_boxes": self.no_boxes,
                 "no_street_objects": dict(self.no_objects),
@@ -128,8 +133,8 @@ class ViewBuilder:
         Data of all pictures.
     shots : mapping of str to Shot, optional
         Data of single pictures, by file name.
-    folders : sequence of Path, optional
-        Folders of the pictures, to read their EXIF.
+    folders : sequence of Path or None, optional
+        Folders of the pictures, to read their EXIF; None for those near the files of detections.
     """
 
     labels: LabelMap
@@ -137,22 +142,23 @@ class ViewBuilder:
     min_score: float = 0.3
     shot: Shot = field(default_factory=Shot)
     shots: Mapping[str, Shot] = field(default_factory=dict)
-    folders: Sequence[Path] = ()
+    folders: Sequence[Path] | None = ()
+    _listings: dict[Path, dict[str, Path]] = field(default_factory=dict, init=False, repr=False)
 
     def views(
         self, pictures: Iterable[AnnotatedPicture], *, places: Places = "each"
     ) -> tuple[list[tuple[str, View]], Tally]:
         """Return the view of each place, with the name of its first picture, and the counts.
 
-        Pictures with the same place in `shots` are one view in any case. InputError if the size or
-        the field of view of a picture is unknown, a number is out of its range, or `shots` contains
-        none of the pictures.
+        Pictures with the same place in `shots` are one view in any case. Pictures that cannot be
+        used, as their size or field of view is unknown, are left out and counted. InputError if no
+        picture can be used, or `shots` contains none of the pictures.
         """
         pictures = list(pictures)
         if (
             self.shots
             and pictures
-            and not self.shots.keys() & {name for picture in pictures for name in _names(picture)}
+            and not self.shots.keys() & {name for picture in pictures for name in picture.names}
         ):
             # Otherwise a table of other pictures would leave every heading unknown.
             raise InputError(
@@ -164,7 +170,14 @@ class ViewBuilder:
         names: dict[str, str] = {}
         positions: list[tuple[tuple[float, float], str]] = []
         for number, picture in enumerate(pictures):
-            shot = self._shot(picture)
+            try:
+                shot = self._shot(picture)
+                self._camera(picture, shot)
+            except InputError as error:
+                tally.unusable[picture.name] = str(error)
+                if len(tally.unusable) == len(pictures):
+                    raise
+                continue
             tally.no_boxes += picture.others
             view = self._view(picture, tally)
             key = f"{number}"
@@ -193,34 +206,57 @@ class ViewBuilder:
 
     def _shot(self, picture: AnnotatedPicture) -> Shot:
         """Combine camera data of a picture from options, annotations and EXIF, by priority."""
-        own = next((self.shots[name] for name in _names(picture) if name in self.shots), Shot())
+        own = next((self.shots[name] for name in picture.names if name in self.shots), Shot())
         if own.heading_error is None:
             own = replace(own, heading_error=self.shot.heading_error)
         shot = own.filled(replace(self.shot, size=None)).filled(picture.shot)
-        path = PurePosixPath(picture.name)
-        endings = ("", *PICTURE_SUFFIXES) if path.suffix == "" else ("",)
-        files = (
-            folder / f"{stem}{ending}"
-            for folder in self.folders
-            for stem in (path, path.name)
-            for ending in endings
-        )
-        if file := next((file for file in files if file.is_file()), None):
-            shot = shot.filled(read_exif(file))
+        if file := self._file(picture):
+            exif = read_exif(file)
+            if shot.size and exif.size and not _same_shape(shot.size, exif.size):
+                boxes, upright = (f"{wide} x {high}" for wide, high in (shot.size, exif.size))
+                raise InputError(
+                    f"the boxes of {picture.name} are in a picture of {boxes} pixels, but {file} "
+                    f"is {upright} as it is shown; detect the objects again in this file, or give "
+                    "the picture that was used."
+                )
+            shot = shot.filled(exif)
         return shot.filled(Shot(size=self.shot.size))
+
+    def _file(self, picture: AnnotatedPicture) -> Path | None:
+        """Return the file of a picture, if need be with another case or kind of picture."""
+        for folder in picture.folders if self.folders is None else self.folders:
+            for path in (folder / name for name in picture.names):
+                if path.is_file():
+                    return path
+                if path.parent not in self._listings:
+                    files = path.parent.iterdir() if path.parent.is_dir() else ()
+                    self._listings[path.parent] = {file.name.lower(): file for file in files}
+                listing = self._listings[path.parent]
+                for ending in ("", *PICTURE_SUFFIXES):
+                    if (file := listing.get(path.name.lower() + ending)) and file.is_file():
+                        return file
+        return None
+
+    def _searched(self, picture: AnnotatedPicture) -> str:
+        """Return a note for messages on the folder where the file of a picture is missing."""
+        folders = picture.folders if self.folders is None else self.folders
+        if not folders or self._file(picture):
+            return ""
+        return f" ({picture.name} is not in {folders[0]})"
 
     def _camera(self, picture: AnnotatedPicture, shot: Shot) -> Camera:
         if shot.size is None:
             raise InputError(
                 f"the size of the picture {picture.name} is not known; give the folder of the "
-                "pictures with --images, or --size WIDTHxHEIGHT."
+                f"pictures with --images{self._searched(picture)}, or --size WIDTHxHEIGHT."
             )
         width, height = shot.size
         fov = field_of_view(shot)
         if fov is None:
             raise InputError(
                 f"the field of view of the picture {picture.name} is not known; give --fov in "
-                "degrees, or with --images the folder of the pictures, whose EXIF may contain it."
+                "degrees, or with --images the folder of the pictures, whose EXIF may contain it"
+                f"{self._searched(picture)}."
             )
         return Camera(
             width=width,
@@ -421,10 +457,9 @@ def north_sigma(error: str | float) -> float:
         ) from fault
 
 
-def _names(picture: AnnotatedPicture) -> tuple[str, str, str]:
-    """Return the names of a picture: as given, without folders, and without the extension."""
-    path = PurePosixPath(picture.name)
-    return picture.name, path.name, path.stem
+def _same_shape(first: tuple[int, int], second: tuple[int, int]) -> bool:
+    """Return whether two pictures have the same ratio of sides, as one may be a smaller copy."""
+    return math.isclose(first[0] * second[1], first[1] * second[0], rel_tol=SAME_SHAPE)
 
 
 def _metres(first: tuple[float, float], second: tuple[float, float]) -> float:

@@ -175,7 +175,7 @@ def read_format(form: str, folder: Path) -> AnnotatedPicture:
     for name, text in FORMATS[form].items():
         (folder / name).write_text(text)
     files = ["labels"] if form == "yolo" else FORMATS[form]
-    (picture,) = read_pictures([folder / name for name in files])
+    (picture,), _ = read_pictures([folder / name for name in files])
     return picture
 
 
@@ -210,7 +210,7 @@ def test_mapillary_detections_are_grouped_by_image(tmp_path: Path) -> None:
     first, second = IMAGE["detections"]["data"][:1] * 2
     items = [{**first, "image": {"id": "a"}}, {**second, "image": {"id": "b"}}]
     (tmp_path / "detections.json").write_text(json.dumps({"data": items}))
-    assert [picture.name for picture in read_pictures([tmp_path])] == ["a", "b"]
+    assert [picture.name for picture in read_pictures([tmp_path])[0]] == ["a", "b"]
 
 
 ROTATED = {
@@ -235,7 +235,7 @@ def test_rotated_box_becomes_bounding_box(
     name: str, text: str, corners: tuple[float, ...], tmp_path: Path
 ) -> None:
     (tmp_path / name).write_text(text)
-    (picture,) = read_pictures([tmp_path])
+    (picture,), _ = read_pictures([tmp_path])
     assert pixels(picture)[0] == pytest.approx(corners)
 
 

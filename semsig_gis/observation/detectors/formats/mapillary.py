@@ -1,4 +1,4 @@
-"""Read detections of Mapillary: images with cameras, and outlines in vector tiles."""
+"""Mapillary: images with cameras, and outlines in vector tiles."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from semsig_gis.core import InputError
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, Shot, bounds, box_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from semsig_gis.observation.detectors.camera import Projection
+    from semsig_gis.observation.detectors.documents import Document
     from semsig_gis.observation.detectors.pictures import Corners
+
+NAME, SUFFIX = "Mapillary", ".json"
 
 CAMERAS: dict[str, Projection] = {
     "perspective": "pinhole",
@@ -32,7 +35,18 @@ MOVE, LINE = 1, 2
 USUAL_EXTENT = 4096
 
 
-def mapillary_images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN401 - any JSON
+def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
+    """Return whether JSON is from Mapillary."""
+    return _images(content) is not None
+
+
+def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the pictures with camera, heading and position."""
+    images = _images(document.content) or []
+    return [_picture(image, str(document.file)) for image in images]
+
+
+def _images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN401 - any JSON
     """Return the images of a document with their detections; None if it is not from Mapillary.
 
     The document is one image with its ``detections``, a list of images, or a list of detections,
@@ -58,8 +72,8 @@ def mapillary_images(document: Any) -> list[dict[str, Any]] | None:  # noqa: ANN
     return list(images.values())
 
 
-def mapillary_picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
-    """Return the picture of an image in the result of `mapillary_images`."""
+def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
+    """Return the picture of an image in the result of `_images`."""
     name = str(image.get("id") or "") or source
     detections = image["detections"]
     detections = detections["data"] if isinstance(detections, dict) else detections

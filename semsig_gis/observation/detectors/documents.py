@@ -1,0 +1,73 @@
+"""Read files of detections without regard to their format: JSON, XML, CSV and text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+from semsig_gis.core import InputError
+from semsig_gis.storage import file_rows, parse_json, read_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Document:
+    """A file and its content: a JSON value, an XML element, the words of lines, or rows of CSV.
+
+    `given` is false if the file was found in a folder.
+    """
+
+    file: Path
+    content: Any
+    given: bool = True
+
+
+def read_document(file: Path, *, given: bool = True) -> Document:
+    """Read a file by its suffix; InputError if it cannot be read or parsed."""
+    return Document(file=file, content=PARSERS[file.suffix.lower()](file), given=given)
+
+
+def text_of(file: Path) -> str:
+    """Return the text of a file; InputError if it cannot be read."""
+    try:
+        return read_text(file)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise InputError(
+            f"{file} cannot be read ({reason}); give a file of detections, or a folder of them."
+        ) from error
+
+
+def _json(file: Path) -> Any:  # noqa: ANN401 - any JSON
+    text = text_of(file)
+    try:
+        return parse_json(text)
+    except ValueError as error:
+        raise InputError(f"{file} is not JSON ({error}); export it again.") from error
+
+
+def _xml(file: Path) -> ET.Element:
+    text = text_of(file)
+    if "<!DOCTYPE" in text:  # to prevent expansion of entities
+        raise InputError(f"{file} defines its own document type; export it as CVAT or Pascal VOC.")
+    try:
+        return ET.fromstring(text)  # noqa: S314 - without a document type
+    except (ET.ParseError, ValueError) as error:
+        raise InputError(
+            f"{file} is not XML that can be read ({error}); export it again."
+        ) from error
+
+
+def _words(file: Path) -> list[list[str]]:
+    return [line.split() for line in text_of(file).splitlines()]
+
+
+def _rows(file: Path) -> list[tuple[int, Any]]:
+    return list(file_rows(file, what="table of boxes"))
+
+
+PARSERS = {".csv": _rows, ".json": _json, ".txt": _words, ".xml": _xml}
+"""How files are parsed, by their suffix."""

@@ -1,0 +1,125 @@
+"""Formats of detections: files with the boxes of objects in pictures.
+
+Each module of this package is a format: its ``NAME``, the ``SUFFIX`` of its files, a function
+``matches`` that recognizes their content, and a function ``pictures`` that reads them. To add one,
+add its module: `read_pictures`, messages and the tests in
+``tests/observation/detectors/test_formats.py`` find it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.documents import PARSERS, Document, read_document
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from semsig_gis.observation.detectors.pictures import AnnotatedPicture
+
+
+class Format(Protocol):
+    """What the module of a format contains."""
+
+    NAME: str
+    SUFFIX: str
+
+    def matches(self, content: Any, /) -> bool:  # noqa: ANN401 - any JSON, XML, CSV or text
+        """Return whether the content of a file, with the suffix of the format, is in it."""
+
+    def pictures(
+        self, document: Document, documents: Sequence[Document], /
+    ) -> Iterable[AnnotatedPicture]:
+        """Return the pictures of a file; `documents` are all files that were given.
+
+        An error about a missing key or a wrong type becomes an InputError.
+        """
+
+
+FORMATS: tuple[Format, ...] = tuple(
+    cast("Format", importlib.import_module(f"{__name__}.{module.name}"))
+    for module in pkgutil.iter_modules(__path__)
+)
+"""Every format, by the name of its module."""
+
+NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
+NAME_FILES = frozenset({"classes.txt"})
+ACCEPTED = f"give {', '.join(form.NAME for form in FORMATS)}, or a folder of them"
+INVALID = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
+
+
+def read_pictures(
+    paths: Iterable[str | Path],
+) -> tuple[list[AnnotatedPicture], list[Path]]:
+    """Read pictures and boxes from files of detections; the format is found by the content.
+
+    A folder means the files of all formats in it and in its folders. YOLO labels need a file of
+    class names (.yaml, .names, classes.txt) among the files, in the same folder or up to two above.
+    COCO results need a file of images and categories among the files.
+
+    Returns the pictures, and the files of folders that are in no format. InputError if a file
+    cannot be read or has another format.
+    """
+    documents: list[Document] = []
+    unknown: list[Path] = []
+    for path in map(Path, paths):
+        if path.is_dir():
+            found = [read_document(file, given=False) for file in _files_in(path)]
+            known = [document for document in found if _format(document)]
+            if not known:
+                raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
+            documents += known
+            unknown += [document.file for document in found if not _format(document)]
+        elif _has_class_names(path):
+            documents.append(Document(file=path, content=None))
+        elif path.suffix.lower() in PARSERS:
+            documents.append(read_document(path))
+        else:
+            raise InputError(f"{path} is not in a supported format; {ACCEPTED}.")
+    labels = [document for document in documents if not _has_class_names(document.file)]
+    return [picture for document in labels for picture in _pictures(document, documents)], unknown
+
+
+def _pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the pictures of a file of labels; InputError if it is in no format."""
+    file, form = document.file, _format(document)
+    if form is None:
+        raise InputError(f"{file} contains no detections in a known format; {ACCEPTED}.")
+    try:
+        pictures = form.pictures(document, documents)
+        return [replace(picture, folder=file.parent) for picture in pictures]
+    except INVALID as error:
+        if isinstance(error, InputError):
+            raise
+        lacks = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise InputError(
+            f"{file} does not follow its format, {form.NAME} ({lacks}); export it again."
+        ) from error
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """Return the files of a folder that may contain detections, without hidden files."""
+    return sorted(
+        file
+        for file in folder.rglob("*")
+        if file.suffix.lower() in PARSERS
+        and not _has_class_names(file)
+        and not any(part.startswith(".") for part in file.relative_to(folder).parts)
+        and file.is_file()
+    )
+
+
+def _has_class_names(file: Path) -> bool:
+    return file.suffix.lower() in NAME_SUFFIXES or file.name in NAME_FILES
+
+
+def _format(document: Document) -> Format | None:
+    """Return the format of a document by its suffix and content."""
+    suffix = document.file.suffix.lower()
+    fitting = (form for form in FORMATS if suffix == form.SUFFIX)
+    return next((form for form in fitting if form.matches(document.content)), None)

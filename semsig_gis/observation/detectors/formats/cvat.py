@@ -1,0 +1,65 @@
+"""CVAT for images 1.1."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.pictures import (
+    AnnotatedPicture,
+    Shot,
+    bounds,
+    box_of,
+    size_of,
+    turned,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from xml.etree import ElementTree as ET
+
+    from semsig_gis.observation.detectors.documents import Document
+
+NAME, SUFFIX = "CVAT for images", ".xml"
+CORNERS = ("xtl", "ytl", "xbr", "ybr")
+
+
+def matches(content: Any) -> bool:  # noqa: ANN401 - an XML element
+    """Return whether XML is from CVAT."""
+    return bool(content.tag == "annotations")
+
+
+def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the pictures; InputError for tracks of a video."""
+    if document.content.find("track") is not None:
+        raise InputError(
+            f"{document.file} contains tracks of a video; export it as CVAT for images 1.1."
+        )
+    return [_picture(image, str(document.file)) for image in document.content.iter("image")]
+
+
+def _picture(image: ET.Element, source: str) -> AnnotatedPicture:
+    name = image.attrib["name"]
+    boxes, others = [], 0
+    for number, shape in enumerate(image, start=1):
+        if shape.tag == "box":
+            left, top, right, bottom = (float(shape.attrib[key]) for key in CORNERS)
+            corners = left, top, right, bottom
+            if angle := float(shape.get("rotation", 0.0)):
+                corners = turned(corners, angle, ((left + right) / 2, (top + bottom) / 2))
+        elif shape.tag == "polygon":
+            corners = bounds(point.split(",") for point in shape.attrib["points"].split(";"))
+        else:
+            others += shape.tag != "tag"
+            continue
+        attributes = {item.get("name"): item.text for item in shape.iter("attribute")}
+        box = box_of(
+            shape.attrib["label"],
+            corners,
+            f"{source}, image {name!r}, shape {number}",
+            score=attributes.get("score", attributes.get("confidence")),
+            whole=shape.get("occluded", "0") != "1",
+        )
+        boxes.append(box)
+    size = size_of(image.get("width"), image.get("height"))
+    return AnnotatedPicture(name=name, boxes=tuple(boxes), others=others, shot=Shot(size=size))

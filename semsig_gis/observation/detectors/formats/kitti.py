@@ -1,0 +1,45 @@
+"""KITTI: a .txt file of label_2 per picture, in pixels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, box_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from semsig_gis.observation.detectors.documents import Document
+
+NAME, SUFFIX = "KITTI label_2", ".txt"
+VALUES = 15  # type, truncated, occluded, angle, box, and seven of the object in space; a score
+REGION = "DontCare"  # several objects that were not labelled
+
+
+def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
+    """Return whether the first line of a text is a name with 14 or 15 values."""
+    words: list[str] = next((line for line in content if line), [])
+    return len(words) in {VALUES, VALUES + 1} and not words[0].isdecimal()
+
+
+def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the picture that is named as the file."""
+    boxes, others = [], 0
+    for number, words in enumerate(document.content, start=1):
+        if not words:
+            continue
+        where = f"{document.file}, line {number}"
+        if len(words) not in {VALUES, VALUES + 1}:
+            raise InputError(
+                f"{where} has {len(words)} values; a line of KITTI has 15, and a score if it is "
+                "of a detector."
+            )
+        if words[0] == REGION:
+            others += 1
+            continue
+        score = words[VALUES] if len(words) > VALUES else None
+        # Both are 0 for a whole object, and -1 if they are unknown.
+        whole = max(float(words[1]), float(words[2])) <= 0
+        boxes.append(box_of(words[0], words[4:8], where, score=score, whole=whole))
+    return [AnnotatedPicture(name=document.file.stem, boxes=tuple(boxes), others=others)]

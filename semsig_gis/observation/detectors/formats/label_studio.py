@@ -1,0 +1,83 @@
+"""Label Studio: tasks with rectangles and polygons in percent of the picture."""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from semsig_gis.observation.detectors.pictures import (
+    AnnotatedPicture,
+    Shot,
+    bounds,
+    box_of,
+    size_of,
+    turned,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from semsig_gis.observation.detectors.documents import Document
+    from semsig_gis.observation.detectors.pictures import Box, Corners
+
+NAME, SUFFIX = "Label Studio", ".json"
+PERCENT = 100.0
+
+
+def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
+    """Return whether JSON is a list of tasks."""
+    return (
+        isinstance(content, list)
+        and bool(content)
+        and all(isinstance(item, dict) and "data" in item for item in content)
+    )
+
+
+def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the picture of each task."""
+    return [_picture(task, str(document.file)) for task in document.content]
+
+
+def _picture(task: dict[str, Any], source: str) -> AnnotatedPicture:
+    where = f"{source}, task {task.get('id', '?')}"
+    annotations = [item for item in task.get("annotations") or [] if not item.get("was_cancelled")]
+    last = (annotations or task.get("predictions") or [{"result": []}])[-1]
+    boxes: list[Box] = []
+    size, others = None, 0
+    for item in last["result"]:
+        kind, value = str(item.get("type", "")), item.get("value", {})
+        size = size_of(item.get("original_width"), item.get("original_height")) or size
+        if kind not in {"rectanglelabels", "polygonlabels"}:
+            others += kind.endswith("labels")
+            continue
+        label = value[kind][0] if value.get(kind) else "no label"
+        corners = _corners(value, size or (1, 1))
+        boxes.append(box_of(label, corners, where, score=item.get("score")))
+    values = [text for text in task["data"].values() if isinstance(text, str)]
+    address = str(task["data"].get("image") or next(iter(values), task.get("id", "?")))
+    parts = urlsplit(address)
+    path = (parse_qs(parts.query).get("d") or [parts.path])[0]
+    # Uploads have a prefix of eight hexadecimal digits.
+    name = re.sub(r"^[0-9a-f]{8}-", "", PurePosixPath(path).name) or address
+    return AnnotatedPicture(
+        name=name, boxes=tuple(boxes), shares=True, others=others, shot=Shot(size=size)
+    )
+
+
+def _corners(value: dict[str, Any], size: tuple[int, int]) -> Corners:
+    """Return the corners of a rectangle or polygon in percent, in shares of the picture."""
+    if "points" in value:
+        corners = bounds(value["points"])
+    else:
+        left, top = float(value["x"]), float(value["y"])
+        corners = left, top, left + float(value["width"]), top + float(value["height"])
+        if angle := float(value.get("rotation") or 0.0):
+            # The rotation is about the left top corner, in pixels.
+            wide, high = size
+            scaled = corners[0] * wide, corners[1] * high, corners[2] * wide, corners[3] * high
+            box = turned(scaled, angle, (left * wide, top * high))
+            corners = box[0] / wide, box[1] / high, box[2] / wide, box[3] / high
+    first, second, third, fourth = (number / PERCENT for number in corners)
+    return first, second, third, fourth

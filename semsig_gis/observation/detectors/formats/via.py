@@ -1,0 +1,75 @@
+"""VGG Image Annotator (VIA), version 1 or 2: a project, or its annotations as JSON."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from semsig_gis.observation.detectors.documents import Document
+    from semsig_gis.observation.detectors.pictures import Corners
+
+NAME, SUFFIX = "VIA", ".json"
+PROJECT = "_via_img_metadata"
+LABELS = ("label", "class", "name", "type", "category", "object")
+"""Usual names of the attribute that is the label, best first; otherwise the first attribute."""
+
+
+def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
+    """Return whether JSON is from VIA."""
+    if not isinstance(content, dict) or PROJECT in content:
+        return isinstance(content, dict)
+    return bool(content) and all(
+        isinstance(item, dict) and {"filename", "regions"} <= item.keys()
+        for item in content.values()
+    )
+
+
+def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the pictures, whose sizes VIA does not write; points and lines are counted."""
+    images = document.content.get(PROJECT, document.content)
+    return [_picture(image, str(document.file)) for image in images.values()]
+
+
+def _picture(image: dict[str, Any], source: str) -> AnnotatedPicture:
+    regions = image["regions"]
+    boxes, others = [], 0
+    for number, region in enumerate(
+        regions.values() if isinstance(regions, dict) else regions, start=1
+    ):
+        corners = _corners(region["shape_attributes"])
+        if corners is None:
+            others += 1
+            continue
+        where = f"{source}, image {image['filename']}, region {number}"
+        boxes.append(box_of(_label(region.get("region_attributes") or {}), corners, where))
+    return AnnotatedPicture(name=str(image["filename"]), boxes=tuple(boxes), others=others)
+
+
+def _label(attributes: dict[str, Any]) -> str:
+    """Return the label among the attributes of a region, which the user names."""
+    usual = {name.strip().casefold(): value for name, value in attributes.items()}
+    for value in (*(usual.get(name) for name in LABELS), *attributes.values()):
+        if isinstance(value, dict):  # of a checkbox: the chosen options
+            value = next((option for option, chosen in value.items() if chosen), None)  # noqa: PLW2901
+        if value not in {None, ""}:
+            return str(value).strip()
+    return "no label"
+
+
+def _corners(shape: dict[str, Any]) -> Corners | None:
+    kind = shape["name"]
+    if kind == "rect":
+        left, top = float(shape["x"]), float(shape["y"])
+        return left, top, left + float(shape["width"]), top + float(shape["height"])
+    if kind == "polygon":
+        return bounds(zip(shape["all_points_x"], shape["all_points_y"], strict=True))
+    if kind in {"circle", "ellipse"}:
+        x, y = float(shape["cx"]), float(shape["cy"])
+        across = float(shape["r"] if kind == "circle" else shape["rx"])
+        down = float(shape["r"] if kind == "circle" else shape["ry"])
+        return x - across, y - down, x + across, y + down
+    return None

@@ -1,0 +1,110 @@
+"""YOLO: a .txt file per picture, in shares of the picture, with a file of class names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from semsig_gis.core import InputError
+from semsig_gis.observation.detectors.documents import text_of
+from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from semsig_gis.observation.detectors.documents import Document
+    from semsig_gis.observation.detectors.pictures import Corners
+
+NAME, SUFFIX = "YOLO with data.yaml", ".txt"
+NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
+"""Files with class names, in the folder of the labels or up to two above."""
+LEVELS = 3
+
+BOX_VALUES = 4
+LEAST_WORDS = 4  # a line with fewer is of another kind of text
+
+
+def matches(content: Any) -> bool:  # noqa: ANN401 - words of lines
+    """Return whether a text is empty, as without objects, or begins with a line of numbers."""
+    words = next((line for line in content if line), None)
+    if words is None:
+        return True
+    return (
+        len(words) >= LEAST_WORDS
+        and not words[0].endswith(":")
+        and all(word.lstrip("-").replace(".", "", 1).isdecimal() for word in (words[1], words[-1]))
+    )
+
+
+def pictures(document: Document, documents: Sequence[Document]) -> list[AnnotatedPicture]:
+    """Return the picture that is named as the file."""
+    file = document.file
+    labels = _names(file, documents) if any(document.content) else {}
+    boxes = []
+    for number, words in enumerate(document.content, start=1):
+        if not words:
+            continue
+        where = f"{file}, line {number}"
+        if len(words) <= BOX_VALUES or not words[0].isdecimal():
+            raise InputError(
+                f"{where} is not a line of YOLO labels; write class, x, y, width, height (and "
+                "score)."
+            )
+        if int(words[0]) not in labels:
+            raise InputError(
+                f"{where} is of class {words[0]}, which has no name; list it in data.yaml."
+            )
+        corners, score = _corners(words[1:], where)
+        boxes.append(box_of(labels[int(words[0])], corners, where, score=score))
+    return [AnnotatedPicture(name=file.stem, boxes=tuple(boxes), shares=True)]
+
+
+def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
+    """Return the corners, in shares of the picture, and the score of a box or polygon.
+
+    Trackers write the number of the object at the end of the line, after the score.
+    """
+    tracked = len(texts) > BOX_VALUES and texts[-1].isdecimal()
+    if tracked and (int(texts[-1]) > 1 or len(texts) == BOX_VALUES + 2):
+        texts = texts[:-1]
+    try:
+        values = [float(text) for text in texts]
+    except ValueError as error:
+        raise InputError(
+            f"{where} has a value that is not a number; write class, x, y, width, height."
+        ) from error
+    score = texts[-1] if len(texts) % 2 else None
+    if len(texts) <= BOX_VALUES + 1:
+        x, y, width, height = values[:BOX_VALUES]
+        corners = x - width / 2, y - height / 2, x + width / 2, y + height / 2
+    else:
+        corners = bounds(zip(values[::2], values[1::2], strict=False))
+    if not all(-1 <= value <= 2 for value in corners):  # noqa: PLR2004 - a picture away
+        raise InputError(
+            f"{where} is not in shares of the picture; divide pixels by its width and height."
+        )
+    return corners, score
+
+
+def _names(file: Path, documents: Sequence[Document]) -> dict[int, str]:
+    """Return the names of classes by number, from a file that was given or is near the labels."""
+    given = (document.file for document in documents if document.content is None)
+    near = (folder / name for folder in file.absolute().parents[:LEVELS] for name in NAME_FILES)
+    source = next(given, None) or next((path for path in near if path.is_file()), None)
+    if source is None:
+        raise InputError(
+            f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
+        )
+    text = text_of(source)
+    if source.suffix.lower() not in {".yaml", ".yml"}:
+        return dict(enumerate(text.split("\n")))
+    try:
+        classes = yaml.safe_load(text)["names"]
+        pairs = classes.items() if isinstance(classes, dict) else enumerate(classes)
+        return {int(number): str(name) for number, name in pairs}
+    except (yaml.YAMLError, RecursionError, KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{source} has no list of class names; give a YAML file with 'names'."
+        ) from error
