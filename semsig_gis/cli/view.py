@@ -42,8 +42,8 @@ def view(
     labels: Annotated[
         list[str] | None,
         typer.Option(
-            help="Map from labels to classes: coco, mapillary_vistas, cityscapes or a .toml file; "
-            "repeat for several, best first.  [default: the three]"
+            help="Map from labels to classes: coco, mapillary_vistas, cityscapes, panoramax or a "
+            ".toml file; repeat for several, best first.  [default: the four]"
         ),
     ] = None,
     database: Annotated[

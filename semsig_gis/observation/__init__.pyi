@@ -4,6 +4,7 @@ from .detectors.camera import Camera as Camera
 from .detectors.camera import Projection as Projection
 from .detectors.exif import picture_shot as picture_shot
 from .detectors.exif import read_exif as read_exif
+from .detectors.formats import FORMATS as FORMATS
 from .detectors.formats import read_pictures as read_pictures
 from .detectors.labels import LabelMap as LabelMap
 from .detectors.labels import Meaning as Meaning

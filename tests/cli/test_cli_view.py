@@ -115,6 +115,25 @@ def test_focal_length_is_read_from_exif(coco: Path, run: Run) -> None:
     assert written(coco.with_name("v.jsonl"))[1].photos[0].width == pytest.approx(67.3, abs=0.1)
 
 
+def test_pictures_and_files_that_are_left_out_are_named(coco: Path, run: Run) -> None:
+    folder = coco.parent / "labels"
+    folder.mkdir()
+    rows = ["filename,class,xmin,ymin,xmax,ymax", "a.jpg,bench,9,9,50,90", "b.jpg,bench,9,9,50,90"]
+    (folder / "_annotations.csv").write_text("\n".join(rows))
+    (folder / "README.txt").write_text("Two pictures.\n")
+    Image.new("L", (400, 300)).save(folder / "a.jpg")
+    code, out, err = run("view labels --fov 90 --out v.jsonl")
+    assert code == 0, err
+    assert out == "v.jsonl: 1 view of 1 picture with 1 object, 1 with a range.\n"
+    first, second = err.splitlines()[:2]
+    assert first == "semsig: left out: labels/README.txt, in no format of detections"
+    assert second.startswith("semsig: left out: 1 picture: the size of the picture b.jpg is not ")
+    assert second.endswith("or --size WIDTHxHEIGHT (b.jpg is not in labels).")
+    report = json.loads(run("view labels --fov 90 --out v.jsonl --json")[1])
+    assert report["unknown_files"] == ["labels/README.txt"]
+    assert list(report["left_out"]["pictures"]) == ["b.jpg"]
+
+
 @pytest.mark.usefixtures("coco")
 @pytest.mark.parametrize(
     ("arguments", "words"),

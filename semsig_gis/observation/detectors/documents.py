@@ -15,19 +15,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Document:
-    """A file and its content: a JSON value, an XML element, the words of lines, or rows of CSV.
-
-    `given` is false if the file was found in a folder.
-    """
+    """A file and its content: a JSON value, an XML element, the words of lines, or rows of CSV."""
 
     file: Path
     content: Any
-    given: bool = True
 
 
-def read_document(file: Path, *, given: bool = True) -> Document:
+def read_document(file: Path) -> Document:
     """Read a file by its suffix; InputError if it cannot be read or parsed."""
-    return Document(file=file, content=PARSERS[file.suffix.lower()](file), given=given)
+    return Document(file=file, content=PARSERS[file.suffix.lower()](file))
 
 
 def text_of(file: Path) -> str:

@@ -138,7 +138,8 @@ def box_of(
 
 def size_of(width: Any, height: Any) -> tuple[int, int] | None:  # noqa: ANN401 - any JSON
     """Return width and height in pixels; None if they are missing or 0."""
-    return (round(float(width)), round(float(height))) if width and height else None
+    wide, high = round(float(width or 0)), round(float(height or 0))
+    return (wide, high) if wide and high else None
 
 
 def bounds(points: Iterable[Iterable[Any]]) -> Corners:

@@ -248,7 +248,7 @@ class ViewBuilder:
         if shot.size is None:
             raise InputError(
                 f"the size of the picture {picture.name} is not known; give the folder of the "
-                f"pictures with --images{self._searched(picture)}, or --size WIDTHxHEIGHT."
+                f"pictures with --images, or --size WIDTHxHEIGHT{self._searched(picture)}."
             )
         width, height = shot.size
         fov = field_of_view(shot)

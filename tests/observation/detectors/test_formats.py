@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import base64
 import json
+import tempfile
+import zlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from sentences import refused
 
 from semsig_gis.core import InputError
-from semsig_gis.observation import Shot, read_pictures
+from semsig_gis.observation import FORMATS, Shot, read_pictures
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
     from semsig_gis.observation import AnnotatedPicture
 
@@ -140,27 +145,200 @@ IMAGE: dict[str, Any] = {
 }
 
 
-# The texts of the files of each format.
+VOC = """<annotation>
+  <folder>street</folder>
+  <filename>street.jpg</filename>
+  <size><width>800</width><height>400</height><depth>3</depth></size>
+  <object>
+    <name>bench</name><pose>Unspecified</pose><truncated>0</truncated><difficult>0</difficult>
+    <part><name>seat</name><bndbox><xmin>90</xmin></bndbox></part>
+    <bndbox><xmin>80</xmin><ymin>100</ymin><xmax>240</xmax><ymax>200.0</ymax></bndbox>
+  </object>
+  <object>
+    <name>stop sign</name><truncated>1</truncated><score>0.75</score>
+    <bndbox><xmax>440</xmax><xmin>400</xmin><ymax>80</ymax><ymin>40</ymin></bndbox>
+  </object>
+  <object><name>lamp</name><polygon><x1>1</x1><y1>2</y1></polygon></object>
+</annotation>
+"""
+
+LABELME: dict[str, Any] = {
+    "version": "5.4.1",
+    "flags": {},
+    "shapes": [
+        # From its lower right corner.
+        {"label": "bench", "shape_type": "rectangle", "points": [[240, 200], [80, 100]]},
+        {"label": "stop sign", "shape_type": "circle", "points": [[420, 60], [432, 76]],
+         "score": 0.75},
+        {"label": "lamp", "shape_type": "point", "points": [[1, 2]]},
+    ],
+    "imagePath": "..\\pictures\\street.jpg",
+    "imageData": None,
+    "imageHeight": 400,
+    "imageWidth": 800,
+}  # fmt: skip
+
+VIA: dict[str, Any] = {
+    "street.jpg12345": {
+        "filename": "street.jpg",
+        "size": 12345,
+        "regions": [
+            {"shape_attributes": {"name": "rect", "x": 80, "y": 100, "width": 160, "height": 100},
+             "region_attributes": {"quality": "good", "Type": "bench"}},
+            {"shape_attributes": {
+                "name": "polygon", "all_points_x": [400, 440, 410], "all_points_y": [40, 50, 80]},
+             "region_attributes": {"Type": {"stop sign": True}}},
+            {"shape_attributes": {"name": "point", "cx": 1, "cy": 2}, "region_attributes": {}},
+        ],
+        "file_attributes": {},
+    }
+}  # fmt: skip
+# Version 1 numbers the regions.
+VIA_1 = {key: {**image, "regions": dict(enumerate(image["regions"]))} for key, image in VIA.items()}
+
+# The header of a PNG of 40 x 40 pixels.
+MASK = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x28\0\0\0\x28\1\3\0\0\0"
+SUPERVISELY: dict[str, Any] = {
+    "description": "",
+    "size": {"height": 400, "width": 800},
+    "tags": [],
+    "objects": [
+        {"classTitle": "bench", "geometryType": "rectangle", "tags": [],
+         "points": {"exterior": [[80, 100], [240, 200]], "interior": []}},
+        {"classTitle": "stop sign", "geometryType": "bitmap",
+         "tags": [{"name": "confidence", "value": 0.75}, {"name": "Occluded", "value": None}],
+         "bitmap": {"data": base64.b64encode(zlib.compress(MASK)).decode(), "origin": [400, 40]}},
+        {"classTitle": "lamp", "geometryType": "point",
+         "points": {"exterior": [[1, 2]], "interior": []}},
+    ],
+}  # fmt: skip
+
+ROBOFLOW = """filename,width,height,class,xmin,ymin,xmax,ymax
+street.jpg,800,400,bench,80,100,240,200
+street.jpg,800,400,stop sign,400,40,440,80
+"""
+
+KITTI = """bench 0.00 0 -1.57 80.00 100.00 240.00 200.00 0.85 1.5 0.5 1.0 1.7 9.0 -1.5
+stop_sign 0.00 1 0.00 400.00 40.00 440.00 80.00 -1 -1 -1 -1000 -1000 -1000 -10 0.75
+DontCare -1 -1 -10 503.89 169.71 590.61 190.13 -1 -1 -1 -1000 -1000 -1000 -10
+"""
+
+FRAMES: list[dict[str, Any]] = [
+    {
+        "name": "street.jpg",
+        "size": {"width": 800, "height": 400},
+        "attributes": {"weather": "clear"},
+        "labels": [
+            {"id": "1", "category": "bench", "attributes": {"occluded": False},
+             "box2d": {"x1": 80, "y1": 100, "x2": 240, "y2": 200}},
+            {"id": "2", "category": "stop sign", "attributes": {"truncated": True}, "score": 0.75,
+             "poly2d": [{"vertices": [[400, 40], [440, 50], [410, 80]], "types": "LLL",
+                         "closed": True}]},
+            {"id": "3", "category": "lane", "attributes": {},
+             "poly2d": [{"vertices": [[1, 2], [3, 4]], "types": "LL", "closed": False}]},
+        ],
+    }
+]  # fmt: skip
+
+
+def tags(**values: str) -> list[dict[str, str]]:
+    return [{"key": key, "value": value} for key, value in values.items()]
+
+
+SCORE_TAG = "detection_confidence[osm|traffic_sign=stop]"
+ITEM: dict[str, Any] = {
+    "type": "Feature",
+    "id": "street",
+    "geometry": {"type": "Point", "coordinates": [7.42, 43.73]},
+    "properties": {
+        "datetime": "2026-05-01T10:00:00+00:00",
+        "view:azimuth": 97,
+        "pers:interior_orientation": {
+            "field_of_view": 360, "sensor_array_dimensions": [800, 400],
+        },
+        "annotations": [
+            {"id": "1", "semantics": tags(**{"osm|backrest": "yes", "osm|amenity": "bench"}),
+             "shape": {"type": "Polygon", "coordinates": [
+                 [[80, 100], [240, 100], [240, 200], [80, 200], [80, 100]]]}},
+            {"id": "2", "semantics": tags(**{SCORE_TAG: "0.75", "osm|traffic_sign": "stop"}),
+             "shape": [400, 40, 440, 80]},
+            {"id": "3", "semantics": [], "shape": [1, 1, 2, 2]},
+        ],
+        "semantics": [],
+    },
+}  # fmt: skip
+
+# The texts of the files of each format, or of more forms of it.
 ONE = {"annotations": [{**COCO["annotations"][0], "bbox": [0, 0, 1, 1]}]}
-FORMATS = {
-    "coco": {"street.json": json.dumps(COCO)},
-    "coco results": {
+POLYGONS = [
+    {
+        **item,
+        "bbox": [],
+        "segmentation": [[x, y, x + width, y, x, y + 1], [x + 1, y + 1, x + 2, y + height]],
+    }
+    for item in COCO["annotations"]
+    for x, y, width, height in [item["bbox"]]
+]
+SAMPLES = {
+    "COCO": {"street.json": json.dumps(COCO)},
+    "COCO (polygons)": {"street.json": json.dumps({**COCO, "annotations": POLYGONS})},
+    "COCO (results)": {
         "results.json": json.dumps([{"score": 1.0, **item} for item in COCO["annotations"]]),
         "truth.json": json.dumps(COCO | ONE),
     },
-    "yolo": {
+    "YOLO with data.yaml": {
         "labels/street.txt": YOLO,
         "data.yaml": "path: .\nnames:\n  0: bench\n  1: stop sign\n",
     },
     # As segmentation models write them, with another file of names.
-    "yolo polygons": {
+    "YOLO with data.yaml (polygons)": {
         "my.names": "bench\nstop sign\n",
         "street.txt": "0 0.1 0.25 0.3 0.3 0.2 0.5\n1 0.5 0.1 0.55 0.2 0.52 0.15 0.75\n",
     },
-    "label studio": {"export.json": json.dumps([TASK])},
-    "cvat": {"annotations.xml": CVAT},
-    "mapillary": {"images.json": json.dumps({"data": [IMAGE]})},
+    # As trackers write them: with a score and the number of the object, or only the number.
+    "YOLO with data.yaml (tracks)": {
+        "classes.txt": "bench\nstop sign\n",
+        "street.txt": "0 0.2 0.375 0.2 0.25 7\n1 0.525 0.15 0.05 0.1 0.75 1\n",
+    },
+    "Label Studio": {"export.json": json.dumps([TASK])},
+    "CVAT for images": {"annotations.xml": CVAT},
+    "Mapillary": {"images.json": json.dumps({"data": [IMAGE]})},
+    "Pascal VOC": {"street.xml": VOC},
+    "LabelMe": {"street.json": json.dumps(LABELME)},
+    "VIA": {"via.json": json.dumps(VIA)},
+    "VIA (project)": {"via.json": json.dumps({"_via_settings": {}, "_via_img_metadata": VIA})},
+    "VIA (version 1)": {"via.json": json.dumps(VIA_1)},
+    "Supervisely": {"street.jpg.json": json.dumps(SUPERVISELY)},
+    "CSV of Roboflow": {"_annotations.csv": ROBOFLOW},
+    "KITTI label_2": {"street.txt": KITTI},
+    "BDD100K": {"bdd100k_labels.json": json.dumps(FRAMES)},
+    "BDD100K (Scalabel)": {
+        "scalabel.json": json.dumps(
+            {
+                "frames": [{**FRAMES[0], "size": None}, {"name": "b", "labels": None}][:1],
+                "config": {"imageSize": {"width": 800, "height": 400}},
+            }
+        )
+    },
+    "BDD100K (frames of a file)": {
+        "street.json": json.dumps(
+            {
+                "name": "street",
+                "frames": [{"objects": FRAMES[0]["labels"], "size": FRAMES[0]["size"]}],
+            }
+        )
+    },
+    "Panoramax": {"item.json": json.dumps(ITEM)},
+    "Panoramax (search)": {
+        "items.json": json.dumps({"type": "FeatureCollection", "features": [ITEM]})
+    },
 }
+# Formats without scores, without sizes, with marks of hidden objects, and with other shapes.
+NO_SCORES = ("Mapillary", "VIA", "CSV")
+NO_SIZES = ("YOLO", "KITTI", "VIA")
+WITH_HIDDEN = ("CVAT", "Pascal", "Supervisely", "KITTI", "BDD100K")
+WITH_OTHERS = ("Label", *WITH_HIDDEN, "VIA", "Panoramax")
+OWN_LABELS = {"KITTI": ["bench", "stop_sign"], "Panor": ["amenity=bench", "traffic_sign=stop"]}
 
 
 def pixels(picture: AnnotatedPicture) -> list[list[float]]:
@@ -171,26 +349,216 @@ def pixels(picture: AnnotatedPicture) -> list[list[float]]:
 
 def read_format(form: str, folder: Path) -> AnnotatedPicture:
     """Write and read the files of a format; return the single picture."""
-    (folder / "labels").mkdir()
-    for name, text in FORMATS[form].items():
+    for name, text in SAMPLES[form].items():
+        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
-    files = ["labels"] if form == "yolo" else FORMATS[form]
-    (picture,), _ = read_pictures([folder / name for name in files])
+    files = ["labels"] if form == "YOLO with data.yaml" else SAMPLES[form]
+    (picture,), unknown = read_pictures([folder / name for name in files])
+    assert unknown == []
     return picture
 
 
-@pytest.mark.parametrize("form", FORMATS)
+def test_every_format_has_sample() -> None:
+    assert {form.partition(" (")[0] for form in SAMPLES} == {form.NAME for form in FORMATS}
+
+
+@pytest.mark.parametrize("form", SAMPLES)
 def test_every_format_gives_same_boxes(form: str, tmp_path: Path) -> None:
     picture = read_format(form, tmp_path)
-    assert picture.name.removesuffix(".jpg") == "street"
-    assert [box.label for box in picture.boxes] == LABELS
+    assert picture.names[-1] == "street"
+    assert picture.folder in {tmp_path, tmp_path / "labels"}
+    assert [box.label for box in picture.boxes] == OWN_LABELS.get(form[:5], LABELS)
     for box_pixels, corners in zip(pixels(picture), CORNERS, strict=True):
         assert box_pixels == pytest.approx(corners, abs=0.15)  # 1 / 4096 of a tile
-    scores = [1.0, 1.0] if form == "mapillary" else SCORES  # it has no scores
-    assert [box.score for box in picture.boxes] == scores
-    assert [box.whole for box in picture.boxes] == [True, form != "cvat"]
-    assert picture.others == (form in {"label studio", "cvat"})
-    assert picture.shot.size == (None if form.startswith("yolo") else (800, 400))
+    assert [box.score for box in picture.boxes] == (
+        [1.0, 1.0] if form.startswith(NO_SCORES) else SCORES
+    )
+    assert [box.whole for box in picture.boxes] == [True, not form.startswith(WITH_HIDDEN)]
+    assert picture.others == form.startswith(WITH_OTHERS)
+    assert picture.shot.size == (None if form.startswith(NO_SIZES) else (800, 400))
+
+
+def test_folder_with_all_formats_and_other_files_is_read(tmp_path: Path) -> None:
+    forms = [form for form in SAMPLES if form != "COCO (results)"]
+    for number, form in enumerate(forms):
+        folder = tmp_path / "sets" / str(number)
+        for name, text in SAMPLES[form].items():
+            (folder / name).parent.mkdir(exist_ok=True, parents=True)
+            (folder / name).write_text(text)
+    others = {
+        "meta.json": '{"classes": []}',
+        "README.roboflow.txt": "This data set has 2 pictures.\n",
+        "photos.csv": "image,fov\nstreet.jpg,60\n",
+        "calib/street.txt": "P0: 7.2e+02 0 6.1e+02 0\n",
+        "ImageSets/train.txt": "street 1\n",
+    }
+    (tmp_path / ".hidden.json").write_text("{")
+    for name, text in others.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    # The names of classes with a suffix of their own are near no labels: give them.
+    (tmp_path / "sets").joinpath("classes.txt").write_text("bench\nstop sign\n")
+    pictures, unknown = read_pictures([tmp_path])
+    assert [picture.names[-1] for picture in pictures] == ["street"] * len(forms)
+    assert all(len(picture.boxes) == len(CORNERS) for picture in pictures)
+    assert {file.relative_to(tmp_path).as_posix() for file in unknown} == set(others)
+
+
+def test_pictures_are_looked_for_near_their_labels(tmp_path: Path) -> None:
+    labels = tmp_path / "set" / "labels" / "train"
+    labels.mkdir(parents=True)
+    (labels / "street.txt").write_text("")
+    (picture,), _ = read_pictures([tmp_path / "set"])
+    assert picture.folders[:2] == (labels, tmp_path / "set" / "images" / "train")
+
+
+LABEL = st.sampled_from(["bench", "stop_sign", "Laternen-Mast", "ベンチ"])
+SIDE = st.integers(0, 9999)
+BOXES = st.lists(
+    st.tuples(LABEL, SIDE, SIDE, SIDE, SIDE).map(
+        lambda box: (box[0], min(box[1::2]), min(box[2::2]), max(box[1::2]), max(box[2::2]))
+    ),
+    min_size=1,
+    max_size=4,
+)
+Boxes = list[tuple[str, int, int, int, int]]
+
+
+def voc(boxes: Boxes) -> str:
+    sides = "<xmin>{}</xmin><ymin>{}</ymin><xmax>{}</xmax><ymax>{}</ymax>"
+    objects = "".join(
+        f"<object><name>{label}</name><bndbox>{sides.format(*corners)}</bndbox></object>"
+        for label, *corners in boxes
+    )
+    return f"<annotation>{objects}</annotation>"
+
+
+def labelme(boxes: Boxes) -> str:
+    shapes = [
+        {"label": label, "points": [[right, top], [left, bottom]], "shape_type": "rectangle"}
+        for label, left, top, right, bottom in boxes
+    ]
+    return json.dumps({"shapes": shapes, "imagePath": "a.jpg"})
+
+
+def via(boxes: Boxes) -> str:
+    regions = [
+        {
+            "shape_attributes": {
+                "name": "rect", "x": left, "y": top, "width": right - left, "height": bottom - top,
+            },
+            "region_attributes": {"own": label},
+        }
+        for label, left, top, right, bottom in boxes
+    ]  # fmt: skip
+    return json.dumps({"a.jpg-1": {"filename": "a.jpg", "size": -1, "regions": regions}})
+
+
+def supervisely(boxes: Boxes) -> str:
+    objects = [
+        {
+            "classTitle": label,
+            "geometryType": "polygon",
+            "points": {"exterior": [[left, top], [right, top], [left, bottom]], "interior": []},
+        }
+        for label, left, top, right, bottom in boxes
+    ]
+    return json.dumps({"size": {"width": 9999, "height": 9999}, "objects": objects})
+
+
+def roboflow(boxes: Boxes) -> str:
+    rows = [f"a.jpg,9999,9999,{','.join(map(str, box))}" for box in boxes]
+    return "\n".join(["filename,width,height,class,xmin,ymin,xmax,ymax", *rows])
+
+
+def kitti(boxes: Boxes) -> str:
+    return "".join(
+        f"{label} 0 0 0 {left} {top} {right} {bottom} 0 0 0 0 0 0 0\n"
+        for label, left, top, right, bottom in boxes
+    )
+
+
+def bdd100k(boxes: Boxes) -> str:
+    labels = [
+        {"category": label, "box2d": dict(zip(("x1", "y1", "x2", "y2"), corners, strict=True))}
+        for label, *corners in boxes
+    ]
+    return json.dumps([{"name": "a.jpg", "labels": labels}, {"name": "b.jpg"}][:1])
+
+
+def panoramax(boxes: Boxes) -> str:
+    annotations = [
+        {"shape": corners, "semantics": [{"key": "osm|object", "value": label}]}
+        for label, *corners in boxes
+    ]
+    return json.dumps({"id": "a", "properties": {"annotations": annotations}})
+
+
+WRITERS: list[tuple[Callable[[Boxes], str], str]] = [
+    (voc, ".xml"),
+    (labelme, ".json"),
+    (via, ".json"),
+    (supervisely, ".json"),
+    (roboflow, ".csv"),
+    (kitti, ".txt"),
+    (bdd100k, ".json"),
+    (panoramax, ".json"),
+]
+
+
+@pytest.mark.parametrize(("write", "suffix"), WRITERS)
+@given(boxes=BOXES)
+def test_boxes_are_read_as_written(
+    write: Callable[[Boxes], str], suffix: str, boxes: Boxes
+) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "a" + suffix)
+        file.write_text(write(boxes), encoding="utf-8")
+        (picture,), _ = read_pictures([file])
+    assert [(box.label.removeprefix("object="), *box.corners) for box in picture.boxes] == boxes
+    assert picture.names[-1] == "a"
+
+
+def test_panoramax_picture_has_camera_and_heading(tmp_path: Path) -> None:
+    shot = Shot(
+        camera="equirectangular",
+        fov=360.0,
+        heading=97.0,
+        heading_error=10.0,
+        north="true",
+        size=(800, 400),
+        position=(43.73, 7.42),
+        time="2026-05-01T10:00:00+00:00",
+    )
+    assert read_format("Panoramax", tmp_path).shot == shot
+
+
+@pytest.mark.parametrize(
+    ("shape", "corners"),
+    [
+        ({"name": "circle", "cx": 50, "cy": 60, "r": 10}, (40, 50, 60, 70)),
+        ({"name": "ellipse", "cx": 50, "cy": 60, "rx": 10, "ry": 5}, (40, 55, 60, 65)),
+    ],
+    ids=lambda value: value["name"] if isinstance(value, dict) else "",
+)
+def test_round_regions_of_via_have_boxes(
+    shape: dict[str, Any], corners: tuple[int, ...], tmp_path: Path
+) -> None:
+    image = {"filename": "a", "regions": [{"shape_attributes": shape, "region_attributes": {}}]}
+    (tmp_path / "a.json").write_text(json.dumps({"a1": image}))
+    ((box,),) = (picture.boxes for picture in read_pictures([tmp_path])[0])
+    assert (box.label, box.corners) == ("no label", corners)
+
+
+def test_old_files_without_size_or_type_of_shape_are_read(tmp_path: Path) -> None:
+    shape = {"label": "bench", "points": [[1, 2], [5, 2], [3, 9]]}
+    (tmp_path / "a.json").write_text(json.dumps({"shapes": [shape], "imagePath": None}))
+    (tmp_path / "b.xml").write_text(
+        VOC.replace("800</w", "0</w").replace("400</h", "0</h").replace("street.jpg", "")
+    )
+    old, no_size = read_pictures([tmp_path])[0]
+    assert (old.name, old.boxes[0].corners, old.shot.size) == ("a", (1, 2, 5, 9), None)
+    assert (no_size.name, no_size.shot.size) == ("b", None)
 
 
 def test_mapillary_image_has_camera_and_position(tmp_path: Path) -> None:
@@ -203,7 +571,7 @@ def test_mapillary_image_has_camera_and_position(tmp_path: Path) -> None:
         size=(800, 400),
         position=(43.73, 7.42),
     )
-    assert read_format("mapillary", tmp_path).shot == shot
+    assert read_format("Mapillary", tmp_path).shot == shot
 
 
 def test_mapillary_detections_are_grouped_by_image(tmp_path: Path) -> None:
@@ -251,7 +619,7 @@ def annotation(**values: object) -> str:
     ("name", "text", "words"),
     [
         ("a.json", "{", "a.json is not JSON"),
-        ("a.json", "{}", "contains no detections in a known format; give JSON (COCO"),
+        ("a.json", "{}", "contains no detections in a known format; give BDD100K, COCO, CVAT"),
         ("a.json", "[1]", "contains no detections"),
         ("a.json", json.dumps(COCO["annotations"]), "without images and categories"),
         ("a.json", annotation(bbox=[1, 2, 3]), "does not follow its format"),
@@ -278,7 +646,29 @@ def annotation(**values: object) -> str:
         ("a.txt", "0 400 200 10 10\n", "is not in shares of the picture"),
         ("a.txt", "9 0.5 0.5 0.1 0.1\n", "is of class 9, which has no name"),
         ("a.xml", "<a", "not XML that can be read"),
-        ("a.xml", "<a/>", "is not a CVAT file"),
+        ("a.xml", "<a/>", "contains no detections in a known format"),
+        ("a.xml", VOC.replace("<xmin>80</xmin>", ""), "object 1 has a box or a score that is not"),
+        ("a.xml", VOC.replace(">80<", ">900<"), "object 1 has the box (900.0, 100.0, 240.0"),
+        ("a.xml", VOC.replace(">800<", ">wide<"), "does not follow its format, Pascal VOC"),
+        ("a.json", json.dumps({**LABELME, "shapes": [{"label": "x"}]}),
+         "does not follow its format, LabelMe (it lacks 'points')"),
+        ("a.json", json.dumps({**LABELME, "shapes": [{"label": "x", "points": []}]}),
+         "does not follow its format, LabelMe"),
+        ("a.json", json.dumps({"a": {"filename": "a", "regions": [{}]}}),
+         "does not follow its format, VIA (it lacks 'shape_attributes')"),
+        ("a.json", json.dumps({**SUPERVISELY, "size": {"width": 9}}), "lacks 'height'"),
+        ("a.json", json.dumps(SUPERVISELY).replace('"eJ', '"AA'), "a bitmap is not a PNG"),
+        ("a.json", json.dumps([{"name": "a", "labels": [{"box2d": {"x1": 1}}]}]), "lacks 'y1'"),
+        ("a.json", json.dumps({**ITEM, "id": 3}).replace("0.75", "sure"),
+         "picture 3, annotation 2 has a box or a score that is not a number"),
+        ("a.json", json.dumps({"properties": ITEM["properties"]}), "Panoramax (it lacks 'id')"),
+        ("a.csv", "filename,class\na,b\n", "contains no detections in a known format"),
+        ("a.csv", ROBOFLOW + "street.jpg,800,400,bench,80,,240,200\n", "line 4 has a box"),
+        ("a.csv", ROBOFLOW + "street.jpg\n", "line 4 has a box"),
+        ("a.txt", KITTI + "bench 0 0\n", "line 4 has 3 values; a line of KITTI has 15"),
+        ("a.txt", KITTI.replace("bench 0.00", "bench x"), "does not follow its format, KITTI"),
+        ("a.txt", KITTI.replace("0.75", "75"), "line 2 has the score 75"),
+        ("a.txt", "Some words.\n", "contains no detections in a known format"),
         ("a.xml", "<!DOCTYPE a><a/>", "its own document type"),
         ("a.xml", "<annotations><track/></annotations>", "contains tracks of a video"),
         ("a.xml", CVAT.replace(' name="street.jpg"', ""), "lacks 'name'"),

@@ -18,7 +18,7 @@ ALL = LabelMap.open([], built_in_taxonomy())
 
 
 def test_built_in_maps() -> None:
-    assert label_maps() == ("cityscapes", "coco", "mapillary_vistas")
+    assert label_maps() == ("cityscapes", "coco", "mapillary_vistas", "panoramax")
     with refused(UnknownNameError, "'cocoa'", "the nearest is 'coco'"):
         LabelMap.open(["cocoa"], paper_taxonomy())
 
@@ -48,6 +48,12 @@ def test_classes_of_labels(label: str, classes: list[str]) -> None:
     meaning = ALL.find(label)
     assert meaning is not None
     assert [name for name, _ in meaning.classes] == classes
+
+
+def test_sign_of_panoramax_is_plate() -> None:
+    meaning = Meaning((("indicator", 1.0),), height=(0.7, 0.2))
+    assert ALL.find("traffic_sign=FR:B14") == meaning
+    assert ALL.find("highway=street_lamp") == Meaning((("street_light", 1.0),))
 
 
 def test_unknown_labels_have_no_meaning() -> None:

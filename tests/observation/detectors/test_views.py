@@ -109,6 +109,7 @@ def test_ignored_boxes_are_counted() -> None:
         "unknown_heading": 0,
         "headings_from_north": {},
         "left_out": {
+            "pictures": {},
             "below_min_score": 1,
             "no_boxes": 2,
             "no_street_objects": {"person": 1},
@@ -186,6 +187,58 @@ def test_size_of_all_is_used_only_for_unknown_sizes(tmp_path: Path) -> None:
         assert column(view, "bearings").tolist() == [0.0]
     without_boxes = single_view(builder, replace(bare, boxes=()))
     assert (len(without_boxes), without_boxes.photos[0].width) == (0, 90)
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("P1.JPG", "p1.jpg"),
+        ("p1.jpg", "P1.JPG"),
+        ("images/p1.JPG", "p1.jpg"),
+        ("C:\\photos\\p1.jpg", "p1.jpg"),
+        ("photos\\p1.jpg", "photos/p1.jpg"),
+        ("p1.jpg", "p1.png"),
+        ("p1", "p1.JPG"),
+        ("p1_jpg.rf.0a1b2c3d4e5f.jpg", "p1.jpg"),
+        ("p1_JPG.rf.0a1b2c3d4e5f", "p1.JPG"),
+    ],
+)
+def test_file_of_picture_is_found(name: str, file: str, tmp_path: Path) -> None:
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    Image.new("L", (1000, 800)).save(tmp_path / file)
+    bare = AnnotatedPicture(name=name, boxes=(box(),))
+    view = single_view(replace(BUILDER, folders=[tmp_path]), bare)
+    assert column(view, "bearings").tolist() == [350.0]
+
+
+def test_copy_of_roboflow_has_priority_over_its_original(tmp_path: Path) -> None:
+    Image.new("L", (1000, 800)).save(tmp_path / "p1_jpg.rf.0a1b.jpg")
+    Image.new("L", (80, 80)).save(tmp_path / "p1.jpg")
+    bare = AnnotatedPicture(name="p1_jpg.rf.0a1b.jpg", boxes=(box(),), folder=tmp_path)
+    view = single_view(replace(BUILDER, folders=None), bare)
+    assert column(view, "bearings").tolist() == [350.0]
+
+
+def test_boxes_of_picture_of_another_shape_are_refused(tmp_path: Path) -> None:
+    Image.new("L", (800, 1000)).save(tmp_path / "a.jpg")
+    Image.new("L", (250, 201)).save(tmp_path / "b.jpg")  # a smaller copy, rounded
+    builder = replace(BUILDER, folders=[tmp_path])
+    with refused(InputError, "in a picture of 1000 x 800 pixels", "is 800 x 1000 as it is shown"):
+        builder.views([picture(box())])
+    assert len(single_view(builder, picture(box(), name="b.jpg"))) == 1
+
+
+def test_pictures_that_cannot_be_used_are_left_out(tmp_path: Path) -> None:
+    Image.new("L", (1000, 800)).save(tmp_path / "a.jpg")
+    (tmp_path / "c.jpg").write_bytes(b"no picture")
+    bare = [AnnotatedPicture(name=f"{name}.jpg", boxes=(box(),)) for name in "abc"]
+    views, tally = replace(BUILDER, folders=[tmp_path]).views(bare)
+    assert [name for name, _ in views] == ["a.jpg"]
+    assert (tally.photos, tally.objects, list(tally.unusable)) == (1, 1, ["b.jpg", "c.jpg"])
+    assert f"(b.jpg is not in {tmp_path})" in tally.unusable["b.jpg"]
+    assert "it is not a picture" in tally.unusable["c.jpg"]
+    with refused(InputError, "the size of the picture b.jpg is not known"):
+        replace(BUILDER, folders=[tmp_path]).views(bare[1:2])
 
 
 def test_unknown_field_of_view_and_table_of_other_pictures_are_refused() -> None:

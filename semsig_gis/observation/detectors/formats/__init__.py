@@ -69,12 +69,12 @@ def read_pictures(
     unknown: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
-            found = [read_document(file, given=False) for file in _files_in(path)]
-            known = [document for document in found if _format(document)]
-            if not known:
+            inside = [read_document(file) for file in _files_in(path)]
+            labels = [document for document in inside if _format(document)]
+            if not labels:
                 raise InputError(f"the folder {path} contains no file of detections; {ACCEPTED}.")
-            documents += known
-            unknown += [document.file for document in found if not _format(document)]
+            documents += labels
+            unknown += [document.file for document in inside if not _format(document)]
         elif _has_class_names(path):
             documents.append(Document(file=path, content=None))
         elif path.suffix.lower() in PARSERS:

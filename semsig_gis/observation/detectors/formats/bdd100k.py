@@ -40,7 +40,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
 
 
 def _frames(content: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - any JSON
-    """Return the frames of a list, or of a file whose name they share; none for other JSON."""
+    """Return the frames of a list, or of a file with one name for all; none for other JSON."""
     shared = {}
     if isinstance(content, dict):
         shared = {"name": content["name"]} if "name" in content else {}

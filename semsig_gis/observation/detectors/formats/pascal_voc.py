@@ -37,7 +37,7 @@ def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture
         where = f"{document.file}, object {number}"
         boxes.append(box_of(label, corners, where, score=score, whole=not hidden))
     # Files that were written without the picture have the size 0.
-    width, height = (float(root.findtext(f"size/{side}") or 0) for side in ("width", "height"))
+    width, height = root.findtext("size/width"), root.findtext("size/height")
     return [
         AnnotatedPicture(
             name=(root.findtext("filename") or "").strip() or document.file.stem,

@@ -33,7 +33,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
 
 
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
-    """Return the picture, whose name is in the name of the file; points and lines are counted."""
+    """Return the picture, named by the file; points and lines are counted."""
     content = document.content
     boxes, others = [], 0
     for number, item in enumerate(content["objects"], start=1):

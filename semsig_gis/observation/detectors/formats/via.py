@@ -29,7 +29,7 @@ def matches(content: Any) -> bool:  # noqa: ANN401 - any JSON
 
 
 def pictures(document: Document, _: Sequence[Document]) -> list[AnnotatedPicture]:
-    """Return the pictures, whose sizes VIA does not write; points and lines are counted."""
+    """Return the pictures, without sizes; points and lines are counted."""
     images = document.content.get(PROJECT, document.content)
     return [_picture(image, str(document.file)) for image in images.values()]
 
@@ -54,7 +54,7 @@ def _label(attributes: dict[str, Any]) -> str:
     usual = {name.strip().casefold(): value for name, value in attributes.items()}
     for value in (*(usual.get(name) for name in LABELS), *attributes.values()):
         if isinstance(value, dict):  # of a checkbox: the chosen options
-            value = next((option for option, chosen in value.items() if chosen), None)  # noqa: PLW2901
+            value = next((option for option, choice in value.items() if choice), None)  # noqa: PLW2901
         if value not in {None, ""}:
             return str(value).strip()
     return "no label"

@@ -90,9 +90,9 @@ def _corners(texts: Sequence[str], where: str) -> tuple[Corners, str | None]:
 
 def _names(file: Path, documents: Sequence[Document]) -> dict[int, str]:
     """Return the names of classes by number, from a file that was given or is near the labels."""
-    given = (document.file for document in documents if document.content is None)
+    own = (document.file for document in documents if document.content is None)
     near = (folder / name for folder in file.absolute().parents[:LEVELS] for name in NAME_FILES)
-    source = next(given, None) or next((path for path in near if path.is_file()), None)
+    source = next(own, None) or next((path for path in near if path.is_file()), None)
     if source is None:
         raise InputError(
             f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
