@@ -255,7 +255,7 @@ class ViewBuilder:
         if fov is None:
             raise InputError(
                 f"the field of view of the picture {picture.name} is not known; give --fov in "
-                "degrees, or with --images the folder of the pictures, whose EXIF may contain it"
+                "degrees, or with --images the folder of the pictures with their EXIF"
                 f"{self._searched(picture)}."
             )
         return Camera(
