@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sentences import refused
+from sentences import assert_sentence, refused
 
 from semsig_gis.core import InputError
 from semsig_gis.observation import FORMATS, Shot, read_pictures
@@ -517,6 +517,41 @@ def test_boxes_are_read_as_written(
         (picture,), _ = read_pictures([file])
     assert [(box.label.removeprefix("object="), *box.corners) for box in picture.boxes] == boxes
     assert picture.names[-1] == "a"
+
+
+def places(value: Any) -> list[tuple[Any, Any]]:  # noqa: ANN401 - any JSON
+    """Return the lists and objects in a JSON value with each of their keys."""
+    if not isinstance(value, (list, dict)):
+        return []
+    pairs = list(value.items() if isinstance(value, dict) else enumerate(value))
+    inner = [place for _, part in pairs for place in places(part)]
+    return [(value, key) for key, _ in pairs] + inner
+
+
+JSON_FORMS = [
+    form
+    for form, files in SAMPLES.items()
+    if len(files) == 1 and next(iter(files)).endswith(".json")
+]
+ANY_VALUE: st.SearchStrategy[Any] = st.sampled_from(
+    [None, True, 0, -1, 1.5, 1e999, 10**400, "", "x", "1", [], {}, [None], [[]], [1], {"x": 1}]
+)
+
+
+@pytest.mark.parametrize("form", JSON_FORMS)
+@given(data=st.data())
+def test_damaged_json_is_read_or_refused(form: str, data: st.DataObject) -> None:
+    ((name, text),) = SAMPLES[form].items()
+    content = json.loads(text)
+    parent, key = data.draw(st.sampled_from(places(content)))
+    parent[key] = data.draw(ANY_VALUE)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, name)
+        file.write_text(json.dumps(content), encoding="utf-8")
+        try:
+            read_pictures([file])
+        except InputError as error:
+            assert_sentence(error, name)
 
 
 def test_panoramax_picture_has_camera_and_heading(tmp_path: Path) -> None:
