@@ -25,6 +25,9 @@ NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
 NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
 """Files with class names of YOLO, in the folder of the labels or in its parent folder."""
 
+NAME_KEYS = ("names", "id2label", "categories")
+"""Where YOLO, Transformers and COCO have the names of classes."""
+
 YOLO_BOX_VALUES = 5  # class and box; lines with more values have a score or a polygon
 PERCENT = 100.0
 ACCEPTED = (
@@ -217,17 +220,38 @@ def _yolo_names(file: Path, names: Path | None) -> dict[int, str]:
         raise InputError(
             f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
         )
+    return read_class_names(source)
+
+
+def read_class_names(source: Path) -> dict[int, str]:
+    """Read the names of classes by number: a name in each line, YAML or JSON."""
     text = _text(source)
-    if source.suffix.lower() not in {".yaml", ".yml"}:
-        return dict(enumerate(text.split("\n")))
+    suffix = source.suffix.lower()
+    if suffix not in {".yaml", ".yml", ".json"}:
+        return dict(enumerate(text.rstrip().split("\n")))
     try:
-        classes = yaml.safe_load(text)["names"]
-        pairs = classes.items() if isinstance(classes, dict) else enumerate(classes)
-        return {int(number): str(name) for number, name in pairs}
+        return numbered_names(parse_json(text) if suffix == ".json" else yaml.safe_load(text))
     except (yaml.YAMLError, RecursionError, *INVALID) as error:
         raise InputError(
             f"{source} has no list of class names; give a YAML file with 'names'."
         ) from error
+
+
+def numbered_names(content: Any) -> dict[int, str]:  # noqa: ANN401 - any YAML or JSON
+    """Return the names of classes by number from a list or a table; raise one of `INVALID`."""
+    if isinstance(content, dict):
+        content = next((content[key] for key in NAME_KEYS if key in content), content)
+    if isinstance(content, dict):
+        pairs = content.items()
+    else:
+        pairs = (
+            (item["id"], item["name"]) if isinstance(item, dict) else (number, item)
+            for number, item in enumerate(content)
+        )
+    names = {int(number): str(name) for number, name in pairs}
+    if min(names) < 0:  # ValueError if there are no names
+        raise ValueError("a number is negative")
+    return names
 
 
 def _label_studio(task: dict[str, Any], source: str) -> AnnotatedPicture:
