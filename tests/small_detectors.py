@@ -145,9 +145,7 @@ LAYOUTS = {
 }
 
 
-def save_detector(
-    path: Path, layout: Layout, *, metadata: Mapping[str, str] | None = None
-) -> Path:
+def save_detector(path: Path, layout: Layout, *, metadata: Mapping[str, str] | None = None) -> Path:
     """Write a detector; skip the test without onnx."""
     onnx = pytest.importorskip("onnx")
     parser, numpy_helper = pytest.importorskip("onnx.parser"), onnx.numpy_helper
@@ -233,5 +231,7 @@ def save_photograph(path: Path, exif: Image.Exif | None = None, *, turned: int =
     image = Image.new("RGB", SIZE, (60, 60, 60))
     for colour, (left, top, right, bottom) in CORNERS.items():
         ImageDraw.Draw(image).rectangle((left, top, right - 1, bottom - 1), fill=colour)
-    image.rotate(turned, expand=True).save(path, quality=95, subsampling=0, exif=exif or Image.Exif())
+    image.rotate(turned, expand=True).save(
+        path, quality=95, subsampling=0, exif=exif or Image.Exif()
+    )
     return path

@@ -292,5 +292,6 @@ def _readable(what: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:  # its errors have no other base class
-        reason = one_line(str(error)).rpartition(" : ")[2].rstrip(".").replace(". ", "; ")
+        reason = one_line(str(error)).rpartition(" : ")[2].rpartition("failed:")[2]
+        reason = reason.rstrip(".").replace(". ", "; ")
         raise InputError(f"{what} ({reason}); {EXPORT}.") from error
