@@ -92,6 +92,10 @@ LAYOUTS = {
         outputs="float[1, N, 84] output0",
         lines="output0 = Concat <axis = 2> (shares, by_class)",
     ),
+    "rt_detr_of_ultralytics_8_4": Layout(
+        outputs="float[1, N, 6] output0",
+        lines="output0 = Concat <axis = 2> (shares, scores, numbers)",
+    ),
     "rt_detr_of_transformers": Layout(
         outputs="float[1, N, 80] logits, float[1, N, 4] pred_boxes",
         lines=f"{LOGITS} logits = Identity (values) pred_boxes = Identity (shares)",
@@ -231,7 +235,5 @@ def save_photograph(path: Path, exif: Image.Exif | None = None, *, turned: int =
     image = Image.new("RGB", SIZE, (60, 60, 60))
     for colour, (left, top, right, bottom) in CORNERS.items():
         ImageDraw.Draw(image).rectangle((left, top, right - 1, bottom - 1), fill=colour)
-    image.rotate(turned, expand=True).save(
-        path, quality=95, subsampling=0, exif=exif or Image.Exif()
-    )
+    image.rotate(turned, expand=True).save(path, quality=95, subsampling=0, exif=exif)
     return path

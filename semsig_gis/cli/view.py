@@ -147,15 +147,13 @@ def view(
     maps = labels or []
     names = None
     if detector is not None:
-        if images is not None:
-            raise InputError("--images is for files of boxes; leave it out with --detector.")
         name_files = [label for label in maps if Path(label).suffix.lower() in NAME_SUFFIXES]
         if len(name_files) > 1:
             raise InputError(
                 f"--labels gives names of classes in {' and '.join(name_files)}; give one file."
             )
         maps = [label for label in maps if label not in name_files]
-        names = next((*name_files, *("coco" for label in maps if label == "coco")), None)
+        names = next(iter(name_files), "coco" if "coco" in maps else None)
     taxonomy = _taxonomy(database)
     shot = Shot(
         camera=camera,

@@ -82,9 +82,11 @@ def _one_output(
     rows: NDArray[np.float64], choices: Sequence[ClassNames], size: tuple[int, int]
 ) -> Found | None:
     """Return the boxes of YOLO, and of the RT-DETR of Ultralytics."""
-    # Corners, score and number of the class.
+    # Box, score and number of the class: corners of YOLO, centres and sizes of RT-DETR as shares.
     if rows.shape[1] == 6 and not (rows[:, 5] % 1).any():  # noqa: PLR2004
-        return Found(rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64), choices[0])
+        shares = bool((np.abs(rows[:, :4]) <= MOST_SHARE).all())
+        corners = _corners(rows[:, :4] * (*size, *size)) if shares else rows[:, :4]
+        return Found(corners, rows[:, 4], rows[:, 5].astype(np.int64), choices[0])
     for names in choices:
         classes = max(names) + 1
         if rows.shape[0] == 4 + classes:  # v8 and newer: a column for each box
@@ -160,9 +162,14 @@ def _scored(
     overlapping: bool = False,
 ) -> Found:
     """Return boxes, given by centre and size, with the best of the scores of all classes."""
+    best = scores.max(axis=1), scores.argmax(axis=1)
+    return Found(_corners(boxes), *best, names, overlapping)
+
+
+def _corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the corners of boxes with centres and sizes."""
     half = boxes[:, 2:] / 2
-    corners = np.hstack([boxes[:, :2] - half, boxes[:, :2] + half])
-    return Found(corners, scores.max(axis=1), scores.argmax(axis=1), names, overlapping)
+    return np.hstack([boxes[:, :2] - half, boxes[:, :2] + half])
 
 
 def suppress_overlaps(
