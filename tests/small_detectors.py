@@ -126,7 +126,7 @@ LAYOUTS = {
         """,
         numbers=(15, 1, 11),
         count=91,
-        **NORMALIZED,  # type: ignore[arg-type]
+        **NORMALIZED,
     ),
     "rf_detr": Layout(
         outputs="float[1, N, 4] dets, float[1, N, 91] labels",

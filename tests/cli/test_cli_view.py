@@ -147,7 +147,7 @@ def photos(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         exif = Image.Exif()
         exif.get_ifd(IFD.Exif)[Base.FocalLengthIn35mmFilm] = 26
         if heading is not None:
-            gps = {GPS.GPSImgDirectionRef: "T", GPS.GPSImgDirection: heading}
+            gps: dict[int, object] = {GPS.GPSImgDirectionRef: "T", GPS.GPSImgDirection: heading}
             exif.get_ifd(IFD.GPSInfo).update(gps)
         (tmp_path / "photos" / folder).mkdir(parents=True)
         save_photograph(tmp_path / "photos" / folder / "a.jpg", exif)
@@ -173,6 +173,7 @@ def test_detector_finds_the_objects_of_photographs(labels: str, run: Run, tmp_pa
     for view in views:
         assert isinstance(view, View)
         assert view.codes is not None
+        assert view.bearings is not None
         bench = TAXONOMY.decode(view.codes).index("L")
         bearings.append(float(view.bearings[bench]))
     # The bench is 180 pixels left of the middle; the focal length is 26 mm of 43.27 mm.

@@ -241,13 +241,14 @@ def numbered_names(content: Any) -> dict[int, str]:  # noqa: ANN401 - any YAML o
     """Return the names of classes by number from a list or a table; raise one of `INVALID`."""
     if isinstance(content, dict):
         content = next((content[key] for key in NAME_KEYS if key in content), content)
-    if isinstance(content, dict):
-        pairs = content.items()
-    else:
-        pairs = (
+    pairs: Iterable[tuple[Any, Any]] = (
+        content.items()
+        if isinstance(content, dict)
+        else (
             (item["id"], item["name"]) if isinstance(item, dict) else (number, item)
             for number, item in enumerate(content)
         )
+    )
     names = {int(number): str(name) for number, name in pairs}
     if min(names) < 0:  # ValueError if there are no names
         raise ValueError("a number is negative")

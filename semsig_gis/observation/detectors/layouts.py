@@ -42,7 +42,7 @@ MOST_OVERLAP = 0.5
 """Of two boxes of a class with a larger intersection over union, one is left out."""
 
 
-class Found(NamedTuple):
+class Detections(NamedTuple):
     """Corners in pixels of the input (n, 4), scores (n,) and class numbers (n,) with their names.
 
     With `overlapping`, an object may have several boxes.
@@ -59,34 +59,35 @@ def read_outputs(
     outputs: Mapping[str, NDArray[np.generic]],
     choices: Sequence[ClassNames],
     size: tuple[int, int],
-) -> Found | None:
+) -> Detections | None:
     """Return the boxes in the outputs of a detector for one picture; None if the layout is unknown.
 
     `choices` are the possible names of its classes; the number of scores decides. `size` is width
     and height of its input in pixels.
     """
-    arrays = [
-        array.astype(np.int64 if np.issubdtype(array.dtype, np.integer) else np.float64)
-        for array in outputs.values()
-    ]
-    if len(arrays) == 1 and arrays[0].ndim == 3:  # noqa: PLR2004 - picture, row, column
-        return _one_output(arrays[0][0], choices, size)
-    if len(arrays) == 2:  # noqa: PLR2004 - boxes and scores
-        return _boxes_and_scores(dict(zip(outputs, arrays, strict=True)), choices, size)
-    if len(arrays) == 3:  # noqa: PLR2004 - boxes, labels and scores
-        return _boxes_labels_and_scores(arrays, choices)
+    floats = {name: array.astype(np.float64) for name, array in outputs.items()}
+    if len(floats) == 2:  # noqa: PLR2004 - boxes and scores
+        return _boxes_and_scores(floats, choices, size)
+    first, *others = floats.values()
+    if not others and first.ndim == 3:  # noqa: PLR2004 - picture, row, column
+        return _one_output(first[0], choices, size)
+    whole = [name for name, array in outputs.items() if np.issubdtype(array.dtype, np.integer)]
+    if len(others) == 2 and len(whole) == 1:  # noqa: PLR2004 - boxes, labels and scores
+        labels = floats.pop(whole[0]).astype(np.int64)
+        scores, boxes = sorted(floats.values(), key=lambda array: array.ndim)
+        return _boxes_labels_and_scores(boxes, labels, scores, choices)
     return None
 
 
 def _one_output(
     rows: NDArray[np.float64], choices: Sequence[ClassNames], size: tuple[int, int]
-) -> Found | None:
+) -> Detections | None:
     """Return the boxes of YOLO, and of the RT-DETR of Ultralytics."""
     # Box, score and number of the class: corners of YOLO, centres and sizes of RT-DETR as shares.
     if rows.shape[1] == 6 and not (rows[:, 5] % 1).any():  # noqa: PLR2004
         shares = bool((np.abs(rows[:, :4]) <= MOST_SHARE).all())
         corners = _corners(rows[:, :4] * (*size, *size)) if shares else rows[:, :4]
-        return Found(corners, rows[:, 4], rows[:, 5].astype(np.int64), choices[0])
+        return Detections(corners, rows[:, 4], rows[:, 5].astype(np.int64), choices[0])
     for names in choices:
         classes = max(names) + 1
         if rows.shape[0] == 4 + classes:  # v8 and newer: a column for each box
@@ -104,7 +105,7 @@ def _boxes_and_scores(
     outputs: Mapping[str, NDArray[np.float64]],
     choices: Sequence[ClassNames],
     size: tuple[int, int],
-) -> Found | None:
+) -> Detections | None:
     """Return the boxes of DETR and its successors, in shares of the picture."""
     boxes, scores = (
         array[0] if array.ndim == 3 else array  # noqa: PLR2004 - picture, box, value
@@ -130,28 +131,23 @@ def _boxes_and_scores(
 
 
 def _boxes_labels_and_scores(
-    arrays: Sequence[NDArray[np.float64] | NDArray[np.int64]], choices: Sequence[ClassNames]
-) -> Found | None:
+    corners: NDArray[np.float64],
+    labels: NDArray[np.int64],
+    scores: NDArray[np.float64],
+    choices: Sequence[ClassNames],
+) -> Detections | None:
     """Return the boxes of torchvision, or of RT-DETR with the size of the picture as an input."""
-    whole = [array for array in arrays if np.issubdtype(array.dtype, np.integer)]
-    others = sorted(
-        (array for array in arrays if not np.issubdtype(array.dtype, np.integer)),
-        key=lambda array: -array.ndim,
-    )
-    if len(whole) != 1:
-        return None
-    (labels,), (corners, scores) = whole, others
     if corners.shape != (*labels.shape, 4) or scores.shape != labels.shape or labels.ndim > 2:  # noqa: PLR2004
         return None
     if labels.ndim == 2:  # noqa: PLR2004 - picture, box
-        return Found(corners[0], scores[0], labels[0], choices[0])
+        return Detections(corners[0], scores[0], labels[0], choices[0])
     names = choices[-1]
     if names.get(0, "background").strip("_ ").lower() not in BACKGROUND:
         raise InputError(
             "detectors of torchvision count classes from 1; give 'background' as the first of the "
             "names, or a YAML file with the number of each name."
         )
-    return Found(corners, scores, labels, names)
+    return Detections(corners, scores, labels, names)
 
 
 def _scored(
@@ -160,10 +156,10 @@ def _scored(
     names: ClassNames,
     *,
     overlapping: bool = False,
-) -> Found:
+) -> Detections:
     """Return boxes, given by centre and size, with the best of the scores of all classes."""
     best = scores.max(axis=1), scores.argmax(axis=1)
-    return Found(_corners(boxes), *best, names, overlapping)
+    return Detections(_corners(boxes), *best, names, overlapping)
 
 
 def _corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -178,13 +174,13 @@ def suppress_overlaps(
     """Return the rows of boxes that overlap no better box of their class, best first."""
     areas = np.prod(corners[:, 2:] - corners[:, :2], axis=1)
     order = np.argsort(-scores, kind="stable")
-    kept: list[int] = []
+    rows: list[int] = []
     while len(order):
         best, order = order[0], order[1:]
-        kept.append(int(best))
+        rows.append(int(best))
         low = np.maximum(corners[best, :2], corners[order, :2])
         high = np.minimum(corners[best, 2:], corners[order, 2:])
         shared = np.prod(np.clip(high - low, 0.0, None), axis=1)
         overlap = shared > MOST_OVERLAP * (areas[best] + areas[order] - shared)
         order = order[~overlap | (numbers[order] != numbers[best])]
-    return kept
+    return rows

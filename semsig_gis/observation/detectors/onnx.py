@@ -156,12 +156,8 @@ class Detector:
         """Return the boxes in an upright picture of this name, in pixels, without overlaps."""
         image, *others = sorted(self.session.get_inputs(), key=_is_no_picture)
         longer = max(picture.size)
-        height, width = (
-            known
-            if isinstance(known, int)
-            else STRIDE * -(-length * self.side // (longer * STRIDE))
-            for known, length in zip(image.shape[-2:], picture.size[::-1], strict=True)
-        )
+        sides = [STRIDE * -(-side * self.side // (longer * STRIDE)) for side in picture.size[::-1]]
+        height, width = _fixed_shape(image.shape[-2:], sides)
         pixels, scale, shift = letterbox(picture, (width, height))
         values = ((pixels / 255.0 - self.mean) / self.deviation).astype(KINDS[image.type])
         values = values.transpose(2, 0, 1)
@@ -170,8 +166,7 @@ class Detector:
             if item.name == SIZE_INPUT:
                 feed[item.name] = np.array([[width, height]])
             else:
-                sides = zip(item.shape, (1, height, width), strict=True)
-                shape = [known if isinstance(known, int) else side for known, side in sides]
+                shape = _fixed_shape(item.shape, (1, height, width))
                 feed[item.name] = np.ones(shape, dtype=np.int64)
         with _readable(f"{self.model} cannot be run on {name}"):
             arrays = self.session.run(None, feed)
@@ -179,8 +174,8 @@ class Detector:
             item.name: np.asarray(array)
             for item, array in zip(self.session.get_outputs(), arrays, strict=True)
         }
-        found = read_outputs(outputs, self.choices, (width, height))
-        if found is None:
+        detections = read_outputs(outputs, self.choices, (width, height))
+        if detections is None:
             shapes = ", ".join(f"{key} {list(array.shape)}" for key, array in outputs.items())
             classes = " or ".join(str(max(choice) + 1) for choice in self.choices)
             raise InputError(
@@ -188,21 +183,28 @@ class Detector:
                 "classes; export it as YOLO, RT-DETR, DETR or torchvision do, and give the names "
                 "of its classes with --labels."
             )
-        rows = np.flatnonzero(found.scores >= min_score)
-        if found.overlapping:
-            rows = rows[suppress_overlaps(*(part[rows] for part in found[:3]))]
-        last = max(found.names)
-        corners = (found.corners[rows].reshape(-1, 2, 2) - shift) / scale
+        rows = np.flatnonzero(detections.scores >= min_score)
+        if detections.overlapping:
+            rows = rows[
+                suppress_overlaps(
+                    detections.corners[rows], detections.scores[rows], detections.numbers[rows]
+                )
+            ]
+        last = max(detections.names)
+        corners = (detections.corners[rows].reshape(-1, 2, 2) - shift) / scale
         boxes = []
         for number, corner, score in zip(
-            found.numbers[rows].tolist(), corners.reshape(-1, 4), found.scores[rows], strict=True
+            detections.numbers[rows].tolist(),
+            corners.reshape(-1, 4),
+            detections.scores[rows],
+            strict=True,
         ):
             if not 0 <= number <= last:
                 raise InputError(
                     f"{self.model} found the class {number} on {name}, but the names end with "
                     f"{last}; give the names of all its classes with --labels."
                 )
-            label = found.names.get(number, f"class {number}")
+            label = detections.names.get(number, f"class {number}")
             boxes.append(box_of(label, corner, f"{self.model}, run on {name},", score=score))
         return tuple(boxes)
 
@@ -219,8 +221,15 @@ def letterbox(
     inner = [max(round(side * ratio), 1) for side in picture.size]
     left, top = ((wide - side) // 2 for wide, side in zip(size, inner, strict=True))
     pixels = np.full((size[1], size[0], 3), GREY, dtype=np.uint8)
-    pixels[top : top + inner[1], left : left + inner[0]] = picture.resize((inner[0], inner[1]))
+    resized = np.asarray(picture.resize((inner[0], inner[1])))
+    pixels[top : top + inner[1], left : left + inner[0]] = resized
     return pixels, np.array(inner) / picture.size, np.array([left, top], dtype=float)
+
+
+def _fixed_shape(shape: Sequence[Any], sides: Iterable[int]) -> list[int]:
+    """Return a shape with these sides where its own are variable."""
+    pairs = zip(shape, sides, strict=True)
+    return [own if isinstance(own, int) else side for own, side in pairs]
 
 
 def _is_no_picture(item: Any) -> bool:  # noqa: ANN401 - onnxruntime has no types
@@ -232,17 +241,15 @@ def _check_inputs(model: Path, session: Any) -> None:  # noqa: ANN401 - onnxrunt
     inputs = session.get_inputs()
     image, *others = sorted(inputs, key=_is_no_picture)
     shape = [1, *image.shape] if len(image.shape) == PICTURES - 1 else image.shape
-    fits = len(shape) == PICTURES and all(
-        known == side for known, side in zip(shape, (1, 3), strict=False) if isinstance(known, int)
-    )
     if (
-        not fits
+        len(shape) != PICTURES
+        or _fixed_shape(shape[:2], (1, 3)) != [1, 3]
         or _is_no_picture(image)
         or any((item.name, len(item.shape)) not in OTHER_INPUTS for item in others)
     ):
-        given = ", ".join(f"{item.name} {item.type} {item.shape}" for item in inputs)
+        types = ", ".join(f"{item.name} {item.type} {item.shape}" for item in inputs)
         raise InputError(
-            f"{model} has the inputs {given}; give a detector of one RGB picture of floating-point "
+            f"{model} has the inputs {types}; give a detector of one RGB picture of floating-point "
             "numbers, [1, 3, height, width] or [3, height, width]."
         )
 
@@ -251,23 +258,23 @@ def _class_names(
     model: Path, metadata: Mapping[str, str], names: str | Path | None
 ) -> Sequence[ClassNames]:
     """Return the names of the classes that a detector may have."""
-    own = None
+    model_names = None
     with contextlib.suppress(SyntaxError, MemoryError, RecursionError, *INVALID):
-        own = numbered_names(ast.literal_eval(metadata["names"]))
+        model_names = numbered_names(ast.literal_eval(metadata["names"]))
     if names is None:
-        if own is None:
+        if model_names is None:
             raise InputError(
                 f"{model} does not contain the names of its classes; give --labels coco, or a "
                 "file of names."
             )
-        return (own,)
+        return (model_names,)
     if names != "coco" and not Path(names).is_file():
         raise InputError(f"{names} is not a file; give 'coco' or a file of class names.")
     choices = COCO_NAMES if names == "coco" else (read_class_names(Path(names)),)
-    if own is not None and all(max(own) != max(choice) for choice in choices):
+    if model_names is not None and all(max(model_names) != max(choice) for choice in choices):
         raise InputError(
-            f"{model} has {len(own)} classes, and {names} has {len(choices[0])}; give the names "
-            "of its classes, or leave them out to use its own."
+            f"{model} has {len(model_names)} classes, and {names} has {len(choices[0])}; give the "
+            "names of its classes, or leave them out to use its own."
         )
     return choices
 

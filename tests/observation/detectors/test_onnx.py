@@ -91,20 +91,20 @@ BOX = st.tuples(*[st.integers(0, 8)] * 2, *[st.integers(0, 6)] * 2)
 
 @given(st.lists(st.tuples(BOX, st.integers(0, 100), st.integers(0, 1)), max_size=12))
 def test_overlapping_boxes_of_a_class_are_suppressed(
-    found: list[tuple[tuple[int, int, int, int], int, int]],
+    boxes: list[tuple[tuple[int, int, int, int], int, int]],
 ) -> None:
-    corners = np.array([(x, y, x + w, y + h) for (x, y, w, h), _, _ in found], dtype=float)
+    corners = np.array([(x, y, x + w, y + h) for (x, y, w, h), _, _ in boxes], dtype=float)
     corners = corners.reshape(-1, 4)
-    scores = np.array([score / 100 for _, score, _ in found])
-    numbers = np.array([number for _, _, number in found], dtype=np.int64)
-    kept: list[int] = []
-    for row in sorted(range(len(found)), key=lambda row: (-scores[row], row)):
+    scores = np.array([score / 100 for _, score, _ in boxes])
+    numbers = np.array([number for _, _, number in boxes], dtype=np.int64)
+    rows: list[int] = []
+    for row in sorted(range(len(boxes)), key=lambda row: (-scores[row], row)):
         if not any(
             numbers[row] == numbers[other] and overlaps(corners[row], corners[other])
-            for other in kept
+            for other in rows
         ):
-            kept.append(row)
-    assert suppress_overlaps(corners, scores, numbers) == kept
+            rows.append(row)
+    assert suppress_overlaps(corners, scores, numbers) == rows
 
 
 NAMES = {
@@ -162,7 +162,8 @@ def test_picture_is_detected_in_its_shown_orientation(tmp_path: Path) -> None:
     exif[Base.Orientation] = 6  # shown after a turn of 90 degrees clockwise
     save_photograph(tmp_path / "a.png", exif, turned=90)
     model = save_detector(tmp_path / "a.onnx", LAYOUTS["yolo_v8"])
-    check(*detect_boxes(model, [tmp_path / "a.png"], names="coco"))
+    (picture,) = detect_boxes(model, [tmp_path / "a.png"], names="coco")
+    check(picture)
 
 
 def test_settings_of_transformers_apply(tmp_path: Path) -> None:
@@ -182,7 +183,8 @@ def test_settings_of_transformers_apply(tmp_path: Path) -> None:
         top=2.1,
     )
     model = save_detector(tmp_path / "onnx/model.onnx", layout)
-    check(*detect_boxes(model, [save_photograph(tmp_path / "a.png")], names="coco"))
+    (picture,) = detect_boxes(model, [save_photograph(tmp_path / "a.png")], names="coco")
+    check(picture)
 
 
 def test_boxes_below_the_score_are_left_out(tmp_path: Path) -> None:
@@ -195,10 +197,7 @@ def test_boxes_below_the_score_are_left_out(tmp_path: Path) -> None:
     assert [len(part) for part in scores] == [3, 1, 0]
 
 
-IDENTITY = {
-    "lines": "output0 = Identity (corners)",
-    "outputs": "float[1, N, 4] output0",
-}
+CORNERS_ONLY = replace(OWN, lines="output0 = Identity (corners)", outputs="float[1, N, 4] output0")
 
 
 @pytest.mark.parametrize(
@@ -213,9 +212,9 @@ IDENTITY = {
         ("yolo_v8_variable", {"imgsz": "[wide"}, "coco", "the input of"),
         ("yolo_end_to_end", {}, "three.txt", "found the class 13 on a.png, but the names end"),
         ("torchvision", {}, "three.txt", "give 'background' as the first of the names"),
-        (replace(OWN, **IDENTITY), {}, "coco", "output0 [1, 3, 4]"),  # type: ignore[arg-type]
+        (CORNERS_ONLY, {}, "coco", "output0 [1, 3, 4]"),
         (replace(OWN, inputs="float[8, 3, 9, 9] images"), {}, "coco", "[8, 3, 9, 9]"),
-        (replace(OWN, inputs="float[1, 1, 9, 9] images", **IDENTITY), {}, "coco", "[1, 1, 9, 9]"),
+        (replace(CORNERS_ONLY, inputs="float[1, 1, 9, 9] images"), {}, "coco", "[1, 1, 9, 9]"),
         (replace(OWN, inputs="uint8[1, 3, 9, 9] images"), {}, "coco", "tensor(uint8)"),
         (replace(OWN, inputs=f"{OWN.inputs}, float[1] scale"), {}, "coco", "scale tensor(float)"),
     ],
