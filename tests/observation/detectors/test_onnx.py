@@ -17,7 +17,7 @@ from small_detectors import CORNERS, LAYOUTS, SIZE, save_detector, save_photogra
 
 from semsig_gis.core import InputError
 from semsig_gis.observation import LabelMap, detect_boxes
-from semsig_gis.observation.detectors.layouts import COCO_NAMES, suppress_overlaps
+from semsig_gis.observation.detectors.layouts import COCO_NAMES, read_outputs, suppress_overlaps
 from semsig_gis.observation.detectors.onnx import letterbox
 from semsig_gis.sources import built_in_taxonomy
 
@@ -234,6 +234,12 @@ def test_unknown_layouts_and_names_are_refused(  # noqa: PLR0917 - the cases
     photo = save_photograph(tmp_path / "a.png")
     with refused(InputError, words):
         detect_boxes(model, [photo], names=names)
+
+
+def test_boxes_of_yolox_are_not_taken_for_those_of_yolo_v5() -> None:
+    for count, recognized in ((25200, True), (8400, False)):
+        outputs = {"output": np.zeros((1, count, 85), dtype=np.float32)}
+        assert (read_outputs(outputs, COCO_NAMES, (640, 640)) is not None) == recognized
 
 
 def test_unreadable_files_are_refused(tmp_path: Path) -> None:
