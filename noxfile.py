@@ -23,12 +23,13 @@ HERE = Path(__file__).parent
 PROJECT = nox.project.load_toml("pyproject.toml")
 PYTHONS = nox.project.python_versions(PROJECT)
 CONSTRAINTS = {"oldest": "constraints-oldest.txt", "newest": "constraints.txt"}
-EXTRAS = "cluster,plot,raster,serve,stac"
+EXTRAS = "cluster,detect,plot,raster,serve,stac"
 TOOLS = (
     "colour-science",
     "hatchling",
     "hypothesis",
     "jsonschema",
+    "onnx",
     "pip",
     "pytest",
     "pytest-xdist",

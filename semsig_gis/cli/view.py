@@ -14,6 +14,7 @@ from semsig_gis.cli.console import (
     app,
     keep_inputs,
     print_json,
+    progress,
     remark,
     require_suffix,
     say,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from semsig_gis.observation import Tally
 
 MOST_NAMES = 8
+NAME_SUFFIXES = frozenset({".txt", ".names", ".yaml", ".yml", ".json"})
 
 
 @app.command()
@@ -34,16 +36,25 @@ def view(
         typer.Argument(
             help="Detections: COCO, Label Studio, LabelMe, VIA, Supervisely, BDD100K, Mapillary or "
             "Panoramax JSON, CVAT or Pascal VOC XML, YOLO .txt with data.yaml, KITTI .txt, CSV of "
-            "Roboflow; or a folder."
+            "Roboflow; or a folder. With --detector: photographs, or folders of them."
         ),
     ],
     *,
     out: Annotated[Path, typer.Option(help="Views to write (.jsonl), for --queries.")],
+    detector: Annotated[
+        Path | None,
+        typer.Option(
+            help="Object detector (.onnx) to run on photographs: YOLO, RT-DETR, DETR or "
+            "torchvision.  (needs the extra detect)"
+        ),
+    ] = None,
     labels: Annotated[
         list[str] | None,
         typer.Option(
             help="Map from labels to classes: coco, mapillary_vistas, cityscapes, panoramax or a "
-            ".toml file; repeat for several, best first.  [default: the four]"
+            ".toml file; repeat for several, best first.  [default: the four]  With --detector also "
+            "the names of its classes: coco, or a .txt, .yaml or .json file.  [default: from the "
+            "model]"
         ),
     ] = None,
     database: Annotated[
@@ -121,19 +132,30 @@ def view(
         LabelMap,
         Shot,
         ViewBuilder,
+        detect_boxes,
         north_sigma,
         read_pictures,
         read_shots,
     )
     from semsig_gis.storage import write_whole
 
-    keep_inputs(out, read=(*files, *(labels or ()), database, photos))
+    keep_inputs(out, read=(*files, *(labels or ()), database, photos, detector))
     require_suffix(".jsonl", out)
     if images is not None and not images.is_dir():
         raise InputError(
             f"--images was given as {images}, which is not a folder; give the folder of the "
             "pictures."
         )
+    maps = labels or []
+    names = None
+    if detector is not None:
+        name_files = [label for label in maps if Path(label).suffix.lower() in NAME_SUFFIXES]
+        if len(name_files) > 1:
+            raise InputError(
+                f"--labels gives names of classes in {' and '.join(name_files)}; give one file."
+            )
+        maps = [label for label in maps if label not in name_files]
+        names = next(iter(name_files), "coco" if "coco" in maps else None)
     taxonomy = _taxonomy(database)
     shot = Shot(
         camera=camera,
@@ -144,16 +166,23 @@ def view(
         roll=roll,
         size=_size(size),
     )
-    detector = ViewBuilder(
-        labels=LabelMap.open(labels or (), taxonomy),
+    builder = ViewBuilder(
+        labels=LabelMap.open(maps, taxonomy),
         taxonomy=taxonomy,
         min_score=min_score,
         shot=shot,
         shots={} if photos is None else read_shots(photos),
         folders=None if images is None else [images],
     )
-    pictures, unknown = read_pictures(files)
-    views, tally = detector.views(pictures, places=place)
+    unknown: Sequence[Path] = ()
+    if detector is None:
+        pictures, unknown = read_pictures(files)
+    else:
+        with progress("detecting objects") as advance:
+            pictures = detect_boxes(
+                detector, files, names=names, min_score=min_score, progress=advance
+            )
+    views, tally = builder.views(pictures, places=place)
     rows: list[dict[str, Any]] = []
     for name, built_view in views:
         time = {"time": tally.times[name]} if name in tally.times else {}

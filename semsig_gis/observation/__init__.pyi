@@ -9,6 +9,7 @@ from .detectors.formats import read_pictures as read_pictures
 from .detectors.labels import LabelMap as LabelMap
 from .detectors.labels import Meaning as Meaning
 from .detectors.labels import label_maps as label_maps
+from .detectors.onnx import detect_boxes as detect_boxes
 from .detectors.pictures import AnnotatedPicture as AnnotatedPicture
 from .detectors.pictures import Box as Box
 from .detectors.pictures import Shot as Shot

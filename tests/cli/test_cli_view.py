@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from PIL import Image
+from PIL.ExifTags import GPS, IFD, Base
 from sentences import sentence
+from small_detectors import LAYOUTS, save_detector, save_photograph
 
 from benchmarks.rendered import Scene
 from semsig_gis.observation import Camera, Photo, View, read_queries
@@ -153,3 +156,73 @@ def test_pictures_and_files_that_are_left_out_are_named(coco: Path, run: Run) ->
 )
 def test_invalid_options_are_refused(arguments: str, words: str, run: Run) -> None:
     sentence(run(f"view {arguments}"), words)
+
+
+@pytest.fixture
+def photos(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder of photographs of the same name with different headings, and a detector."""
+    monkeypatch.chdir(tmp_path)
+    for folder, heading in (("north", 350.0), ("east", 80.0), ("unknown", None)):
+        exif = Image.Exif()
+        exif.get_ifd(IFD.Exif)[Base.FocalLengthIn35mmFilm] = 26
+        if heading is not None:
+            gps: dict[int, object] = {GPS.GPSImgDirectionRef: "T", GPS.GPSImgDirection: heading}
+            exif.get_ifd(IFD.GPSInfo).update(gps)
+        (tmp_path / "photos" / folder).mkdir(parents=True)
+        save_photograph(tmp_path / "photos" / folder / "a.jpg", exif)
+    save_detector(tmp_path / "model.onnx", LAYOUTS["yolo_v8"])
+    return tmp_path / "photos"
+
+
+@pytest.mark.usefixtures("photos")
+@pytest.mark.parametrize("labels", ["--labels coco", "--labels names.yaml --labels coco"])
+def test_detector_finds_the_objects_of_photographs(labels: str, run: Run, tmp_path: Path) -> None:
+    names = {number: f"thing {number}" for number in range(80)} | {13: "bench", 10: "hydrant"}
+    (tmp_path / "names.yaml").write_text(json.dumps({"names": names}))
+    code, out, err = run(
+        "view --detector model.onnx photos/north photos/east photos/unknown --out v.jsonl",
+        *labels.split(),
+    )
+    assert code == 0, err
+    assert out.startswith("v.jsonl: 3 views of 3 pictures with ")
+    assert "measured from true north: 2 headings" in err
+    assert "the heading of 1 picture is unknown" in err
+    views = [line.query for line in read_queries("v.jsonl", taxonomy=TAXONOMY)]
+    bearings = []
+    for view in views:
+        assert isinstance(view, View)
+        assert view.codes is not None
+        assert view.bearings is not None
+        bench = TAXONOMY.decode(view.codes).index("L")
+        bearings.append(float(view.bearings[bench]))
+    # The bench is 180 pixels left of the middle; the focal length is 26 mm of 43.27 mm.
+    offset = math.degrees(math.atan(180 / (26 / math.hypot(36, 24) * 800)))
+    expected = [(heading - offset) % 360 for heading in (350, 80, 0)]
+    assert bearings == pytest.approx(expected, abs=0.5)
+
+
+@pytest.mark.usefixtures("photos")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("photos/north --detector no.onnx", "the detector no.onnx is not a file"),
+        ("photos/north --detector photos/north/a.jpg", "cannot be loaded as an ONNX model"),
+        ("photos --detector model.onnx", "photos contains no photograph"),
+        ("model.onnx --detector model.onnx", "model.onnx cannot be read (it is not a picture)"),
+        ("photos/north --detector model.onnx", "give --labels coco"),
+        ("photos/north --detector model.onnx --labels yolo", "label map 'yolo' is unknown"),
+        ("photos/north --detector model.onnx --labels a.txt --labels b.txt", "a.txt and b.txt"),
+    ],
+)
+def test_invalid_detectors_are_refused(
+    arguments: str, words: str, run: Run, tmp_path: Path
+) -> None:
+    sentence(run(f"view {arguments} --out v.jsonl"), words)
+    assert not (tmp_path / "v.jsonl").exists()
+
+
+@pytest.mark.usefixtures("photos")
+def test_missing_onnxruntime_is_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    arguments = "view photos/north --detector model.onnx --labels coco --out v.jsonl"
+    sentence(run(arguments), "a detector needs onnxruntime", "pip install 'semsig_gis[detect]'")

@@ -12,6 +12,9 @@ from semsig_gis.storage import file_rows, parse_json, read_text
 if TYPE_CHECKING:
     from pathlib import Path
 
+INVALID = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
+"""What reading a document of another form than expected raises."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Document:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 import io
 import math
@@ -9,13 +10,14 @@ import struct
 import warnings
 from typing import TYPE_CHECKING, Any
 
-from PIL import Image
+from PIL import Image, ImageOps
 from PIL.ExifTags import GPS, IFD, Base
 
 from semsig_gis.core import FULL_TURN, InputError
 from semsig_gis.observation.detectors.pictures import Shot
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 COMPASS_ERROR = 10.0
@@ -36,11 +38,27 @@ def read_exif(path: str | Path) -> Shot:
 
     InputError if the file is not a picture.
     """
+    with _opened(path) as image:
+        return _shot_of(image)
+
+
+def open_upright(path: str | Path) -> Image.Image:
+    """Return the pixels of a picture in its shown orientation, in RGB.
+
+    InputError if the file is not a picture.
+    """
+    with _opened(path) as image:
+        return ImageOps.exif_transpose(image).convert("RGB")
+
+
+@contextlib.contextmanager
+def _opened(path: str | Path) -> Iterator[Image.Image]:
+    """Open a picture; InputError if it is not valid, also while the block reads it."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about sizes and damaged tags
             with Image.open(path) as image:
-                return _shot_of(image)
+                yield image
     except UNREADABLE as error:
         reason = getattr(error, "strerror", None) or "it is not a picture"
         raise InputError(

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from semsig_gis.core import InputError
-from semsig_gis.observation.detectors.documents import PARSERS, Document, read_document
+from semsig_gis.observation.detectors.documents import INVALID, PARSERS, Document, read_document
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -50,7 +50,6 @@ FORMATS: tuple[Format, ...] = tuple(
 NAME_SUFFIXES = frozenset({".yaml", ".yml", ".names"})
 NAME_FILES = frozenset({"classes.txt"})
 ACCEPTED = f"give {', '.join(form.NAME for form in FORMATS)}, or a folder of them"
-INVALID = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError)
 
 
 def read_pictures(

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from semsig_gis.core import InputError
-from semsig_gis.observation.detectors.documents import text_of
+from semsig_gis.observation.detectors.documents import INVALID, text_of
 from semsig_gis.observation.detectors.pictures import AnnotatedPicture, bounds, box_of
+from semsig_gis.storage import parse_json
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from semsig_gis.observation.detectors.documents import Document
@@ -21,6 +22,8 @@ NAME, SUFFIX = "YOLO with data.yaml", ".txt"
 NAME_FILES = ("data.yaml", "data.yml", "classes.txt", "obj.names")
 """Files with class names, in the folder of the labels or up to two above."""
 LEVELS = 3
+NAME_KEYS = ("names", "id2label", "categories")
+"""Where YOLO, Transformers and COCO have the names of classes."""
 
 BOX_VALUES = 4
 LEAST_WORDS = 4  # a line with fewer is of another kind of text
@@ -97,14 +100,36 @@ def _names(file: Path, documents: Sequence[Document]) -> dict[int, str]:
         raise InputError(
             f"the classes of {file} have no names; give its data.yaml or classes.txt as well."
         )
+    return read_class_names(source)
+
+
+def read_class_names(source: Path) -> dict[int, str]:
+    """Read the names of classes by number: a name in each line, YAML or JSON."""
     text = text_of(source)
-    if source.suffix.lower() not in {".yaml", ".yml"}:
-        return dict(enumerate(text.split("\n")))
+    suffix = source.suffix.lower()
+    if suffix not in {".yaml", ".yml", ".json"}:
+        return dict(enumerate(text.rstrip().split("\n")))
     try:
-        classes = yaml.safe_load(text)["names"]
-        pairs = classes.items() if isinstance(classes, dict) else enumerate(classes)
-        return {int(number): str(name) for number, name in pairs}
-    except (yaml.YAMLError, RecursionError, KeyError, TypeError, ValueError) as error:
+        return numbered_names(parse_json(text) if suffix == ".json" else yaml.safe_load(text))
+    except (yaml.YAMLError, RecursionError, *INVALID) as error:
         raise InputError(
             f"{source} has no list of class names; give a YAML file with 'names'."
         ) from error
+
+
+def numbered_names(content: Any) -> dict[int, str]:  # noqa: ANN401 - any YAML or JSON
+    """Return the names of classes by number from a list or a table; raise one of `INVALID`."""
+    if isinstance(content, dict):
+        content = next((content[key] for key in NAME_KEYS if key in content), content)
+    pairs: Iterable[tuple[Any, Any]] = (
+        content.items()
+        if isinstance(content, dict)
+        else (
+            (item["id"], item["name"]) if isinstance(item, dict) else (number, item)
+            for number, item in enumerate(content)
+        )
+    )
+    names = {int(number): str(name) for number, name in pairs}
+    if min(names) < 0:  # ValueError if there are no names
+        raise ValueError("a number is negative")
+    return names
