@@ -94,7 +94,7 @@ def route(options: RouteOptions) -> None:
         return
     print_rows(
         f"{len(views)} views of {city.path.name}",
-        ("view", "x", "y", "lon", "lat", "± m", "chance", "answered"),
+        ("view", "x", "y", "lon", "lat", "± m, if there", "chance", "answered"),
         ([name, *_row(location)] for name, location in zip(names, locations, strict=True)),
     )
     print_place(locations[-1])

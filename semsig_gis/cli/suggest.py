@@ -46,8 +46,7 @@ def suggest(options: SuggestOptions) -> None:
         "What to look for next",
         ("question", "symbol", "yes", "bits"),
         [
-            # Rounded first, as in JSON.
-            [row.text, row.item.symbol, percent(round(row.chance, 4)), f"{round(row.gain, 4):.3f}"]
+            [row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}"]
             for row in questions
         ],
     )
