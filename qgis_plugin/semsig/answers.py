@@ -136,11 +136,11 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     if place is None:
         lines = _tie_lines(answer)
     else:
-        given = answer["answered"]
-        lines = [] if given else [f"Cannot tell. {answer['region']['text']}."]
+        sure = answer["answered"]
+        lines = [] if sure else [f"Cannot tell. {answer['region']['text']}."]
         lines += [answer["doubt"]] if answer["doubt"] else []
         within, chance = f"{place['within_m']:g} m", percent(place["chance"])
-        verdict = "The place is" if given else "The best place is"
+        verdict = "The place is" if sure else "The best place is"
         lines.append(f"{verdict} within {within} of the ellipse's middle: chance {chance}.")
     lines += [f"Note: {note}" for note in answer.get("notes", [])]
     if searched is not None:

@@ -437,9 +437,9 @@ def _print_north(north: North) -> None:
         say(f"Bearings are measured from {north}, at {north.turn % 360.0:.1f}° from grid north.")
 
 
-def print_notes(answer: Answer) -> None:
-    """Print the notes on a query."""
-    for note in answer.notes:
+def print_notes(*answers: Answer) -> None:
+    """Print the notes on queries, equal ones once."""
+    for note in dict.fromkeys(note for answer in answers for note in answer.notes):
         say(f"Note: {note}")
 
 
@@ -457,14 +457,14 @@ def print_place(location: Location) -> None:
 
     Without an answer, the region comes first, and the position only with "if it is there".
     """
-    estimate, given = location.estimate, location.answer.given
+    estimate, sure = location.estimate, location.answer.given
     lon, lat = degrees_of(location)
     radius, mass = location.rule.radius, percent(location.answer.mass)
-    if not given:
+    if not sure:
         say(f"Cannot tell. {location.region_text}.")
     if location.doubt:
         say(location.doubt)
-    best, there = ("", "") if given else ("Best place: ", "If it is there: ")
+    best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
     say(f"{best}{lat:.6f}, {lon:.6f} (lat, lon), within {radius:g} m of it: chance {mass}.")
     longer, shorter, bearing = estimate.ellipse()
     say(
@@ -477,7 +477,7 @@ def print_place(location: Location) -> None:
             f"{there}{north} {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
             f"from {location.north.name} north."
         )
-    if given:
+    if sure:
         say(f"{location.region_text}.")
 
 

@@ -38,7 +38,17 @@ def suggest(options: SuggestOptions) -> None:
     questions = next_questions(locator.index, location, unplaced=unplaced, absent=absent)
     if options.as_json:
         answer = location.to_dict()
-        shared = ("query", "prior", "answered", "place", "region", "notes")
+        shared = (
+            "query",
+            "prior",
+            "answered",
+            "elsewhere",
+            "fit",
+            "doubt",
+            "place",
+            "region",
+            "notes",
+        )
         rows = [question.to_dict() for question in questions]
         print_json({**{name: answer[name] for name in shared}, "questions": rows})
         return

@@ -202,7 +202,7 @@ def with_unplaced(
     used = locator.index.table.codes
     titles = {
         name: [
-            by_code(code).title.lower() + ("" if code in used else " (the map has none: not used)")
+            by_code(code).title.lower() + ("" if code in used else " (not used, the map has none)")
             for code in codes
         ]
         for name, codes in (("seen", unplaced), ("absent", absent))

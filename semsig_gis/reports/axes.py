@@ -416,8 +416,8 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
     low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    given = location.answer.given
-    verdict = "The answer" if given else f"Cannot tell. {location.region_text}\nBest place"
+    sure = location.answer.given
+    verdict = "The answer" if sure else f"Cannot tell. {location.region_text}\nBest place"
     chance = f"within {location.rule.radius:g} m with a chance of {percent(location.answer.mass)}"
     lines = [f"{verdict}: {chance}", *([location.doubt] if location.doubt else [])]
     axes.set_title("\n".join(lines), wrap=True)

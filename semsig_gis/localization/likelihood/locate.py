@@ -17,6 +17,7 @@ import numpy as np
 
 from semsig_gis.core import InputError, cell_ids, crs_label, map_with, percent, to_degrees
 from semsig_gis.localization.answers import (
+    LEAST_ELSEWHERE,
     REGION_SHARE,
     Answer,
     Ranking,
@@ -133,17 +134,17 @@ class Location(Answer):
     fit: float | None = None
 
     def _facts(self) -> dict[str, object]:
-        given = self.answer.given
+        sure = self.answer.given
         region = {"region": f"{len(self.region):,} of {self.cells:,} cells"}
         place = {
-            "place" if given else "best place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
-            "give or take" if given else "if there, give or take": f"{self.estimate.sigma:.1f} m",
+            "place" if sure else "best place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
+            "give or take" if sure else "if there, give or take": f"{self.estimate.sigma:.1f} m",
             f"within {self.rule.radius:g} m": percent(self.answer.mass),
         }
         return {
-            "answer": "yes" if given else "cannot tell",
+            "answer": "yes" if sure else "cannot tell",
             **({"doubt": self.doubt} if self.doubt else {}),
-            **(place | region if given else region | place),
+            **(place | region if sure else region | place),
             "candidates": len(self.columns["cell"]),
             "noise": self.noise,
             "CRS": crs_label(self.crs),
@@ -176,11 +177,12 @@ class Location(Answer):
     @property
     def region_text(self) -> str:
         """The size of the region: ``90 % region: 7 cells, 700 m², in 1 place``."""
+        if_here = ", if it is from this area" if self.elsewhere >= LEAST_ELSEWHERE else ""
         cells, km2, places = len(self.region), self.region_km2, self.region_places
         size = f"{km2:.3g} km²" if km2 >= 0.1 else f"{km2 * 1e6:,.0f} m²"  # noqa: PLR2004 - 10 ha
         where = "many places" if places is None else f"{places} place{'' if places == 1 else 's'}"
         number = f"{cells:,} cell{'' if cells == 1 else 's'}"
-        return f"{percent(REGION_SHARE, 0)} region: {number}, {size}, in {where}"
+        return f"{percent(REGION_SHARE)} region{if_here}: {number}, {size}, in {where}"
 
     @property
     def region_km2(self) -> float:

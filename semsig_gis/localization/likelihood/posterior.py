@@ -175,22 +175,22 @@ class Posterior(Displayed):
         columns = database.columns[likely].astype(np.int64)
         rows = database.rows[likely].astype(np.int64)
         steps, east, north = self._circle(radius)
-        left, taken = chances[likely] > 0, np.zeros(len(chances), np.bool_)
-        places = []
-        while len(places) < count and left.any():
+        remaining, used = chances[likely] > 0, np.zeros(len(chances), np.bool_)
+        places: list[tuple[int, int, float]] = []
+        while len(places) < count and remaining.any():
             # Rounded, so that equal sums stay equal.
-            best = int(np.where(left, np.round(sums, 9), -1.0).argmax())
+            best = int(np.where(remaining, np.round(sums, 9), -1.0).argmax())
             column, row = columns[best] + east, rows[best]
             low = np.searchsorted(database.cell_ids, cell_ids(column, row - north), side="left")
             high = np.searchsorted(database.cell_ids, cell_ids(column, row + north), side="right")
             inside = np.concatenate([np.arange(*ends) for ends in zip(low, high, strict=True)])
-            inside = inside[~taken[inside]]
-            taken[inside] = True
+            inside = inside[~used[inside]]
+            used[inside] = True
             own = chances[inside]
-            places.append((likely[best], inside[own.argmax()], own.sum()))
+            places.append((int(likely[best]), int(inside[own.argmax()]), float(own.sum())))
             away = (columns - columns[best]) ** 2 + (rows - rows[best]) ** 2
-            left &= away > steps**2
-            near = np.flatnonzero(left & (away <= (2.0 * steps) ** 2))
+            remaining &= away > steps**2
+            near = np.flatnonzero(remaining & (away <= (2.0 * steps) ** 2))
             inside, own = inside[own > 0], own[own > 0]
             apart = (columns[near, None] - database.columns[inside]) ** 2
             apart += (rows[near, None] - database.rows[inside]) ** 2
