@@ -416,11 +416,13 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
     low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    sure = location.answer.given
-    verdict = "The answer" if sure else f"Cannot tell. {location.region_text}\nBest place"
     chance = f"within {location.rule.radius:g} m with a chance of {percent(location.answer.mass)}"
-    lines = [f"{verdict}: {chance}", *([location.doubt] if location.doubt else [])]
-    axes.set_title("\n".join(lines), wrap=True)
+    if location.answer.given:
+        axes.set_title(f"The answer\n{chance}")
+    else:
+        lines = "Cannot tell", location.region_text, f"Best place: {chance}"
+        axes.set_title("\n".join(lines), fontsize="medium")
+    axes.set_xlabel(location.doubt, wrap=True)
     _frame(axes)
     return axes
 
