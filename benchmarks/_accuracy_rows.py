@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from benchmarks._accuracy_methods import NEAR
 from benchmarks._measuring import short
 from semsig_gis.core import wilson_interval
@@ -17,10 +19,12 @@ if TYPE_CHECKING:
     from benchmarks._accuracy_methods import Outcome
     from benchmarks._accuracy_queries import City
 
-__all__ = ["Bar", "Row"]
+__all__ = ["PRECISIONS", "Bar", "Row"]
 
 MANY = 10
 """Least number of visible objects of the queries in ``p50_ten``."""
+PRECISIONS = (90, 95, 98)
+"""Percent of the answers that are right, in ``most_at_90`` and so on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +123,22 @@ class Row:
         """How often the region of exactly 90 % contains the true cell; None without regions."""
         return self._mean_of("in_exact_region")
 
+    def most_answered(self, precision: float) -> float | None:
+        """Return the largest share of the queries to answer with a share of right answers.
+
+        The answers are those of the highest chances, equal ones together. None if all queries are
+        answered.
+        """
+        if self.coverage is None:
+            return None
+        masses = np.array([outcome.mass or 0.0 for outcome in self.outcomes])
+        right = np.array([outcome.within[-1] == 1.0 for outcome in self.outcomes])
+        order = np.argsort(-masses, kind="stable")
+        ends = np.append(np.diff(masses[order]) != 0.0, True)
+        counts = np.arange(1, len(order) + 1)
+        passes = ends & (np.cumsum(right[order]) >= precision * counts)
+        return int(counts[passes].max(initial=0)) / len(order)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the row as plain values."""
         count, cells = len(self.outcomes), len(self.city.database)
@@ -143,6 +163,7 @@ class Row:
             "region_mass": self._mean_of("region_mass"),
             "coverage": self.coverage,
             "precision": self.precision,
+            **{f"most_at_{share}": self.most_answered(share / 100.0) for share in PRECISIONS},
         }
         return {
             "city": self.city.name,
@@ -173,6 +194,7 @@ class Row:
             "region_mass",
             "coverage",
             "precision",
+            *(f"most_at_{share}" for share in PRECISIONS),
         ):
             if values[name] is not None:
                 line += f", {name} {values[name]}"

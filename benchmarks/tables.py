@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from benchmarks._accuracy_rows import PRECISIONS
 from benchmarks._measuring import FOLDER, INPUTS, LAST_ONLY, read_rows
 from benchmarks.views import FULL_TURN, RANGES, SECTORS
 from benchmarks.views import bars as bars_of_views
@@ -45,7 +46,11 @@ chance is exactly 90 %.
 _SURE = """## Answers
 
 The likelihood method gives an answer, or "cannot tell". The threshold is chosen on half of the
-`medium` queries so that 98 % of the answers are right; the table shows the other halves.
+`medium` queries so that 98 % of the answers are right, with a confidence of 95 %; the table shows
+the other halves. To show that takes at least 217 answers, all right: a city where fewer of the
+thousand queries can be answered gets no threshold, and answers nothing. The last columns do not
+depend on a threshold chosen before: they are the largest shares of the queries, those with the
+highest chances, that could be answered with 90, 95 and 98 % of the answers right.
 """
 _BARS = """## Targets
 
@@ -115,7 +120,10 @@ _ACCURACY_HEAD = (
 _CHANCE_HEAD = (
     "city | noise | method | setting | stated | came true | region: stated | holds | just 90 %"
 )
-_ANSWER_HEAD = "city | noise | queries | answered | right, of these"
+_ANSWER_HEAD = (
+    "city | noise | queries | answered | right, of these | most, 90 % right | 95 % right | "
+    "98 % right"
+)
 _BAYES_HEAD = (
     "degrees | ranges | detections | at most | by Bayes | the likelihood method | interval | stated"
 )
@@ -227,6 +235,7 @@ def _answer_cells(row: Mapping[str, Any]) -> Sequence[str]:
     return (
         *(row["city"], row["distortion"], f"{row['queries']:,}"),
         *(_share(row["coverage"]), _share(row["precision"])),
+        *(_share(row[f"most_at_{share}"]) for share in PRECISIONS),
     )
 
 

@@ -164,8 +164,8 @@
         <translation>Kandidaten</translation>
     </message>
     <message>
-        <source>Cannot tell: within {metres} m of the best place with a chance of {chance}.</source>
-        <translation>Nicht zu sagen: mit einer Wahrscheinlichkeit von {chance} im Umkreis von {metres} m um den besten Ort.</translation>
+        <source>Cannot tell: 90 % of the chance is in {cells} cells, and {chance} within {metres} m of the best place.</source>
+        <translation>Nicht zu sagen: 90 % der Wahrscheinlichkeit liegen in {cells} Zellen, und {chance} im Umkreis von {metres} m um den besten Ort.</translation>
     </message>
     <message>
         <source>Catalogue</source>
@@ -364,8 +364,8 @@
         <translation>Wie Zellen mit einer Anfrage verglichen werden. likelihood: nach der Chance, dass ein Detektor die Anfrage von dort sieht. edit+edit: danach, wie viele Objekte hinzukommen, wegfallen oder getauscht werden müssen, um die eine Folge in die andere zu verwandeln, im Mittel von Typen und Winkeln. edit+edit:5%: dasselbe unter den 5 % der Zellen, deren Typen am besten passen. histogram+histogram: danach, wie oft jeder Typ und jeder Winkel vorkommt, gleich in welcher Reihenfolge. jaccard+jaccard: danach, welche Typen und welche Winkel überhaupt vorkommen. types:edit und angles:edit: wie edit+edit, nach den Typen oder den Winkeln allein.</translation>
     </message>
     <message>
-        <source>How many cells to list.</source>
-        <translation>Wie viele Zellen aufgeführt werden.</translation>
+        <source>How many places (with likelihood) or cells to list at most.</source>
+        <translation>Wie viele Orte (bei likelihood) oder Zellen höchstens aufgeführt werden.</translation>
     </message>
     <message>
         <source>How many objects the detector gets wrong: none, 1, 7 or 13.</source>
@@ -584,8 +584,8 @@
         <translation>Das GeoPackage, das geschrieben wird.</translation>
     </message>
     <message>
-        <source>The best cells.</source>
-        <translation>Die besten Zellen.</translation>
+        <source>The best places or cells.</source>
+        <translation>Die besten Orte oder Zellen.</translation>
     </message>
     <message>
         <source>The catalogues of the files. With several, objects that two of them contain are merged; the first is treated as the best source.</source>
@@ -600,8 +600,8 @@
         <translation>Die Zellen nach ihrer Chance, in einem GeoPackage.</translation>
     </message>
     <message>
-        <source>The cells that a view from here may be confused with, by chance:</source>
-        <translation>Die Zellen, mit denen eine Ansicht von hier verwechselt werden kann, nach Wahrscheinlichkeit:</translation>
+        <source>The places that a view from here may be confused with, by chance:</source>
+        <translation>Die Orte, mit denen eine Ansicht von hier verwechselt werden kann, nach Wahrscheinlichkeit:</translation>
     </message>
     <message>
         <source>The database to write.</source>

@@ -164,8 +164,8 @@
         <translation>Candidats</translation>
     </message>
     <message>
-        <source>Cannot tell: within {metres} m of the best place with a chance of {chance}.</source>
-        <translation>Impossible à dire : à moins de {metres} m du meilleur lieu avec une probabilité de {chance}.</translation>
+        <source>Cannot tell: 90 % of the chance is in {cells} cells, and {chance} within {metres} m of the best place.</source>
+        <translation>Impossible à dire : 90 % de la probabilité est dans {cells} cellules, et {chance} à moins de {metres} m du meilleur lieu.</translation>
     </message>
     <message>
         <source>Catalogue</source>
@@ -364,8 +364,8 @@
         <translation>Comment les cellules sont comparées à une requête. likelihood : par la probabilité qu’un détecteur voie la requête de là. edit+edit : par le nombre d’objets à ajouter, à ôter ou à échanger pour changer une suite en l’autre, en moyenne des types et des angles. edit+edit:5% : de même, parmi les 5 % des cellules dont les types correspondent le mieux. histogram+histogram : par le nombre de fois que chaque type et chaque angle apparaît, quel que soit l’ordre. jaccard+jaccard : par les types et les angles qui apparaissent. types:edit et angles:edit : comme edit+edit, par les types ou les angles seuls.</translation>
     </message>
     <message>
-        <source>How many cells to list.</source>
-        <translation>Combien de cellules énumérer.</translation>
+        <source>How many places (with likelihood) or cells to list at most.</source>
+        <translation>Combien de lieux (avec likelihood) ou de cellules énumérer au plus.</translation>
     </message>
     <message>
         <source>How many objects the detector gets wrong: none, 1, 7 or 13.</source>
@@ -584,8 +584,8 @@
         <translation>Le GeoPackage à écrire.</translation>
     </message>
     <message>
-        <source>The best cells.</source>
-        <translation>Les meilleures cellules.</translation>
+        <source>The best places or cells.</source>
+        <translation>Les meilleurs lieux ou cellules.</translation>
     </message>
     <message>
         <source>The catalogues of the files. With several, objects that two of them contain are merged; the first is treated as the best source.</source>
@@ -600,8 +600,8 @@
         <translation>Les cellules selon leur probabilité, dans un GeoPackage.</translation>
     </message>
     <message>
-        <source>The cells that a view from here may be confused with, by chance:</source>
-        <translation>Les cellules avec lesquelles une vue d’ici peut être confondue, par probabilité :</translation>
+        <source>The places that a view from here may be confused with, by chance:</source>
+        <translation>Les lieux avec lesquels une vue d’ici peut être confondue, par probabilité :</translation>
     </message>
     <message>
         <source>The database to write.</source>

@@ -16,6 +16,7 @@ __all__ = [
     "candidate_rows",
     "log_text",
     "parse_answer",
+    "percent",
     "place_row",
     "ring",
 ]
@@ -39,6 +40,8 @@ PLACE_FIELDS = {
     "shorter_m": "double",
     "bearing": "double",
     "heading": "double",
+    "elsewhere": "double",
+    "fit": "double",
 }
 CORNERS = 72
 BORDER = re.compile("[┏┡└]")
@@ -120,8 +123,8 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     Returns
     -------
     list of str
-        The chance of the place, or the ties of the candidates; notes on the query; the size of
-        the regions to search.
+        The region if there is no answer, doubts, and the chance of the place, or the ties of the
+        candidates; notes on the query; the size of the regions to search.
 
     Examples
     --------
@@ -133,18 +136,45 @@ def answer_lines(answer: dict[str, Any]) -> list[str]:
     if place is None:
         lines = _tie_lines(answer)
     else:
-        verdict = "The place is" if answer["answered"] else "Cannot tell: the best place is"
-        within, chance = f"{place['within_m']:g} m", f"{place['chance']:.1%}"
-        lines = [f"{verdict} within {within} of the ellipse's middle with a chance of {chance}."]
+        sure = answer["answered"]
+        lines = [] if sure else [f"Cannot tell. {answer['region']['text']}."]
+        lines += [answer["doubt"]] if answer["doubt"] else []
+        within, chance = f"{place['within_m']:g} m", percent(place["chance"])
+        verdict = "The place is" if sure else "The best place is"
+        lines.append(f"{verdict} within {within} of the ellipse's middle: chance {chance}.")
     lines += [f"Note: {note}" for note in answer.get("notes", [])]
     if searched is not None:
         regions = searched["regions"]
-        chance = f", with {searched['chance']:.1%} of the chance" if "chance" in searched else ""
+        share = percent(searched["chance"]) if "chance" in searched else ""
+        chance = f", with {share} of the chance" if share else ""
         lines.append(
             f"To search: {regions:,} region{'' if regions == 1 else 's'}, "
             f"{searched['km2']:.4g} km2, {searched['percent']:.3g} % of the city{chance}."
         )
     return lines
+
+
+def percent(chance: float) -> str:
+    """Return a chance in whole percent, as the command writes it.
+
+    Parameters
+    ----------
+    chance : float
+        From 0 to 1.
+
+    Returns
+    -------
+    str
+        Never 0 or 100 %.
+
+    Examples
+    --------
+    >>> percent(0.418), percent(0.9981), percent(0.0002)
+    ('42 %', 'over 99 %', 'under 1 %')
+    """
+    if chance > 0.995:  # noqa: PLR2004 - as `semsig_gis.core.percent`
+        return "over 99 %"
+    return "under 1 %" if chance < 0.01 else f"{100 * chance:.0f} %"  # noqa: PLR2004
 
 
 def _tie_lines(answer: dict[str, Any]) -> list[str]:
@@ -221,6 +251,8 @@ def place_row(answer: dict[str, Any]) -> tuple[list[tuple[float, float]], list[A
         ellipse["shorter"],
         ellipse["bearing"],
         place["heading"],
+        answer["elsewhere"],
+        answer["fit"],
     ]
     return outline, values
 

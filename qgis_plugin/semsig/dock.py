@@ -33,6 +33,7 @@ from qgis.PyQt.QtWidgets import (
 )
 
 from .algorithm import load_style
+from .answers import percent
 from .compass_dial import CompassDial, Mark, Sign, sign_icon
 from .results import WGS84, show_answer
 from .server import CityServer
@@ -279,7 +280,7 @@ class SemsigDock(QgsDockWidget):
                 cell=cell["cell"], types=cell["types"], count=f"{cell['alike']:,}"
             )
         )
-        self._list(answer, tr("The cells that a view from here may be confused with, by chance:"))
+        self._list(answer, tr("The places that a view from here may be confused with, by chance:"))
 
     # --- A view ------------------------------------------------------------------------------
 
@@ -331,10 +332,17 @@ class SemsigDock(QgsDockWidget):
         verdict = (
             tr("Found: the place is within {metres} m with a chance of {chance}.")
             if answer["given"]
-            else tr("Cannot tell: within {metres} m of the best place with a chance of {chance}.")
+            else tr(
+                "Cannot tell: 90 % of the chance is in {cells} cells, and {chance} within "
+                "{metres} m of the best place."
+            )
         )
-        chance = f"{answer['mass']:.1%}"
-        self._list(answer, verdict.format(metres=f"{answer['radius']:g}", chance=chance))
+        text = verdict.format(
+            cells=f"{answer['region']['counts']['0.9']:,}",
+            metres=f"{answer['radius']:g}",
+            chance=percent(answer["mass"]),
+        )
+        self._list(answer, f"{text} {answer['doubt']}".rstrip())
         self.message.setText(tr("Choose a rank in the list to go there."))
         show_answer(answer, load_style)
         self._go_to([candidate["place"] for candidate in self.candidates[:3]])
@@ -346,7 +354,7 @@ class SemsigDock(QgsDockWidget):
         self.table.blockSignals(True)  # noqa: FBT003 - as Qt calls it
         self.table.setRowCount(len(self.candidates))
         for row, candidate in enumerate(self.candidates):
-            texts = str(candidate["rank"]), f"{candidate['chance']:.1%}", candidate["types"]
+            texts = str(candidate["rank"]), percent(candidate["chance"]), candidate["types"]
             for column, text in enumerate(texts):
                 item = QTableWidgetItem(text)
                 if column < 2:  # noqa: PLR2004 - the numbers

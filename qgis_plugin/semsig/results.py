@@ -111,6 +111,8 @@ def show_answer(answer: dict[str, Any], load_style: Any) -> None:  # noqa: ANN40
         "within_m": answer["radius"],
         "sigma_m": estimate["sigma"],
         "heading": estimate["heading"],
+        "elsewhere": answer["elsewhere"],
+        "fit": answer["fit"],
     }
     rows: list[tuple[QgsGeometry, dict[str, Any]]] = []
     for candidate in answer["candidates"]:

@@ -218,7 +218,7 @@ def calibrate(
     if rule.answered:
         say(
             f"Answers from a chance of {rule.threshold:.4f} that the place is within {radius:g} m: "
-            f"{rule.answered:,} of {rule.queries:,} samples ({percent(rule.coverage)}) are "
+            f"{rule.answered:,} of {rule.queries:,} samples ({percent(rule.coverage, 1)}) are "
             f"answered, {rule.wrong:,} of them wrongly; {percent(precision, 0)} are right with a "
             f"confidence of {percent(rule.confidence, 0)}."
         )

@@ -324,8 +324,14 @@ EXPLANATION = (
 
 def print_location(location: Location) -> None:
     """Print an answer by likelihood."""
-    ranks = location.columns["rank"].tolist()
-    _print_candidates(location, f"likelihood ({location.noise} noise)", ranks, "chance")
+    columns = location.columns
+    _print_candidates(
+        location,
+        f"{len(columns['rank'])} best places in {location.cells:,} cells, "
+        f"by likelihood ({location.noise} noise)",
+        columns["rank"].tolist(),
+        ("chance", map(percent, columns["chance"].tolist())),
+    )
     knowledge = location.known
     if near := knowledge.get("near"):
         say(
@@ -350,7 +356,12 @@ def print_localization(localization: Localization) -> None:
     """Print an answer by distance."""
     ends = zip(*(localization.columns[name].tolist() for name in RANKS), strict=True)
     ranks = [str(low) if low == high else f"{low}-{high}" for low, high in ends]
-    _print_candidates(localization, localization.used, ranks, "distance")
+    _print_candidates(
+        localization,
+        f"{len(ranks)} best of {localization.cells:,} cells, by {localization.used}",
+        ranks,
+        ("distance", (f"{value:.4f}" for value in localization.columns["distance"].tolist())),
+    )
     if tied := localization.tied_beyond:
         more = "1 further cell ties" if tied == 1 else f"{tied:,} further cells tie"
         say(f"{more} with the last one.")
@@ -359,24 +370,26 @@ def print_localization(localization: Localization) -> None:
     print_notes(localization)
 
 
-def _print_candidates(answer: Answer, method: str, ranks: list[Any], score: str) -> None:
-    """Print the table of candidates."""
+def _print_candidates(
+    answer: Answer, title: str, ranks: list[Any], scores: tuple[str, Iterable[str]]
+) -> None:
+    """Print the table of candidates, with a column of scores."""
     from semsig_gis.core import to_degrees
 
     columns = answer.columns
     x, y = columns["x"], columns["y"]
     lon, lat = (axis.round(7) for axis in to_degrees(answer.crs).transform(x, y))  # as in JSON
-    values = (columns["cell_id"], x, y, lon, lat, columns[score], columns["types"])
-    formats = ("", ".1f", ".1f", ".6f", ".6f", ".4f", "")
-    # Identifiers stay numbers, so that they are printed as such.
-    texts = [
-        [format(value, spec) if spec else value for value in column.tolist()]
-        for column, spec in zip(values, formats, strict=True)
+    name, texts = scores
+    places = [
+        [format(value, spec) for value in column.tolist()]
+        for column, spec in zip((x, y, lon, lat), (".1f", ".1f", ".6f", ".6f"), strict=True)
     ]
+    # Identifiers stay numbers, so that they are printed as such.
+    cells, types = columns["cell_id"].tolist(), columns["types"].tolist()
     print_rows(
-        f"{len(ranks)} best of {answer.cells:,} cells, by {method}",
-        ("rank", "cell", "x", "y", "lon", "lat", score, "types"),
-        zip(ranks, *texts, strict=True),
+        title,
+        ("rank", "cell", "x", "y", "lon", "lat", name, "types"),
+        zip(ranks, cells, *places, texts, types, strict=True),
     )
 
 
@@ -424,9 +437,9 @@ def _print_north(north: North) -> None:
         say(f"Bearings are measured from {north}, at {north.turn % 360.0:.1f}° from grid north.")
 
 
-def print_notes(answer: Answer) -> None:
-    """Print the notes on a query."""
-    for note in answer.notes:
+def print_notes(*answers: Answer) -> None:
+    """Print the notes on queries, equal ones once."""
+    for note in dict.fromkeys(note for answer in answers for note in answer.notes):
         say(f"Note: {note}")
 
 
@@ -440,31 +453,32 @@ def degrees_of(location: Location) -> tuple[float, float]:
 
 
 def print_place(location: Location) -> None:
-    """Print the place of an answer by likelihood, and whether it is certain enough."""
-    from semsig_gis.localization import REGION_SHARE
+    """Print the place of an answer by likelihood, and whether it is certain enough.
 
-    estimate = location.estimate
+    Without an answer, the region comes first, and the position only with "if it is there".
+    """
+    estimate, sure = location.estimate, location.answer.given
     lon, lat = degrees_of(location)
     radius, mass = location.rule.radius, percent(location.answer.mass)
-    verdict = "" if location.answer.given else "Cannot tell: the best place is "
-    where = f"{verdict}{lat:.6f}, {lon:.6f} (lat, lon)"
-    say(f"{where}, within {radius:g} m of it with a chance of {mass}.")
+    if not sure:
+        say(f"Cannot tell. {location.region_text}.")
+    if location.doubt:
+        say(location.doubt)
+    best, there = ("", "") if sure else ("Best place: ", "If it is there: ")
+    say(f"{best}{lat:.6f}, {lon:.6f} (lat, lon), within {radius:g} m of it: chance {mass}.")
     longer, shorter, bearing = estimate.ellipse()
     say(
-        f"Estimated position: x {estimate.x:.1f}, y {estimate.y:.1f} ± {estimate.sigma:.1f} m "
+        f"{there or 'Position: '}x {estimate.x:.1f}, y {estimate.y:.1f} ± {estimate.sigma:.1f} m "
         f"(90 %: {longer:.1f} m along {bearing:.0f}°, {shorter:.1f} m across)."
     )
     if estimate.heading is not None:
+        north = "north of the query" if there else "North of the query:"
         say(
-            f"North of the query: {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
+            f"{there}{north} {estimate.heading % 360.0:.1f}° ± {estimate.heading_sigma:.1f}° "
             f"from {location.north.name} north."
         )
-    cells, km2 = len(location.region), location.region_km2
-    size = f"{km2:.3f} km²" if km2 >= 0.1 else f"{km2 * 1e6:,.0f} m²"  # noqa: PLR2004 - 10 ha
-    say(
-        f"{percent(REGION_SHARE, 0)} of the chance is in {cells:,} cell{'' if cells == 1 else 's'} "
-        f"({size})."
-    )
+    if sure:
+        say(f"{location.region_text}.")
 
 
 def _print_explanation(rank: int, explanation: Explanation, north: North) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from semsig_gis.cli.console import AsJson, Database, print_json, print_rows, progress
-from semsig_gis.cli.localize import degrees_of, print_place
+from semsig_gis.cli.localize import degrees_of, print_notes, print_place
 from semsig_gis.cli.options import (
     Day,
     Explain,
@@ -94,10 +94,11 @@ def route(options: RouteOptions) -> None:
         return
     print_rows(
         f"{len(views)} views of {city.path.name}",
-        ("view", "x", "y", "lon", "lat", "± m", "chance", "answered"),
+        ("view", "x", "y", "lon", "lat", "± m, if there", "chance", "answered"),
         ([name, *_row(location)] for name, location in zip(names, locations, strict=True)),
     )
     print_place(locations[-1])
+    print_notes(*locations)
 
 
 def _row(location: Location) -> list[str]:

@@ -38,7 +38,17 @@ def suggest(options: SuggestOptions) -> None:
     questions = next_questions(locator.index, location, unplaced=unplaced, absent=absent)
     if options.as_json:
         answer = location.to_dict()
-        shared = ("query", "prior", "answered", "place", "region", "notes")
+        shared = (
+            "query",
+            "prior",
+            "answered",
+            "elsewhere",
+            "fit",
+            "doubt",
+            "place",
+            "region",
+            "notes",
+        )
         rows = [question.to_dict() for question in questions]
         print_json({**{name: answer[name] for name in shared}, "questions": rows})
         return
@@ -46,8 +56,7 @@ def suggest(options: SuggestOptions) -> None:
         "What to look for next",
         ("question", "symbol", "yes", "bits"),
         [
-            # Rounded first, as in JSON.
-            [row.text, row.item.symbol, percent(round(row.chance, 4)), f"{round(row.gain, 4):.3f}"]
+            [row.text, row.item.symbol, percent(row.chance), f"{round(row.gain, 4):.3f}"]
             for row in questions
         ],
     )

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 # Format characters that join letters and emoji; all others only hide or reorder text.
 JOINERS = "\u200c\u200d"
+# Chances that are written as whole percents.
+LEAST_CHANCE, MOST_CHANCE = 0.01, 0.995
 UTF16 = f"utf-16-{sys.byteorder[0]}e"
 
 
@@ -67,10 +69,18 @@ def escaped(text: str) -> str:
     return plain.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
-def percent(share: float, digits: int = 1) -> str:
-    """Return a share from 0 to 1 as percent: ``41.8 %``.
+def percent(share: float, digits: int | None = None) -> str:
+    """Return a share from 0 to 1 as percent: a chance in whole percent, others with `digits`.
 
-    >>> percent(0.418), percent(1.0, 0)
+    A chance is an estimate, so it is never said to be 0 or 100 %.
+
+    >>> percent(0.418), percent(0.9981), percent(0.0002)
+    ('42 %', 'over 99 %', 'under 1 %')
+    >>> percent(0.418, 1), percent(1.0, 0)
     ('41.8 %', '100 %')
     """
-    return f"{100 * share:.{digits}f} %"
+    if digits is not None:
+        return f"{100 * share:.{digits}f} %"
+    if share > MOST_CHANCE:
+        return "over 99 %"
+    return "under 1 %" if share < LEAST_CHANCE else f"{100 * share:.0f} %"

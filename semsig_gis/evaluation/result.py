@@ -148,7 +148,7 @@ class Evaluation(Displayed):
     def _facts(self) -> dict[str, object]:
         means = self.means()
         near = means.loc[[f"p{self.success_metres}"], ["value", "low", "high"]].to_numpy()[0]
-        share, low, high = map(percent, near.tolist())
+        share, low, high = (percent(value, 1) for value in near.tolist())
         return {
             "queries": len(self.queries),
             "cells": self.database["cells"],
@@ -156,7 +156,7 @@ class Evaluation(Displayed):
             "distortion": chain_text(self.asked.distortions) or "none",
             "best of": self.top,
             f"within {self.success_metres} m": f"{share} ({low} to {high})",
-            "recall@10 %": percent(means["value"]["recall10"]),
+            "recall@10 %": percent(means["value"]["recall10"], 1),
             "CRS": self.database["crs"],
         }
 

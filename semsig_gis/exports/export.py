@@ -59,6 +59,7 @@ _ONE_LAYER: Mapping[str, Callable[..., None]] = {
     ".geojson": write_geojson,
     ".csv": write_csv,
 }
+RASTER_FACTS = ("query", "north", "prior", "elsewhere", "fit", "notes")
 _RASTER = frozenset({".tif", ".tiff"})
 _TILES = ".pmtiles"
 # Accepted layers or rasters by suffix; the first is the default.
@@ -413,7 +414,7 @@ def export_answer(
     regions = search_regions(answer, database, share=share, within=within)
     if suffix in _RASTER and answer.chances is not None:
         facts = answer.to_dict()
-        facts = {name: facts[name] for name in ("query", "north", "prior", "notes")}
+        facts = {name: facts[name] for name in RASTER_FACTS}
         export_geotiff(database, answer.chances, path, name="posterior", facts=facts)
     elif suffix in _ANSWER:
         _ANSWER[suffix](answer_layers(answer, database, regions), path)

@@ -289,7 +289,7 @@ def answer_layers(
             candidates,
             name="candidates",
             title="Candidates",
-            description="The best cells for the query.",
+            description="The best places or cells for the query.",
             geometry="point",
             styles=(by_rank(str(answer.candidates.columns[0]), geometry="point"),),
         ),
@@ -298,6 +298,7 @@ def answer_layers(
         return layers
     row: dict[str, Any] = {"answer": "given" if facts["answered"] else "withheld"}
     row |= {name: value for name, value in place.items() if isinstance(value, (bool, int, float))}
+    row |= {name: np.nan if facts[name] is None else facts[name] for name in ("elsewhere", "fit")}
     points = gpd.points_from_xy([place["x"]], [place["y"]])
     estimate = layer(
         gpd.GeoDataFrame(pd.DataFrame([row]), geometry=points, crs=answer.crs),

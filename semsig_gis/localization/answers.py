@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from semsig_gis.core import LICENSES, Displayed, InputError, plot_with, to_degrees
+from semsig_gis.core import LICENSES, Displayed, InputError, percent, plot_with, to_degrees
 from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
@@ -29,17 +29,21 @@ if TYPE_CHECKING:
 
 REGION_SHARE = 0.9
 """Share of the probability in the region of an answer."""
+LEAST_ELSEWHERE = 0.1
+"""Least chance of being from elsewhere that an answer states."""
+LEAST_FIT = 0.01
+"""Goodness of fit below which a view fits badly."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(Displayed):
     """The best cells for a query, by any method.
 
-    `columns` describe the cells, best first: the rank, ``cell`` (row in the database), ``cell_id``,
-    ``x`` and ``y`` (viewpoint in `crs`), ``types`` (symbols), ``length`` (objects) and columns of
-    the method; `candidates` is a table of them. `cells` is the number of cells searched. `notes`
-    are sentences on parts of the query that were not used or look wrong. The bearings of `query`
-    are measured from `north`.
+    `columns` describe the cells, by likelihood those of distinct places, best first: the rank,
+    ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint in `crs`), ``types``
+    (symbols), ``length`` (objects) and columns of the method; `candidates` is a table of them.
+    `cells` is the number of cells searched. `notes` are sentences on parts of the query that were
+    not used or look wrong. The bearings of `query` are measured from `north`.
     """
 
     query: Signature
@@ -168,6 +172,19 @@ def query_notes(query: Signature, present: ArrayLike, taxonomy: Taxonomy) -> tup
     if not codes:
         return notes
     lacking = map(taxonomy.by_code, dict.fromkeys(codes))
-    legend = ", ".join(f"{item.symbol} ({item.title.lower()})" for item in lacking)
-    note = f"no cell of the database sees {legend}, so it counts as a false detection."
-    return (note, *notes)
+    legend = " and no ".join(f"{item.title.lower()} ({item.symbol})" for item in lacking)
+    used = "this object was" if len(codes) == 1 else f"these {len(codes)} objects were"
+    return (f"the map has no {legend}, so {used} not used.", *notes)
+
+
+def doubt_sentence(elsewhere: float, fit: float | None) -> str:
+    """Return a sentence on the chance that a view is from elsewhere and on how well it fits.
+
+    It is empty if both are unremarkable; see `Location` for the numbers.
+    """
+    worse = fit is not None and fit < LEAST_FIT
+    fits = f"worse than {1000.0 * (1.0 - (fit or 0.0)):,.0f} of 1,000 simulated views from there"
+    if elsewhere < LEAST_ELSEWHERE:
+        return f"The view fits the best place badly: {fits}." if worse else ""
+    badly = f"; it fits the best place {fits}" if worse else ""
+    return f"The view may not be from this area: chance {percent(elsewhere)}{badly}."

@@ -48,7 +48,7 @@ class Locator(Protocol[_Answer_co]):
     def locate(self, query: Signature, *, top: int | None = None) -> _Answer_co:
         """Return the answer to a query; `top` replaces the number of candidates of the locator.
 
-        Objects of a class that no cell sees count as false detections, with a note in the answer.
+        Objects of a class that no cell sees are not used; a note in the answer says so.
         Raises InputError if the query lacks a part that the method needs.
         """
 
@@ -220,8 +220,7 @@ def localize(
         method also searches between the centres of cells if a city has a store of street objects.
     query : Signature
         The objects that a person or a detector saw, possibly none; types or bearings may be
-        unknown. Objects of a class that no cell sees are false detections, with a note in the
-        answer.
+        unknown. Objects of a class that no cell sees are not used, with a note in the answer.
     method : str, Method or LikelihoodMethod, default "likelihood"
         How the cells are ranked, or its text (see `parse_method`), such as ``"edit+edit:5%"``. A
         fusion uses one part if the query has only this one.

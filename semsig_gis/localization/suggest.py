@@ -178,7 +178,7 @@ def unplaced_prior(
     counts = _class_counts(query)
     weights = np.ones(len(database.type_sequences))
     for code in unplaced:
-        if code in index.table.codes:  # other classes are false detections at every cell
+        if code in index.table.codes:  # classes that the map lacks are not used
             weights *= _yes_chances(index, code, counts[code])
         counts[code] += 1
     for code in absent:
@@ -199,8 +199,12 @@ def with_unplaced(
         return locator
     by_code = locator.index.database.taxonomy.by_code
     prior = unplaced_prior(locator.index, query, unplaced, absent=absent)
+    used = locator.index.table.codes
     titles = {
-        name: [by_code(code).title.lower() for code in codes]
+        name: [
+            by_code(code).title.lower() + ("" if code in used else " (not used, the map has none)")
+            for code in codes
+        ]
         for name, codes in (("seen", unplaced), ("absent", absent))
         if codes
     }

@@ -121,5 +121,5 @@ def _text(column: str, value: Any) -> str | None:  # noqa: ANN401 - any type of 
     if column == "types":
         return str(value)
     number = float(value)  # KML and CSV contain texts
-    texts = {"chance": f"{percent(number, 2)}", "km2": f"{number:.4g}"}
+    texts = {"chance": percent(number), "km2": f"{number:.4g}"}
     return texts.get(column, f"{number:.0f}")

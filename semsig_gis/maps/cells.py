@@ -366,13 +366,13 @@ def ambiguity_legend(sizes: Mapping[str, NDArray[np.int64]], *, licenses: Sequen
     for (name, size), line in zip(sizes.items(), shares, strict=True):
         rows = "".join(
             f"<tr><td>{swatch(colour, LIFTING)}{label}</td>"
-            f"<td class='count'>{percent(share)}</td></tr>"
+            f"<td class='count'>{percent(share, 1)}</td></tr>"
             for colour, label, share in zip(
                 GROUP_COLOURS.values(), group_labels(), line, strict=True
             )
         )
         scale = (
-            f"<p><b>{percent(line[0])}</b> of {len(size):,} cells look like no other<br>"
+            f"<p><b>{percent(line[0], 1)}</b> of {len(size):,} cells look like no other<br>"
             f"How many cells have the {escape(name.lower())}</p><table>{rows}</table>"
         )
         scales.append(layer_part(name, scale))
@@ -391,7 +391,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
     query = "query" if view == FULL_TURN else f"photo of {view:g} degrees"
     bands = "<br>".join(
         f"{percent(band['from'], 0)} to {percent(band['to'], 0)}: "
-        f"{percent(band['share'])} of the cells"
+        f"{percent(band['share'], 1)} of the cells"
         for band in reversed(facts["bands"])
     )
     classes = "".join(
@@ -407,7 +407,7 @@ def identifiability_legend(identifiability: Identifiability) -> str:
     )
     return (
         "<summary>Where a query can be placed</summary>"
-        f"<p><b>{percent(facts['chance_found'])}</b> chance to answer a {query} {within}<br>"
+        f"<p><b>{percent(facts['chance_found'], 1)}</b> chance to answer a {query} {within}<br>"
         f"Mean of {facts['cells']:,} cells, "
         f"{method_text(escaped_text(facts['noise']) + ' noise')}<br>"
         "Click a cell to see what it is mistaken for</p>"

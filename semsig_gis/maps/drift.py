@@ -223,13 +223,13 @@ def drift_legend(
     total = sum(len(rows) for rows, _ in kinds.values())
     lines = "".join(
         f"<tr><td>{swatch(colour, FLIPPING if kind == 'same' else LIFTING)}{kinds[kind][1]}</td>"
-        f"<td>{len(kinds[kind][0]):,}</td><td>{percent(len(kinds[kind][0]) / total)}</td></tr>"
+        f"<td>{len(kinds[kind][0]):,}</td><td>{percent(len(kinds[kind][0]) / total, 1)}</td></tr>"
         for kind, colour in DRIFT_COLOURS.items()
     )
     changed = 1.0 - len(cells.same) / total
     return (
         "<summary>What has changed</summary>"
-        f"<p><b>{percent(changed)}</b> of {total:,} cells see something else<br>"
+        f"<p><b>{percent(changed, 1)}</b> of {total:,} cells see something else<br>"
         "Click a cell to see what it saw before</p>"
         f"{layer_part('What has changed', f'<table>{lines}</table>')}"
         f"{'' if objects is None else _object_changes(objects, taxonomy)}"

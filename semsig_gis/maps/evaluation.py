@@ -301,7 +301,7 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
     successes = int(evaluation.successful.sum())
     best = "the best candidate" if evaluation.top == 1 else f"the best of {evaluation.top:,}"
     shares = "".join(
-        f"<tr><td>P(error ≤ {threshold} m)</td><td>{percent(share)}</td></tr>"
+        f"<tr><td>P(error ≤ {threshold} m)</td><td>{percent(share, 1)}</td></tr>"
         for threshold, share in zip(ERROR_BREAKS, evaluation.cdf(ERROR_BREAKS), strict=True)
     )
     limits = [f"{percent(least, 0)}" for least in FAILURES if least]
@@ -316,9 +316,10 @@ def evaluation_legend(evaluation: Evaluation, *, radius: float, licenses: Sequen
         f"{class_bar(list(FAILURES.values()), limits)}"
         f'<i class="hatched"></i>fewer than {ENOUGH_QUERIES:g} queries count</p>'
     )
+    share = percent(evaluation.cdf([Evaluation.success_metres])[0], 1)
     return (
         "<summary>Localization errors</summary>"
-        f"<p><b>{percent(evaluation.cdf([Evaluation.success_metres])[0])}</b> of {count:,} queries "
+        f"<p><b>{share}</b> of {count:,} queries "
         f"{within}<br>{method_text(f'{escape(str(evaluation.method))}, {best}')}<br>"
         f"Distortion: {escaped_text(distortions or 'none')}</p>"
         f"{layer_part('Successful queries', successful)}"

@@ -54,7 +54,7 @@ Image = tuple[bytes, list[list[float]]]  # a PNG, and latitudes and longitudes o
 PLACE_FIELDS = ("Chance", "Place", "Standard deviation", "North of the query", "Cell")
 BEST_FIELDS = ("Chance", "Cell sees", "Cell", "Place")
 CANDIDATE_FIELDS = (
-    *("Query", "Cell sees", "Chance", "Log-likelihood"),
+    *("Query", "Cell sees", "Chance", "Chance of the cell", "Log-likelihood"),
     *("North of the query", "Cell", "Place"),
 )
 OBJECT_FIELDS = (
@@ -78,7 +78,6 @@ RAYS: dict[str, tuple[str, dict[str, object]]] = {
 }
 CANDIDATE = "#ffffff"
 SECTOR = {"color": "#404040", "weight": 1.5, "opacity": 0.9, "dashArray": None}
-BEST_PLACE = "The best place has the most chance around it; ranks are of single cells."
 REGION_COLOURS = [CHANCES[share] for share in sorted(CHANCES, reverse=True)]
 SURROUNDINGS_M = 45.0  # smallest distance that is shown around the answer
 CLOSEST_ZOOM = 20
@@ -256,7 +255,7 @@ class _LocationLayers:
         details = [
             f"{percent(location.answer.mass)} within {location.rule.radius:g} m",
             _position(centre),
-            f"{place.sigma:.1f} m each way; 90 %: {ellipse}",
+            f"if there, {place.sigma:.1f} m each way; 90 %: {ellipse}",
             _north(place.heading, place.heading_sigma),
             str(location.cell_id),
         ]
@@ -279,13 +278,14 @@ class _LocationLayers:
             details = [
                 query_signature(query, taxonomy, radius=radius, place=place, turn=turn),
                 cell_signature(self.database, row["cell"], query, turn, place=place),
-                f"{percent(row['chance'], 2)}",
+                percent(row["chance"]),
+                percent(row["cell_chance"]),
                 f"{row['loglik']:.2f}",
                 _north(row.get("heading")),
                 str(row["cell_id"]),
                 _position(place),
             ]
-            name = f"Rank {row['rank']:,} of {len(self.database):,}"
+            name = f"Rank {row['rank']:,}"
             records.append([place, CANDIDATE, 8, name, details, str(row["rank"])])
         return records
 
@@ -366,11 +366,13 @@ def _notes(answer: Answer) -> str:
 def location_legend(location: Location) -> str:
     """Return the legend of `location_map` as HTML with data escaped."""
     posterior, answer, estimate = location.posterior, location.answer, location.estimate
-    mark, verdict, note = (
-        (ANSWERS["given"], "The answer", "")
+    mark = ANSWERS["given" if answer.given else "withheld"]
+    verdict = (
+        "The answer"
         if answer.given
-        else (ANSWERS["withheld"], "Cannot tell; the best place", f"<p>{BEST_PLACE}</p>")
+        else f"Cannot tell</b><br>{location.region_text}<br><b>The best place"
     )
+    doubt = f"<p>{location.doubt}</p>" if location.doubt else ""
     # The counted verdicts always, others only where they occur.
     verdicts = {row["verdict"] for item in location.explanations for row in item.rows}
     kinds = "".join(
@@ -386,7 +388,7 @@ def location_legend(location: Location) -> str:
         "<summary>Where it was seen</summary>"
         f"<p>{mark_svg(mark)} <b>{verdict}</b>: {percent(answer.mass)} within "
         f"{location.rule.radius:g} m<br>If there, ±&nbsp;{estimate.sigma:.1f}&nbsp;m each way "
-        f"(ellipse: 90 %)<br>{method_text(method)}</p>{note}{_notes(location)}"
+        f"(ellipse: 90 %)<br>{method_text(method)}</p>{doubt}{_notes(location)}"
         f"{_chances_legend(posterior)}"
         f"{layer_part('Candidates', f'<p>{swatch(CANDIDATE)}Candidates by rank</p>')}"
         f"{layer_part('Objects from rank ', rays) if location.explanations else ''}"

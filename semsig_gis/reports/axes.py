@@ -27,6 +27,7 @@ from semsig_gis.core import (
     extra,
     group_labels,
     nearest_name,
+    percent,
 )
 from semsig_gis.evaluation import PlotKind, chain_text
 from semsig_gis.localization import Location
@@ -415,9 +416,13 @@ def _draw_location(location: Location, *, ax: Axes | None, legend: bool) -> Axes
     region = np.vstack([database.xy[location.region], [[place.x, place.y]]])
     low, high = region.min(axis=0) - AROUND_M, region.max(axis=0) + AROUND_M
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    verdict = "The answer" if location.answer.given else "Cannot tell; the best guess"
-    chance = f"{100 * location.answer.mass:.1f} %"
-    axes.set_title(f"{verdict}\nwithin {location.rule.radius:g} m with a chance of {chance}")
+    chance = f"within {location.rule.radius:g} m with a chance of {percent(location.answer.mass)}"
+    if location.answer.given:
+        axes.set_title(f"The answer\n{chance}")
+    else:
+        lines = "Cannot tell", location.region_text, f"Best place: {chance}"
+        axes.set_title("\n".join(lines), fontsize="medium")
+    axes.set_xlabel(location.doubt, wrap=True)
     _frame(axes)
     return axes
 

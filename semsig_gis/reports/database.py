@@ -39,8 +39,8 @@ def _occurrence_table(facts: Mapping[str, Any]) -> Table:
         ("Class (symbol)", "Number", "Share", paris.COLUMN, "Share"),
         tuple(
             (
-                *(class_label(item), f"{item['number']:,}", percent(item["share"])),
-                *(("", "") if number is None else (f"{number:,}", percent(number / total))),
+                *(class_label(item), f"{item['number']:,}", percent(item["share"], 1)),
+                *(("", "") if number is None else (f"{number:,}", percent(number / total, 1))),
             )
             for item, number in zip(items, numbers, strict=True)
         ),
@@ -156,7 +156,7 @@ def _statistic_text(name: str, value: float | None) -> str:
     if value is None:
         return ""
     if name == "alone":
-        return percent(value)
+        return percent(value, 1)
     if name == "entropy_bits":
         return f"{value:.2f}"
     return f"{value:,.1f}" if name in {"mean", "std"} else f"{value:,g}"

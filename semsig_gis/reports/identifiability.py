@@ -39,10 +39,10 @@ def identifiability_tables(
     """
     facts = identifiability.summary(object_counts=object_counts)
     within = f"within {facts['radius_m']:g} m"
-    cells = {label: percent(share) for label, share in _cell_chances(facts).items()}
+    cells = {label: percent(share, 1) for label, share in _cell_chances(facts).items()}
     bits = {"bits left": f"{facts['bits_left']:.2f} of {facts['cell_bits']:.2f}"}
     bands = {
-        f"cells found {within} with a chance of {band}": percent(share)
+        f"cells found {within} with a chance of {band}": percent(share, 1)
         for band, share in _band_shares(facts).items()
     }
     whole = Table(
@@ -76,13 +76,14 @@ def check_tables(check: IdentifiabilityCheck) -> tuple[Table, ...]:
         {
             "Chance to be found": [f"{item.low:g} to {item.high:g}" for item in check.bins],
             "Queries": [f"{item.queries:,}" for item in check.bins],
-            "Stated": [percent(item.stated) for item in check.bins],
-            "Found": [percent(item.true) for item in check.bins],
+            "Stated": [percent(item.stated, 1) for item in check.bins],
+            "Found": [percent(item.true, 1) for item in check.bins],
             "Interval (95 %)": [
-                f"{percent(item.true_low)} to {percent(item.true_high)}" for item in check.bins
+                f"{percent(item.true_low, 1)} to {percent(item.true_high, 1)}"
+                for item in check.bins
             ],
         },
-        f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",
+        f"Of {check.queries:,} fresh queries, {percent(check.found, 1)} were found.",
     )
     names = [SCORES[name] for name in check.correlations]
     values = [figure(value, "+.3f") for value in check.correlations.values()]
@@ -208,7 +209,7 @@ def _calibration_section(check: IdentifiabilityCheck) -> Section:
     return Section(
         name="calibration",
         title="Do the chances come true?",
-        text=(f"Of {check.queries:,} fresh queries, {percent(check.found)} were found.",),
+        text=(f"Of {check.queries:,} fresh queries, {percent(check.found, 1)} were found.",),
         numbers=tuple(numbers),
         plots=(plot,),
     )

@@ -49,15 +49,17 @@ def answer_drawing(
     database, estimate = location.posterior.database, location.estimate
     levels = region_levels(location.posterior)
     image, bounds = pixels.image(pixels.levels(levels), REGION_COLOURS, effort=1)
-    entropy = location.posterior.entropy
     parts = _AnswerParts(location, question, table, shares)
     return {
         "given": location.answer.given,
         "mass": location.answer.mass,
         "radius": location.rule.radius,
-        "entropy": entropy,
-        "places_left": 2.0**entropy,
+        "entropy": location.posterior.entropy,
+        "doubt": location.doubt,
+        "elsewhere": location.elsewhere,
+        "fit": location.fit,
         "region": {
+            "text": location.region_text,
             "image": data_url(image),
             "bounds": bounds,
             "counts": {
@@ -181,7 +183,7 @@ class _AnswerParts:
             if verdict == "matched":
                 share = max(float(self.shares[self.codes[kind]]), LEAST_SHARE)
                 weight = -chance * math.log2(share)
-                text = f"{title}: the map has one there; {percent(share)} of the cells see one"
+                text = f"{title}: the map has one there; {percent(share, 1)} of the cells see one"
             elif verdict == "misnamed":
                 odds = float(self.table.misnamed[length, class_row])
                 weight = chance * math.log2(max(odds, LEAST_SHARE))

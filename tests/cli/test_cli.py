@@ -448,7 +448,7 @@ def test_every_query_has_an_answer_or_an_error(city: Path, run: Run, method: str
     assert [answer["line"] for answer in answers] == [1, 2, 3, 4]
     assert [answer["id"] for answer in answers] == [1, 2, "\ud800", 4]
     assert ["error" in answer for answer in answers] == [False, True, True, False]
-    assert "X (crossing)" in answers[0]["notes"][0]
+    assert "crossing (X)" in answers[0]["notes"][0]
     assert "nothing was seen" in answers[3]["notes"][0]
     (city / "queries.jsonl").write_text(rows[1])
     code, out, err = run(*batch)
@@ -461,7 +461,7 @@ def test_every_query_has_an_answer_or_an_error(city: Path, run: Run, method: str
 @pytest.mark.usefixtures("city")
 @pytest.mark.parametrize("method", ["edit+edit", "likelihood"])
 @pytest.mark.parametrize(
-    ("view", "words"), [("--types X", "X (crossing)"), ("--bearings=", "nothing was seen")]
+    ("view", "words"), [("--types X", "crossing (X)"), ("--bearings=", "nothing was seen")]
 )
 def test_unknown_class_and_empty_query_are_answered(
     run_ok: RunOk, method: str, view: str, words: str

@@ -83,12 +83,12 @@ def test_answer_and_priors_are_printed(city: Path, run: Run) -> None:
     assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 10.0
     assert "explanation" not in answer["candidates"][0]
     out = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)[1]
-    for words in ("2 best of", "Estimated position: x", "North of the query: "):
+    for words in ("2 best places in", "Position: x", "North of the query: ", "over 99 %"):
         assert words in out
     code, out, _ = run("localize", city, "--types", VIEW["types"][:1])
     assert code == 0
-    assert "Cannot tell: the best place is" in out
-    assert "of the chance is in" in out
+    assert "Cannot tell. 90 % region: " in out
+    assert out.index("Cannot tell") < out.index("Best place: ") < out.index("If it is there: x ")
     x, y = PLACE
     lon, lat = Transformer.from_crs(2154, 4326, always_xy=True).transform(x, y)
     query = "localize", city, *options(VIEW), "--near", f"{lon},{lat},15"

@@ -227,9 +227,8 @@ def test_likelihood_ranks_the_answer_first_then_cells_by_likelihood(top: int) ->
             assert all(math.isnan(row[name]) for name in ("chance", "right", "in_region"))
             assert (row["error_m"], row["rank_low"]) == (math.inf, 150)
             continue
-        location = locate(INDEX, query, top=len(DATABASE))
-        answer = location.answer.cell
-        loglik = location.candidates.set_index("cell")["loglik"].sort_index().to_numpy()
+        location = locate(INDEX, query)
+        answer, loglik = location.answer.cell, location.loglik.astype(np.float64)
         scores = -loglik.astype(np.float32)
         assert row["tied"] == 1
         assert row["best_cell_id"] == DATABASE.cell_ids[answer]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization import Localization, Location
 
 CITY, _ = small_city()
-LOCATION = small_location()
+LOCATION = small_location().doubted(0.25, 0.004)
 KML = "{http://www.opengis.net/kml/2.2}"
 
 
@@ -60,6 +60,7 @@ def test_file_contains_all_layers_of_an_answer(
         assert row.answer == ("given" if LOCATION.answer.given else "withheld")
         assert float(row.sigma) == pytest.approx(estimate.sigma)
         assert bool(row.refined) is estimate.refined
+        assert [float(row.elsewhere), float(row.fit)] == [0.25, 0.004]
 
 
 def test_files_have_the_licences_and_load_no_other_files(tmp_path: Path) -> None:

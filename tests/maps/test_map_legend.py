@@ -78,6 +78,7 @@ def legends(city: SignatureDatabase, objects: StreetObjects, name: str) -> dict[
         "localization_by_bearings": localization_legend(by_bearings),
         "location": location_legend(locate(index, query, explained=1)),
         "location_unsure": location_legend(locate(index, query, rule=AnswerRule(threshold=2.0))),
+        "location_doubted": location_legend(locate(index, query).doubted(0.6, 0.002)),
         "identifiability": identifiability_legend(
             dataclasses.replace(chances_of(city), noise=noise)
         ),

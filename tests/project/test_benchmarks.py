@@ -75,6 +75,7 @@ FIGURES = [
 SHARES = [
     *("p5", "p25", "p50", "p50_low", "p50_high", "recall10pct", "chance"),
     *("in_exact_region", "in_region", "region_mass", "coverage", "precision"),
+    *("most_at_90", "most_at_95", "most_at_98"),
 ]
 # Parts of the method and the setting of a row, and the number of rows with both.
 ROWS = {

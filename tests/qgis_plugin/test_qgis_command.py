@@ -335,10 +335,14 @@ def test_answer_lines_report_ties_place_and_regions() -> None:
     ]
     searched = {"regions": 1, "cells": 13, "km2": 0.0013, "percent": 0.00493, "chance": 0.951}
     place = {"within_m": 50.0, "chance": 0.05}
-    placed = {"answered": False, "place": place, "candidates": [], "searched": searched}
+    region = {"text": "90 % region: 13 cells, 1,300 m², in 2 places"}
+    placed = {"answered": False, "doubt": "It is foggy.", "region": region, "place": place}
+    placed |= {"candidates": [], "searched": searched}
     assert answer_lines(placed) == [
-        "Cannot tell: the best place is within 50 m of the ellipse's middle with a chance of 5.0%.",
-        "To search: 1 region, 0.0013 km2, 0.00493 % of the city, with 95.1% of the chance.",
+        "Cannot tell. 90 % region: 13 cells, 1,300 m², in 2 places.",
+        "It is foggy.",
+        "The best place is within 50 m of the ellipse's middle: chance 5 %.",
+        "To search: 1 region, 0.0013 km2, 0.00493 % of the city, with 95 % of the chance.",
     ]
     del searched["chance"]
     ranked = {"candidates": [{"rank_high": 1200}], "tied_beyond": 0, "searched": searched}

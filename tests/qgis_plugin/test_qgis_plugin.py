@@ -370,7 +370,7 @@ def test_second_run_into_the_same_files_updates_the_layers(session: dict[str, An
     assert tied.endswith("further cells tie with the last candidate.")
     assert searched.startswith("To search: ")
     placed, searched = second["infos"][-2:]
-    assert "m of the ellipse's middle with a chance of" in placed
+    assert "m of the ellipse's middle: chance " in placed
     assert searched.startswith("To search: ")
 
 

@@ -44,7 +44,7 @@ def test_a_table_is_markdown() -> None:
 
 
 def test_numbers_as_text() -> None:
-    assert percent(1.0) == "100.0 %"
+    assert percent(1.0, 1) == "100.0 %"
     values = (None, math.nan, math.inf, 1234.56)
     assert [figure(value, ",.1f") for value in values] == ["", "", "infinite", "1,234.6"]
     assert interval(math.nan, math.nan) == ""

@@ -208,11 +208,11 @@ def test_camera_and_place_come_from_exif(
     workbench.mark(photos[0], 0)
     # Its place can be used.
     assert "--near" not in workbench.ask("return semsig.session.answer.command")
-    places_left = workbench.ask("return semsig.session.answer.places_left")
+    entropy = workbench.ask("return semsig.session.answer.entropy")
     workbench.press("#near")
     workbench.settle()
     assert workbench.ask("return semsig.session.body().near") == [*photo["place"], 50]
-    assert workbench.ask("return semsig.session.answer.places_left") < places_left
+    assert workbench.ask("return semsig.session.answer.entropy") < entropy
     workbench.one("#near-metres").send_keys(Keys.CONTROL, "a")
     workbench.type("20", Keys.ENTER)
     command = workbench.ask("return semsig.session.answer.command")
@@ -241,12 +241,12 @@ def test_next_question_is_shown_and_answered(
     workbench.press("#question button", "Ask another")
     second = workbench.question()
     assert second != first
-    before = workbench.ask("return semsig.session.answer.places_left")
+    before = workbench.ask("return semsig.session.answer.entropy")
     workbench.press("#question button", "No")
     assert workbench.question() != second
     (absent,) = workbench.all("#question .absent button")
     assert absent.text.startswith("No ")
-    assert workbench.ask("return semsig.session.answer.places_left") < before
+    assert workbench.ask("return semsig.session.answer.entropy") < before
     absent.click()
     workbench.settle()
     assert workbench.ask("return semsig.session.absent") == []

@@ -122,7 +122,13 @@ they rank cells by a distance, and cells that look the same share a rank.
                 "With likelihood and an uncertain north, the standard deviation.",
             ),
             area("With likelihood: polygons that the place lies in."),
-            whole_number("TOP", "Number of candidates", 10, (1, 10_000), "How many cells to list."),
+            whole_number(
+                "TOP",
+                "Number of candidates",
+                10,
+                (1, 10_000),
+                "How many places (with likelihood) or cells to list at most.",
+            ),
             advanced(
                 described(
                     QgsProcessingParameterString("REQUIRE", "A cell must see", optional=True),
@@ -130,7 +136,7 @@ they rank cells by a distance, and cells that look the same share a rank.
                     "objects or fewer).",
                 )
             ),
-            described(candidates, "The best cells."),
+            described(candidates, "The best places or cells."),
             described(
                 place,
                 "With likelihood: the ellipse in which the place lies with a chance of 90 %, if "

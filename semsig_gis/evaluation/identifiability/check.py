@@ -94,7 +94,7 @@ class IdentifiabilityCheck(Displayed):
     def _facts(self) -> dict[str, object]:
         return {
             "queries": self.queries,
-            "found": percent(self.found),
+            "found": percent(self.found, 1),
             "correlation": f"{self.correlations['found']:.2f}",
             "attainable": f"{self.attainable:.2f}",
             "seed": self.seed,

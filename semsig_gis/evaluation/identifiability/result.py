@@ -111,7 +111,7 @@ class Identifiability(Displayed):
         return {
             "cells": len(self.database),
             "noise": self.noise.name,
-            f"found within {self.radius:g} m": f"{percent(self.found.mean())} for the mean cell",
+            f"found within {self.radius:g} m": f"{percent(self.found.mean(), 1)} for the mean cell",
             "bits left": f"{self.bits.mean():.1f} of {np.log2(len(self.database)):.1f}",
             "view": f"{self.view:g}°",
             "trials": self.trials,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from semsig_gis.localization.likelihood.posterior import Posterior
+    from semsig_gis.localization.likelihood.posterior import Places, Posterior
 
 STARTS = 4
 """Starting points of the thresholds that are tried, from strict to loose."""
@@ -91,9 +91,13 @@ class AnswerRule:
         """Whether to answer, by the chance that the place is near the best one."""
         return bool(mass >= self.threshold)
 
-    def decide(self, posterior: Posterior) -> Decision:
-        """Return the best place, its chance, and whether it is the answer."""
-        cell, mass = posterior.best_place(self.radius)
+    def decide(self, posterior: Posterior, *, places: Places | None = None) -> Decision:
+        """Return the best place, its chance, and whether it is the answer.
+
+        The `places` of the posterior are computed if not given.
+        """
+        best = posterior.places(1, radius=self.radius) if places is None else places
+        cell, mass = int(best.centres[0]), round(float(best.chances[0]), 9)
         x, y = posterior.database.xy[cell].tolist()
         return Decision(cell=cell, x=x, y=y, mass=mass, given=self.answers(mass))
 

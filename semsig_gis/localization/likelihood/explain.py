@@ -49,14 +49,15 @@ COLUMNS = [
 class Explanation(Displayed):
     """Which objects a query and a place have in common, and which not.
 
-    `rows` has a row for each object of the query, then one for each street object that is probably
-    none of them; `table` is a table of these rows. `verdict` is ``"matched"`` (more likely an
-    object than not), ``"misnamed"`` (the same, but of another class), ``"false"``, ``"missed"`` or,
-    for street objects in the sectors of no photo, ``"outside"``; `chance` is the probability of
-    the verdict. `query`, `photo` and `object` are row numbers, `distance` and `query_range`, if
-    given, are in metres, `bearing_error` is in degrees clockwise from object to detection, and
-    `place` that of the street object. Values that do not apply are None. `place` and `xy` are in
-    metres in `crs`, `headings` are the degrees added to the bearings of each photo.
+    `rows` has a row for each object of the query of a class that the map has, then one for each
+    street object that is probably none of them; `table` is a table of these rows. `verdict` is
+    ``"matched"`` (more likely an object than not), ``"misnamed"`` (the same, but of another class),
+    ``"false"``, ``"missed"`` or, for street objects in the sectors of no photo, ``"outside"``;
+    `chance` is the probability of the verdict. `query`, `photo` and `object` are row numbers,
+    `distance` and `query_range`, if given, are in metres, `bearing_error` is in degrees clockwise
+    from object to detection, and `place` that of the street object. Values that do not apply are
+    None. `place` and `xy` are in metres in `crs`, `headings` are the degrees added to the bearings
+    of each photo.
     """
 
     rows: tuple[dict[str, Any], ...]
@@ -146,8 +147,8 @@ def explain(
     The query, perhaps a `View`, needs bearings; its types may be unknown. `xy` and `radius` are in
     metres, `heading` is in degrees to add to the bearings, one for all or one for each photo, and
     objects behind `footprints` are not visible. Chances are sums over all one-to-one associations;
-    each model of a mixture is weighted by the likelihood of the query at this place. An object of a
-    class that the city does not have is false; a query without any other raises `InputError`.
+    each model of a mixture is weighted by the likelihood of the query at this place. Objects
+    of classes that the city does not have are left out; a query of no others raises `InputError`.
     """
     x, y = map(float, xy)
     place = np.array([[x, y]])
@@ -280,12 +281,13 @@ class _Scene:
     def _detection_rows(
         self, query: View, chances: NDArray[np.float64], partners: dict[int, int]
     ) -> list[dict[str, Any]]:
-        """Return a row for each object of the query."""
+        """Return a row for each object of the query of a known class."""
         bearings = query_bearings(query)
         codes = query.class_scores().argmax(axis=1)
         ranges = np.full(len(query), np.nan) if query.ranges is None else query.ranges
         rows = []
-        for number, (code, metres) in enumerate(zip(codes.tolist(), ranges.tolist(), strict=True)):
+        for number in np.flatnonzero(query.among(self.codes)).tolist():
+            code, metres = int(codes[number]), float(ranges[number])
             row: dict[str, Any] = {
                 "verdict": "false",
                 "chance": max(1.0 - float(chances[:, number].sum()), 0.0),

@@ -9,18 +9,21 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
 from semsig_gis.core import InputError, cell_ids, crs_label, map_with, percent, to_degrees
 from semsig_gis.localization.answers import (
+    LEAST_ELSEWHERE,
     REGION_SHARE,
     Answer,
     Ranking,
     candidate_columns,
     check_top,
+    doubt_sentence,
     query_notes,
 )
 from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
@@ -52,12 +55,15 @@ if TYPE_CHECKING:
     from semsig_gis.localization.likelihood.explain import Explanation
     from semsig_gis.localization.likelihood.incremental import IncrementalIndex
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
-    from semsig_gis.localization.likelihood.posterior import Refinement
+    from semsig_gis.localization.likelihood.posterior import Places, Refinement
     from semsig_gis.observation import Leg, North
 
 DISAGREEMENT = 0.01
 """Ratio of a prior (see `posterior.prior_ratio`) at or below which an answer warns of it."""
 LARGE_POWER = 4  # of ten; larger numbers are written as powers
+MOST_PLACES = 100
+"""Most places of a region that are counted."""
+ROUNDING = 1e-9
 TINY = np.finfo(np.float64).tiny
 
 
@@ -73,21 +79,22 @@ class Location(Answer):
     noise : str
         Name of the noise model.
     columns : mapping of str to ndarray
-        The columns of `candidates`, the likeliest cells, likeliest first: ``rank`` (from 1),
-        ``cell`` (row in the database), ``cell_id``, ``x`` and ``y`` (viewpoint, CRS of the
-        database), ``types`` (symbols), ``length`` (objects), ``loglik`` (natural logarithm of the
-        likelihood), ``chance`` and, if north was not known exactly, ``heading`` (degrees to add to
-        the bearings of the query).
+        The columns of `candidates`, distinct places (see `Posterior.places`), likeliest first, each
+        by its likeliest cell: ``rank`` (from 1), ``cell`` (row in the database), ``cell_id``, ``x``
+        and ``y`` (viewpoint, CRS of the database), ``types`` (symbols), ``length`` (objects),
+        ``loglik`` (natural logarithm of the likelihood), ``chance`` of the place, ``cell_chance``
+        of the cell and, if north was not known exactly, ``heading`` (degrees to add to the bearings
+        of the query).
     answer : Decision
-        The cell around which the chance is largest, that chance, and whether it is enough.
+        The centre of the first place, its chance, and whether it is enough.
     estimate : PlaceEstimate
-        The place around that cell and the heading, each with its uncertainty.
+        The place around that cell and the heading, each with its uncertainty, if it is there.
     rule : AnswerRule
         The rule of the decision.
     region : ndarray of int64
         Row numbers of the fewest cells that contain 90 % of the chance, likeliest first.
     posterior : Posterior
-        The chance of every cell.
+        The chance of every cell, if the view is from the area of the database.
     loglik : ndarray of float, shape (n,)
         Natural logarithm of the likelihood of every cell.
     explanations : tuple of Explanation
@@ -97,6 +104,12 @@ class Location(Answer):
     prior_ratio : float or None
         Ratio of the likelihoods of the query with the prior and with a uniform one; None without
         a prior.
+    elsewhere : float
+        Chance that the view is not from the area of the database; the chances of places and of the
+        answer add up to the rest.
+    fit : float or None
+        Share of simulated views from the best place that fit it worse than the query; None if not
+        computed. Below 0.01, the query fits badly.
 
     Examples
     --------
@@ -117,18 +130,59 @@ class Location(Answer):
     explanations: tuple[Explanation, ...] = ()
     known: Mapping[str, Any] = field(default_factory=dict)
     prior_ratio: float | None = None
+    elsewhere: float = 0.0
+    fit: float | None = None
 
     def _facts(self) -> dict[str, object]:
-        return {
-            "answer": "yes" if self.answer.given else "cannot tell",
-            "place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
-            "give or take": f"{self.estimate.sigma:.1f} m",
+        sure = self.answer.given
+        region = {"region": f"{len(self.region):,} of {self.cells:,} cells"}
+        place = {
+            "place" if sure else "best place": f"{self.estimate.x:.1f}, {self.estimate.y:.1f}",
+            "give or take" if sure else "if there, give or take": f"{self.estimate.sigma:.1f} m",
             f"within {self.rule.radius:g} m": percent(self.answer.mass),
-            "region": f"{len(self.region):,} of {self.cells:,} cells",
+        }
+        return {
+            "answer": "yes" if sure else "cannot tell",
+            **({"doubt": self.doubt} if self.doubt else {}),
+            **(place | region if sure else region | place),
             "candidates": len(self.columns["cell"]),
             "noise": self.noise,
             "CRS": crs_label(self.crs),
         }
+
+    def doubted(self, elsewhere: float, fit: float | None = None) -> Location:
+        """Return the answer with these fields, and with the chances of places and the decision.
+
+        The answer itself must be one of a view from the area for sure.
+        """
+        here = 1.0 - elsewhere
+        mass = self.answer.mass * here
+        answer = replace(self.answer, mass=mass, given=self.rule.answers(mass))
+        chances = {name: self.columns[name] * here for name in ("chance", "cell_chance")}
+        columns = {**self.columns, **chances}
+        return replace(self, answer=answer, columns=columns, elsewhere=elsewhere, fit=fit)
+
+    @property
+    def doubt(self) -> str:
+        """A sentence on `elsewhere` and `fit`; empty if both are unremarkable."""
+        return doubt_sentence(self.elsewhere, self.fit)
+
+    @cached_property
+    def region_places(self) -> int | None:
+        """Number of distinct places with 90 % of the chance; None if there are over 100."""
+        chances = self.posterior.places(MOST_PLACES, radius=self.rule.radius).chances
+        count = int(np.searchsorted(np.cumsum(chances), REGION_SHARE - ROUNDING)) + 1
+        return count if count <= len(chances) else None
+
+    @property
+    def region_text(self) -> str:
+        """The size of the region: ``90 % region: 7 cells, 700 m², in 1 place``."""
+        if_here = ", if it is from this area" if self.elsewhere >= LEAST_ELSEWHERE else ""
+        cells, km2, places = len(self.region), self.region_km2, self.region_places
+        size = f"{km2:.3g} km²" if km2 >= 0.1 else f"{km2 * 1e6:,.0f} m²"  # noqa: PLR2004 - 10 ha
+        where = "many places" if places is None else f"{places} place{'' if places == 1 else 's'}"
+        number = f"{cells:,} cell{'' if cells == 1 else 's'}"
+        return f"{percent(REGION_SHARE)} region{if_here}: {number}, {size}, in {where}"
 
     @property
     def region_km2(self) -> float:
@@ -163,7 +217,8 @@ class Location(Answer):
         """Return everything except the chances of all cells as plain values for JSON.
 
         ``place`` has the keys of `PlaceEstimate.to_dict` and ``cell_id``, ``lon``, ``lat``,
-        ``chance`` and ``within_m``. ``threshold`` is None if no chance is enough. ``candidates``
+        ``chance`` and ``within_m``. ``threshold`` is None if no chance is enough. The ``places`` of
+        the ``region`` are None if there are over 100, and ``doubt`` may be empty. ``candidates``
         have the keys of `columns`, ``lon``, ``lat`` (degrees, WGS 84) and, for the first of them,
         ``explanation``, with bearings from ``north`` like those of the query. ``prior`` has the
         keys of `known` and ``ratio``; it is None without a prior.
@@ -188,7 +243,16 @@ class Location(Answer):
                 "within_m": self.rule.radius,
             },
             "threshold": threshold if math.isfinite(threshold) else None,
-            "region": {"share": REGION_SHARE, "cells": len(self.region), "km2": self.region_km2},
+            "elsewhere": self.elsewhere,
+            "fit": self.fit,
+            "doubt": self.doubt,
+            "region": {
+                "share": REGION_SHARE,
+                "cells": len(self.region),
+                "km2": self.region_km2,
+                "places": self.region_places,
+                "text": self.region_text,
+            },
             "entropy_bits": self.posterior.entropy,
             "prior": None
             if self.prior_ratio is None
@@ -294,7 +358,8 @@ class LikelihoodLocator:
             if not self.refined:  # all cells that are as good an answer
                 equal = np.flatnonzero(location.chances == location.chances[answer.cell])
                 masses = location.posterior.mass_within(self.rule.radius, equal)
-                best = equal[np.round(masses, 9) == answer.mass]
+                masses = np.round(masses, 9)
+                best = equal[masses == masses[equal == answer.cell]]
             scores[best] = scores.min() - 1.0
             yield Ranking(
                 scores=scores,
@@ -357,7 +422,8 @@ class LikelihoodLocator:
         if store is not None and len(usable):
             parts = self._parts(usable, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
-        answer = self.rule.decide(posterior)
+        places = posterior.places(top, radius=self.rule.radius)
+        answer = self.rule.decide(posterior, places=places)
         radius, sigma = self.rule.radius, self.north_sigma
         database, noise = self.index.database, self.index.noise
         estimate = None
@@ -374,7 +440,7 @@ class LikelihoodLocator:
                 north_sigma=sigma,
                 turned=not self.quick,
             )
-        columns = _columns(scores, posterior, min(top, len(scores.loglik)))
+        columns = _columns(scores, posterior, places)
         first = columns["cell"].tolist()[: self.explained if len(usable) else 0]
         return Location(
             query=query,
@@ -472,12 +538,12 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
         cells, it is ``cell_noise(noise, step)``.
     query : Signature
         The observed objects, perhaps none; types or bearings may be unknown. Objects of a class
-        that no cell sees are false detections, and the answer has a note on them.
+        that no cell sees are not used, and the answer has a note on them.
     **options : LocateOptions
         ``north_sigma`` is the standard deviation in degrees of the north of the query, 0 by
         default and infinite if it is not known; ``log_prior``, shape (n,), is a prior of the place
         (see `likelihood.priors`). The ``rule`` is when to answer, from a chance of 0.9 by default,
-        and ``top`` (10) the number of cells to list. The ``store`` has the street objects of the
+        and ``top`` (10) the most places to list. The ``store`` has the street objects of the
         cells: with ``refined``, the place is searched between the viewpoints as well, and the
         chance of a cell is the sum over its parts. ``explained`` (0) is the number of candidates
         to explain; without a store, street objects have no identifiers. ``known`` describes the
@@ -564,15 +630,15 @@ def _prior_notes(ratio: float | None) -> tuple[str, ...]:
     return (note,)
 
 
-def _columns(scores: CellScores, posterior: Posterior, count: int) -> dict[str, NDArray[Any]]:
-    """Return the likeliest cells, by column."""
-    database, chances = posterior.database, posterior.chances
-    listed = posterior.likeliest(count)
+def _columns(scores: CellScores, posterior: Posterior, places: Places) -> dict[str, NDArray[Any]]:
+    """Return distinct places with their likeliest cells, by column."""
+    listed = places.cells
     columns = {
-        "rank": np.arange(1, count + 1),
-        **candidate_columns(database, listed),
+        "rank": np.arange(1, len(listed) + 1),
+        **candidate_columns(posterior.database, listed),
         "loglik": scores.loglik[listed].astype(np.float64),
-        "chance": chances[listed],
+        "chance": places.chances,
+        "cell_chance": posterior.chances[listed],
     }
     if scores.heading is not None:
         columns["heading"] = scores.heading[listed].astype(np.float64)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,18 @@ ROUNDING = 1e-3  # of a sum of chances in a file of float32
 LIKELIEST_CELLS = 1000
 """Cells among which the best place is searched."""
 LEAST_POWER = -1100  # of two; smaller numbers are 0
+
+
+class Places(NamedTuple):
+    """Distinct places, likeliest first, shape (p,) each: no cell is in two of them.
+
+    `centres` are the rows of the cells in their middle, `cells` those of their likeliest cells, and
+    `chances` the sums over their cells.
+    """
+
+    centres: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    chances: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -132,12 +144,8 @@ class Posterior(Displayed):
         # The cells are ordered by column and row: in each column, the circle is one slice.
         ids = database.cell_ids
         before = np.concatenate([[0.0], np.cumsum(self.chances)])
-        # All cells are within the diagonal of the city.
-        most = np.hypot(np.ptp(database.columns), np.ptp(database.rows)) + 1.0
-        steps = min(radius / database.grid.step + 1e-9, float(most))
         total = np.zeros(len(columns))
-        for east in range(-math.floor(steps), math.floor(steps) + 1):
-            north = math.floor(math.sqrt(steps**2 - east**2))
+        for east, north in zip(*(part.tolist() for part in self._circle(radius)[1:]), strict=True):
             low = np.searchsorted(ids, cell_ids(columns + east, rows - north), side="left")
             high = np.searchsorted(ids, cell_ids(columns + east, rows + north), side="right")
             total += before[high] - before[low]
@@ -149,11 +157,53 @@ class Posterior(Displayed):
         It is the one of the thousand likeliest cells with the most chance within `radius` metres,
         of equals the likeliest.
         """
-        cells = np.sort(self.likeliest(LIKELIEST_CELLS))
-        # Rounded, so that equal sums stay equal.
-        mass = np.round(self.mass_within(radius, cells), 9)
-        best = np.lexsort((-self.chances[cells], -mass))[0]
-        return int(cells[best]), float(mass[best])
+        place = self.places(1, radius=radius)
+        return int(place.centres[0]), round(float(place.chances[0]), 9)
+
+    def places(self, count: int, *, radius: float = 50.0) -> Places:
+        """Return at most `count` distinct places that are possible, likeliest first.
+
+        A place is all cells at most `radius` metres from its centre that are in no earlier place.
+        Its centre is, of the thousand likeliest cells without those in earlier places, the one with
+        the most chance left within the radius, of equals the likeliest.
+        """
+        database, chances = self.database, self.chances
+        likely = self.likeliest(LIKELIEST_CELLS)
+        order = np.argsort(likely)
+        sums = np.empty(len(likely))
+        sums[order] = self.mass_within(radius, likely[order])
+        columns = database.columns[likely].astype(np.int64)
+        rows = database.rows[likely].astype(np.int64)
+        steps, east, north = self._circle(radius)
+        remaining, used = chances[likely] > 0, np.zeros(len(chances), np.bool_)
+        places: list[tuple[int, int, float]] = []
+        while len(places) < count and remaining.any():
+            # Rounded, so that equal sums stay equal.
+            best = int(np.where(remaining, np.round(sums, 9), -1.0).argmax())
+            column, row = columns[best] + east, rows[best]
+            low = np.searchsorted(database.cell_ids, cell_ids(column, row - north), side="left")
+            high = np.searchsorted(database.cell_ids, cell_ids(column, row + north), side="right")
+            inside = np.concatenate([np.arange(*ends) for ends in zip(low, high, strict=True)])
+            inside = inside[~used[inside]]
+            used[inside] = True
+            own = chances[inside]
+            places.append((int(likely[best]), int(inside[own.argmax()]), float(own.sum())))
+            away = (columns - columns[best]) ** 2 + (rows - rows[best]) ** 2
+            remaining &= away > steps**2
+            near = np.flatnonzero(remaining & (away <= (2.0 * steps) ** 2))
+            inside, own = inside[own > 0], own[own > 0]
+            apart = (columns[near, None] - database.columns[inside]) ** 2
+            apart += (rows[near, None] - database.rows[inside]) ** 2
+            sums[near] -= (apart <= steps**2) @ own
+        return Places(*map(np.array, zip(*places, strict=True)))
+
+    def _circle(self, radius: float) -> tuple[float, NDArray[np.int64], NDArray[np.int64]]:
+        """Return a radius in cells, the columns in its circle, and the last row in each."""
+        # All cells are within the diagonal of the city.
+        most = np.hypot(np.ptp(self.database.columns), np.ptp(self.database.rows)) + 1.0
+        steps = min(radius / self.database.grid.step + 1e-9, float(most))
+        east = np.arange(-math.floor(steps), math.floor(steps) + 1)
+        return steps, east, np.floor(np.sqrt(steps**2 - east**2)).astype(np.int64)
 
 
 def open_posterior(path: str | Path, database: SignatureDatabase) -> Posterior:

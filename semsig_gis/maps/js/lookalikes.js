@@ -2,7 +2,7 @@ semsig.cellFacts.lookalikes = (city, cell) => {
   const {data, grid} = city;
   const percent = (steps) => {
     const value = 100 * steps / grid.chances;
-    return value < 1 ? "below 1 %" : value > 99 ? "above 99 %" : `${Math.round(value)} %`;
+    return value < 1 ? "under 1 %" : value > 99.5 ? "over 99 %" : `${Math.round(value)} %`;
   };
   const bits = data.bits[cell] / grid.bits;
   const like = Number((2 ** bits).toPrecision(2));

@@ -1,31 +1,28 @@
 // The answer: as a sentence, on the map, as wheels, and the reasons for and against candidates.
-semsig.rounded = (count) => {
-  const unit = 10 ** Math.max(Math.floor(Math.log10(Math.max(count, 1))) - 1, 0);
-  return (Math.round(count / unit) * unit).toLocaleString("en");
-};
 semsig.coordinates = (place) => place.map((part) => part.toFixed(5)).join(", ");
 semsig.away = (metres) => (metres < 1000
   ? `${Math.round(metres)} m` : `${(metres / 1000).toFixed(1)} km`);
 semsig.percent = (share) => {
-  if (share > 0.995) return "more than 99\u00a0%";
-  return share < 0.01 ? "less than 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
+  if (share > 0.995) return "over 99\u00a0%";
+  return share < 0.01 ? "under 1\u00a0%" : `${Math.round(100 * share)}\u00a0%`;
 };
 // The answer as a sentence.
 semsig.sentence = ({answer, scenes}) => {
   if (!scenes.length) return "Nothing was seen yet: add a photo, a compass, or simulate a view.";
   if (answer?.error) return answer.error;
   if (!answer?.estimate) return "Nothing is marked yet: click what you see.";
-  const {given, mass, radius, estimate, places_left: left} = answer;
-  const text = given
+  const {given, mass, radius, estimate, region, doubt} = answer;
+  const verdict = given
     ? `Within ${radius} m of ${semsig.coordinates(estimate.place)} with a chance of `
       + `${semsig.percent(mass)}.`
-    : `Cannot tell yet: ${left < 1.5 ? "one place is" : `about ${semsig.rounded(left)} places are`}`
-      + ` left, and within ${radius} m of the best the chance is ${semsig.percent(mass)}.`;
+    : `Cannot tell yet. ${region.text}; within ${radius} m of the best the chance is `
+      + `${semsig.percent(mass)}.`;
+  const text = doubt ? `${verdict} ${doubt}` : verdict;
   if (!answer.truth) return text;
   const {found, metres, rank} = answer.truth;
-  const verdict = given ? (found ? "Found" : "Wrong") : "Not found";
+  const outcome = given ? (found ? "Found" : "Wrong") : "Not found";
   const ranked = rank === null ? "" : `, whose cell has rank ${rank.toLocaleString("en")}`;
-  return `${verdict}: the best place is ${semsig.away(metres)} from the true one${ranked}. ${text}`;
+  return `${outcome}: the best place is ${semsig.away(metres)} from the true one${ranked}. ${text}`;
 };
 semsig.Answer = class {
   constructor(session, map) {
@@ -156,7 +153,7 @@ semsig.Answer = class {
       const button = L.DomUtil.create("button", "");
       button.type = "button";
       semsig.text(button, "b", candidate.rank);
-      button.append(` ${candidate.chance < 0.01 ? "<1" : Math.round(100 * candidate.chance)} %`);
+      button.append(` ${semsig.percent(candidate.chance)}`);
       button.title = semsig.coordinates(candidate.place);
       button.setAttribute("aria-pressed", String(at === this.session.chosen));
       button.addEventListener("click", () => {

@@ -201,7 +201,7 @@ def test_rankings_cover_cells_of_all_parts(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", METHODS)
-def test_absent_class_is_false_detection(tmp_path: Path, text: str) -> None:
+def test_absent_class_is_not_used(tmp_path: Path, text: str) -> None:
     parted, method = in_parts(CITY, np.arange(len(CITY)) % 3, tmp_path), Method.parse(text)
     expected = localize(CITY, asked("D", [1.0]), method=method, top=100)
     for database in (parted, CITY):
@@ -209,7 +209,7 @@ def test_absent_class_is_false_detection(tmp_path: Path, text: str) -> None:
         pd.testing.assert_frame_equal(result.candidates, expected.candidates)
         assert len(result.query) == 2
         (note,) = result.notes
-        assert "M (bus stop)" in note
+        assert note == "the map has no bus stop (M), so this object was not used."
     assert not expected.notes
 
 

@@ -47,6 +47,8 @@ LONG = np.argsort(-CITY.lengths, kind="stable")[:20].tolist()
 CELLS = random_database(3)
 SHARP = NoiseSpec(detection=0.95, misnamed=0.02, clutter=0.5, bearing_sigma=3.0)
 PLACE = CORNER + np.array([103.0, 97.0])
+FROM_ELSEWHERE = "The view may not be from this area: chance 35 %"
+OF_VIEWS = "of 1,000 simulated views from there."
 
 
 def seen_from(xy: np.ndarray, *, objects: StreetObjects = STORE.objects) -> Signature:
@@ -74,10 +76,61 @@ def test_long_signatures_are_located() -> None:
         location = locate(INDEX, CITY.signature(cell), top=5)
         right += int(np.hypot(*(CITY.xy[cell] - [location.answer.x, location.answer.y])) <= 50)
         chances = location.candidates["chance"].to_numpy()
-        assert (np.diff(chances) <= 0).all()
+        assert (np.diff(chances) <= 1e-9).all()
         assert 0 < chances.sum() <= 1 + 1e-9
         assert location.candidates["rank"].tolist() == [1, 2, 3, 4, 5]
     assert right >= len(LONG) - 1
+
+
+def test_a_view_from_elsewhere_lowers_the_chances_of_all_places() -> None:
+    location = locate(INDEX, CITY.signature(LONG[0]))
+    assert location.answer.given
+    assert (location.elsewhere, location.fit, location.doubt) == (0.0, None, "")
+    doubted = location.doubted(0.6, 0.002)
+    assert not doubted.answer.given
+    assert doubted.answer.mass == pytest.approx(0.4 * location.answer.mass)
+    for name in ("chance", "cell_chance"):
+        assert doubted.columns[name] == pytest.approx(0.4 * location.columns[name])
+    assert doubted.candidates["chance"].sum() <= 0.4 + 1e-9
+    # Chances of cells and the region are those of a view from here.
+    assert np.array_equal(doubted.chances, location.chances)
+    assert doubted.region_text == "90 % region, if it is from this area: 1 cell, 100 m², in 1 place"
+    plain = json.loads(json.dumps(doubted.to_dict(), allow_nan=False))
+    assert [plain[name] for name in ("answered", "elsewhere", "fit")] == [False, 0.6, 0.002]
+    assert plain["place"]["chance"] == doubted.answer.mass
+    assert plain["doubt"] == doubted.doubt
+    assert "doubt The view may not be from this area" in repr(doubted)
+    assert location.doubted(0.05).answer.given
+
+
+@pytest.mark.parametrize(
+    ("elsewhere", "fit", "sentence"),
+    [
+        (0.0, None, ""),
+        (0.0999, 0.01, ""),
+        (0.1, None, "The view may not be from this area: chance 10 %."),
+        (0.998, 0.5, "The view may not be from this area: chance over 99 %."),
+        (0.0, 0.0, f"The view fits the best place badly: worse than 1,000 {OF_VIEWS}"),
+        (0.35, 0.002, f"{FROM_ELSEWHERE}; it fits the best place worse than 998 {OF_VIEWS}"),
+    ],
+)
+def test_a_sentence_states_the_doubts(elsewhere: float, fit: float | None, sentence: str) -> None:
+    assert locate(INDEX, CITY.signature(LONG[0])).doubted(elsewhere, fit).doubt == sentence
+
+
+def test_the_region_is_counted_in_distinct_places() -> None:
+    # A line of equal cells 10 m apart; a place has at most eleven of them.
+    street, long_street = (
+        locate(build_index(database, named_noise("generic")), database.signature(0))
+        for database in (database_of([("D", [20.0])] * cells) for cells in (330, 1200))
+    )
+    assert street.region_places == 0.9 * 330 / 11
+    assert street.region_text == "90 % region: 297 cells, 29,700 m², in 27 places"
+    assert long_street.region_places is None
+    assert long_street.region_text == "90 % region: 1,080 cells, 0.108 km², in many places"
+    sure = locate(INDEX, CITY.signature(LONG[0]))
+    assert sure.region_places == 1
+    assert sure.region_text.endswith(", in 1 place")
 
 
 def test_the_answer_depends_on_prior_and_rule() -> None:
@@ -122,7 +175,7 @@ def test_refinement_finds_places_between_the_viewpoints() -> None:
             errors[trial, int(refined)] = math.dist(xy, (location.estimate.x, location.estimate.y))
             assert location.estimate.refined == refined
             assert location.posterior.chances.sum() == pytest.approx(1.0)
-            assert (np.diff(location.candidates["chance"]) <= 0).all()
+            assert (np.diff(location.candidates["chance"]) <= 1e-9).all()
     plain, close = np.median(errors, axis=0)
     assert close < 1.0 < plain < 8.0
 
@@ -144,7 +197,7 @@ def test_explanations_name_the_street_objects() -> None:
 
 
 @pytest.mark.parametrize("north_sigma", [0.0, math.inf])
-def test_a_class_that_no_cell_sees_is_a_false_detection(north_sigma: float) -> None:
+def test_a_class_that_no_cell_sees_is_not_used(north_sigma: float) -> None:
     absent = CODES[0]
     sees_none = np.add.reduceat(CITY.codes == absent, CITY.offsets[:-1]) == 0
     city = CITY.select(sees_none)
@@ -157,9 +210,17 @@ def test_a_class_that_no_cell_sees_is_a_false_detection(north_sigma: float) -> N
     location, expected = (locate(index, view, **options) for view in (query, plain))
     assert np.array_equal(location.chances, expected.chances)
     assert location.query is query
-    assert len(location.notes) == 1
-    assert location.explanations[0].counts["false"] == expected.explanations[0].counts["false"] + 1
+    (note,) = location.notes
+    assert note.startswith("the map has no ")
+    assert note.endswith(", so this object was not used.")
+    assert location.explanations[0].to_dict() == expected.explanations[0].to_dict()
     assert not expected.notes
+    # In a route and between the viewpoints as well.
+    for views in zip(
+        *(locate_route(index, [view, view], [Leg(dx=0.0, dy=0.0)]) for view in (query, plain)),
+        strict=True,
+    ):
+        assert np.array_equal(*(view.chances for view in views))
     nothing = Signature(np.empty(0, np.uint8), np.empty(0))
     empty_location, far_location = (locate(index, view, **options) for view in (nothing, far))
     assert np.array_equal(empty_location.chances, far_location.chances)
@@ -255,6 +316,8 @@ def test_a_location_converts_to_plain_values_and_points() -> None:
     assert location.to_geodataframe().crs == CITY.crs
     assert location.region_km2 == pytest.approx(len(location.region) * 1e-4)
     assert location.posterior.chances[location.region].sum() >= 0.9 - 1e-9
+    assert (plain["elsewhere"], plain["fit"], plain["doubt"]) == (0.0, None, "")
+    assert plain["region"]["text"] == location.region_text
     # A rule without answers has plain values as well.
     location = locate(INDEX, CITY.signature(LONG[0]), rule=AnswerRule(threshold=math.inf))
     plain = json.loads(json.dumps(location.to_dict(), allow_nan=False))

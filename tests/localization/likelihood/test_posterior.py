@@ -76,6 +76,25 @@ def test_the_mass_within_a_radius_is_a_sum_over_the_cells_in_it(
     assert [mass, expected[cell]] == pytest.approx([expected.max()] * 2, abs=2e-9)
 
 
+@given(LOGLIKS, st.sampled_from([0.0, 10.0, 14.2, 25.0, 1e6]), st.integers(1, 200))
+def test_places_are_circles_without_the_cells_of_earlier_ones(
+    loglik: np.ndarray, radius: float, count: int
+) -> None:
+    result = posterior(DATABASE, loglik)
+    places = result.places(count, radius=radius)
+    away = np.hypot(*(DATABASE.xy[:, None] - DATABASE.xy[None]).transpose(2, 0, 1))
+    left = result.chances.copy()
+    for centre, cell, chance in zip(*(part.tolist() for part in places), strict=True):
+        assert left[centre] > 0
+        sums = (away <= radius + 1e-6) @ left
+        assert [chance, sums[centre]] == pytest.approx([sums[left > 0].max()] * 2, abs=2e-9)
+        own = away[centre] <= radius + 1e-6
+        assert left[cell] == left[own].max()
+        left[own] = 0.0
+    assert places.chances.sum() <= 1.0 + 1e-9
+    assert len(places.chances) == count or left.sum() == 0.0
+
+
 @given(LOGLIKS, st.floats(0.01, 1.0))
 def test_a_credible_region_is_the_smallest_with_its_share(loglik: np.ndarray, share: float) -> None:
     result = posterior(DATABASE, loglik)
