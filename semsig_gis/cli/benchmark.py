@@ -86,9 +86,12 @@ def benchmark(
     folder: Annotated[Path, typer.Argument(help="Folder with the files of the data set.")],
     *,
     out: Annotated[Path | None, typer.Option(help="Results to write (.json).")] = None,
-    methods: Annotated[str, typer.Option(help="Methods with commas between them.")] = ",".join(
-        METHODS
-    ),
+    methods: Annotated[
+        str,
+        typer.Option(
+            help="Methods with commas between them; --out has the worst failures of the last one."
+        ),
+    ] = ",".join(METHODS),
     noise: Annotated[
         Path | None,
         typer.Option(
@@ -131,6 +134,7 @@ def benchmark(
         with progress("locating") as advance:
             scored = score_photographs(locators, sets, progress=advance)
         settings = {"data": data, "radius": radius, "cells": len(city.database), "limit": limit}
+        settings["classes"] = city.database.taxonomy.to_list()
         with progress("explaining failures"):
             result = settings | _result(scored, locators, sets, city)
     if out is not None:
@@ -175,14 +179,15 @@ def _result(
     )
     from semsig_gis.localization import LikelihoodLocator
 
+    method, locator = list(locators.items())[-1]
+    failures = {}
+    if isinstance(locator, LikelihoodLocator):
+        rows = photograph_failures(scored, locator, sets, city, method=method)
+        failures = {"failures": {"method": method, "views": rows}}
     return {
         "table": plain_records(photograph_table(scored)),
         "calibration": plain_records(photograph_calibration(scored)),
-        "failures": {
-            method: photograph_failures(scored, locator, sets, city, method=method)
-            for method, locator in locators.items()
-            if isinstance(locator, LikelihoodLocator)
-        },
+        **failures,
     }
 
 

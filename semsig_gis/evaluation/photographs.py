@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from semsig_gis.core import GridSpec, InputError, SignatureSpec, angular_distance
+from semsig_gis.core import GridSpec, InputError, SignatureSpec, angular_distance, to_degrees
 from semsig_gis.database import ObjectStore, build_database, open_city, save_with_store
 from semsig_gis.evaluation.figures import calibration_bins, range_labels
 from semsig_gis.localization import DEFAULT_RULE, LikelihoodLocator, Location, explain
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 DETECTIONS = ("3-5", "6-8", "9+")
 """Groups of views by their number of detections."""
 ALL = "all"
+SCENE = ("verdict", "query_class", "query_bearing", "object_class", "object_bearing", "distance")
 WITHIN_M = (5, 10, 25, 50)
 FAILURES = 6
 TURN = 137.5  # degrees; each view without a compass is turned by another multiple of it
@@ -296,8 +297,8 @@ def photograph_table(scored: pd.DataFrame) -> pd.DataFrame:
     >>> views = {"method": "generic", "set": "single", "detections": [4, 5], "seconds": 0.1}
     >>> views |= {"heading_error": [2.0, 4.0], "chance": [0.95, 0.5]}
     >>> table = photograph_table(pd.DataFrame(views | shares))
-    >>> table.loc[0, ["detections", "n", "p50", "answered", "right", "brier"]].tolist()
-    ['all', 2, 0.5, 0.5, 1.0, 0.12625]
+    >>> table[["detections", "n", "p50", "answered", "right"]].values.tolist()
+    [['all', 2, 0.5, 0.5, 1.0], ['3-5', 2, 0.5, 0.5, 1.0]]
     """
     rows = []
     for (method, name), views in scored.groupby(["method", "set"], sort=False):
@@ -352,21 +353,22 @@ def photograph_failures(
 ) -> list[dict[str, Any]]:
     """Return the views that a method located wrongly with the largest stated chances.
 
-    Each has the ``set``, ``view``, ``chance`` and ``error_m``, and explanations (see
-    `Explanation.to_dict`, without the objects outside of the photos) of the view at the answered
-    place (``answered``) and at the true one (``true``).
+    Each has the ``set``, ``view``, ``chance`` and ``error_m``, and the scene at the true place
+    (``true``) and at the answered one (``answered``): ``x``, ``y``, ``lon``, ``lat``, and ``rows``
+    with the columns of `SCENE` of its explanation (see `explain`), without the objects outside of
+    the photos.
     """
     wrong = scored[(scored["method"] == method) & (scored["right"] == 0)]
     store, failures = city.store, []
     for row in wrong.nlargest(FAILURES, "chance").to_dict("records"):
-        (seen,) = (item for item in photographs[row["set"]] if item.name == row["view"])
+        seen = next(item for item in photographs[row["set"]] if item.name == row["view"])
         turn = locator.locate(seen.view).estimate.heading or 0.0
         scenes = {}
         for name, xy, heading in (
-            ("answered", (row["x"], row["y"]), turn),
             ("true", seen.xy, -seen.turn),
+            ("answered", (row["x"], row["y"]), turn),
         ):
-            scene = explain(
+            rows = explain(
                 seen.view,
                 xy,
                 locator.index.noise,
@@ -374,8 +376,19 @@ def photograph_failures(
                 index=store.index,
                 radius=city.database.spec.radius,
                 heading=heading,
-            ).to_dict()
-            scene["rows"] = [item for item in scene["rows"] if item["verdict"] != "outside"]
-            scenes[name] = scene
+            ).rows
+            inside = [item for item in rows if item["verdict"] != "outside"]
+            lon, lat = to_degrees(city.database.crs).transform(*xy)
+            scenes[name] = {
+                "x": xy[0],
+                "y": xy[1],
+                "lon": lon,
+                "lat": lat,
+                "rows": [{key: _rounded(item[key]) for key in SCENE} for item in inside],
+            }
         failures.append({key: row[key] for key in ("set", "view", "chance", "error_m")} | scenes)
     return failures
+
+
+def _rounded(value: Any) -> Any:  # noqa: ANN401 - a text, a number or None
+    return round(value, 1) if isinstance(value, float) else value
