@@ -175,7 +175,7 @@ def failures() -> dict[str, Picture]:
         scenes = []
         for name, title in (("true", "Where it was"), ("answered", "What it was mistaken for")):
             place = failure[name]
-            seen = [row for row in place["rows"] if row["query_class"]]
+            detections = [row for row in place["rows"] if row["query_class"]]
             there = [row for row in place["rows"] if row["object_class"]]
             there.sort(key=lambda row: row["object_bearing"])
             codes = [taxonomy.by_name(row["object_class"]).code for row in there]
@@ -199,7 +199,7 @@ def failures() -> dict[str, Picture]:
                     ),
                     asked=tuple(
                         (taxonomy.by_name(row["query_class"]).code, row["query_bearing"])
-                        for row in seen
+                        for row in detections
                     ),
                     error_m=failure["error_m"] if name == "answered" else None,
                 )

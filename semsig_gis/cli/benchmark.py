@@ -118,7 +118,7 @@ def benchmark(
     require_suffix(".json", out)
     keep_inputs(out, read=(noise, *(folder.iterdir() if folder.is_dir() else ())))
     files = PHOTOGRAPHS[_known(data, PHOTOGRAPHS, "data set")]
-    chosen = [_known(name.strip(), METHODS, "method") for name in methods.split(",")]
+    names = [_known(name.strip(), METHODS, "method") for name in methods.split(",")]
     with tempfile.TemporaryDirectory(prefix="semsig-") as name:
         scratch = Path(name)
         with progress("building"):
@@ -130,10 +130,15 @@ def benchmark(
             for name, file in files.views.items()
         }
         task = _Task(data=files, folder=folder, city=city, noise=noise, scratch=scratch)
-        locators = {name: _locator(name, task) for name in chosen}
+        locators = {name: _locator(name, task) for name in names}
         with progress("locating") as advance:
             scored = score_photographs(locators, sets, progress=advance)
-        settings = {"data": data, "radius": radius, "cells": len(city.database), "limit": limit}
+        settings: dict[str, Any] = {
+            "data": data,
+            "radius": radius,
+            "cells": len(city.database),
+            "limit": limit,
+        }
         settings["classes"] = city.database.taxonomy.to_list()
         with progress("explaining failures"):
             result = settings | _result(scored, locators, sets, city)

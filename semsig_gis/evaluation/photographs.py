@@ -202,7 +202,8 @@ def score_photographs(
 
     Examples
     --------
-    >>> from semsig_gis import Method, View, make_locator
+    >>> from semsig_gis import Method, View
+    >>> from semsig_gis.localization import make_locator
     >>> x, y = demo_database.xy[0].tolist()
     >>> seen = Photograph(name="a", view=View.of(demo_database.signature(0)), xy=(x, y))
     >>> locator = make_locator(demo_database, Method.parse("edit+edit"))
@@ -244,7 +245,8 @@ def _with_ties(locator: Locator[Any], answer: Answer) -> Answer:
     """Return an answer that lists all cells that are as good as the best."""
     if isinstance(answer, Location) or answer.columns["tied"][0] <= len(answer.columns["tied"]):
         return answer
-    return locator.locate(answer.query, top=int(answer.columns["tied"][0]))
+    longer: Answer = locator.locate(answer.query, top=int(answer.columns["tied"][0]))
+    return longer
 
 
 def _outcome(answer: Answer, photograph: Photograph) -> dict[str, Any]:
@@ -336,7 +338,7 @@ def photograph_calibration(scored: pd.DataFrame) -> pd.DataFrame:
     A method without probabilities has no rows.
     """
     tables = [
-        calibration_bins(views).assign(method=method, set=name)
+        calibration_bins(views).assign(method=str(method), set=str(name))
         for (method, name), views in scored.groupby(["method", "set"], sort=False)
         if views["chance"].notna().any()
     ]
@@ -361,15 +363,15 @@ def photograph_failures(
     wrong = scored[(scored["method"] == method) & (scored["right"] == 0)]
     store, failures = city.store, []
     for row in wrong.nlargest(FAILURES, "chance").to_dict("records"):
-        seen = next(item for item in photographs[row["set"]] if item.name == row["view"])
-        turn = locator.locate(seen.view).estimate.heading or 0.0
+        photograph = next(item for item in photographs[row["set"]] if item.name == row["view"])
+        turn = locator.locate(photograph.view).estimate.heading or 0.0
         scenes = {}
         for name, xy, heading in (
-            ("true", seen.xy, -seen.turn),
+            ("true", photograph.xy, -photograph.turn),
             ("answered", (row["x"], row["y"]), turn),
         ):
             rows = explain(
-                seen.view,
+                photograph.view,
                 xy,
                 locator.index.noise,
                 objects=store.objects,

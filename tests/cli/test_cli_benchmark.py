@@ -50,8 +50,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     names = [objects.taxonomy.by_code(code).name for code in objects.codes.tolist()]
     used = "".join(f'{name} = "{name}"\n' for name in dict.fromkeys(names))
     (tmp_path / "flatlandia.toml").write_text(CATALOGUE + used, encoding="utf-8")
-    rows = enumerate(zip(names, objects.xy.tolist(), strict=True))
-    lines = [f"{number},{name},{x},{y}" for number, (name, (x, y)) in rows]
+    numbered = enumerate(zip(names, objects.xy.tolist(), strict=True))
+    lines = [f"{number},{name},{x},{y}" for number, (name, (x, y)) in numbered]
     (tmp_path / "objects.csv").write_text("\n".join(["id,class,x,y", *lines]), encoding="utf-8")
 
     def detections(x: float, y: float) -> list[dict[str, Any]]:
@@ -65,20 +65,20 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     busy = np.flatnonzero(database.lengths > 8)
     places = database.xy[busy[:: len(busy) // 12]].tolist()
-    seen = [{"id": f"v{i}", "x": x, "y": y} for i, (x, y) in enumerate(places)]
-    for row in seen:
+    views = [{"id": f"v{i}", "x": x, "y": y} for i, (x, y) in enumerate(places)]
+    for row in views:
         row["detections"] = detections(row["x"], row["y"])
-    unknown = [{**row, "heading_error": "unknown"} for row in seen[:2]]
+    unknown = [{**row, "heading_error": "unknown"} for row in views[:2]]
     several = [
         {"id": row["id"], "x": row["x"], "y": row["y"], "photos": [
             {"heading": 0, "fov": 360, "detections": row["detections"][:3]},
             {"heading": 0, "fov": 360, "detections": row["detections"][3:]},
         ]}
-        for row in seen[:3]
+        for row in views[:3]
     ]  # fmt: skip
     for name, rows in {
-        "learn": seen,
-        "test_thin": seen[:5],
+        "learn": views,
+        "test_thin": views[:5],
         "test_places": several,
         "test_no_compass": unknown,
     }.items():
