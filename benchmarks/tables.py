@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,8 @@ TODAY = "of the day"
 """Value of ``map`` in the rows of ``chances.json`` with a current map."""
 PAGE = FOLDER.parent / "docs" / "figures.md"
 TRUST = FOLDER.parent / "docs" / "reliability.md"
-_SOAK = ("<!-- make soak -->\n", "<!-- end -->")
+PHOTOGRAPHS = FOLDER.parent / "docs" / "real_photographs.md"
+_END = "<!-- end -->"
 
 _HEAD = """# Figures
 
@@ -134,11 +136,15 @@ _OLD_HEAD = (
 )
 _BAR_HEAD = "city | figure | target | measured | reached"
 _PAPER_HEAD = "experiment | case | figure | ours | interval | the paper"
+_PHOTOGRAPHS_HEAD = (
+    "method | set | detections | views | <= 5 m | <= 10 m | <= 25 m | <= 50 m | answered | right | "
+    "Brier | calibration error | heading error (degrees) | s"
+)
 _SPEED_HEAD = "figure | ours | peer | times better | target | the paper"
 
 
 def main() -> None:
-    """Write the page of figures, and the table of the soak."""
+    """Write the page of figures, and the tables of the soak and of real photographs."""
     names = ("accuracy", "results", "reproduction", "chances", "views")
     results = [read_rows(FOLDER / f"{name}.json") for name in names]
     PAGE.write_text(page(*results, bayes=read_rows(FOLDER / "bayes.json")), encoding="utf-8")
@@ -146,7 +152,14 @@ def main() -> None:
         trust_page(TRUST.read_text(encoding="utf-8"), read_rows(FOLDER / "soak.json")),
         encoding="utf-8",
     )
-    for path in (PAGE, TRUST):
+    PHOTOGRAPHS.write_text(
+        photographs_page(
+            PHOTOGRAPHS.read_text(encoding="utf-8"),
+            json.loads((FOLDER / "real_photographs.json").read_text(encoding="utf-8")),
+        ),
+        encoding="utf-8",
+    )
+    for path in (PAGE, TRUST, PHOTOGRAPHS):
         print(f"wrote {path.relative_to(FOLDER.parent)}")
 
 
@@ -345,9 +358,31 @@ def _speed_cells(row: Mapping[str, Any]) -> Sequence[str]:
 
 def trust_page(text: str, rows: Iterable[dict[str, Any]]) -> str:
     """Return the page ``reliability.md`` with its table replaced, from rows of ``soak.json``."""
-    before, _, rest = text.partition(_SOAK[0])
-    after = rest.partition(_SOAK[1])[2]
-    return f"{before}{_SOAK[0]}\n{soak_table(rows)}\n{_SOAK[1]}{after}"
+    return _with_table(text, "<!-- make soak -->\n", soak_table(rows))
+
+
+def photographs_page(text: str, result: Mapping[str, Any]) -> str:
+    """Return ``real_photographs.md`` with its table replaced, from ``real_photographs.json``."""
+    table = _table(_PHOTOGRAPHS_HEAD, _photograph_cells, result["table"])
+    return _with_table(text, "<!-- make photographs -->\n", table)
+
+
+def _photograph_cells(row: Mapping[str, Any]) -> Sequence[str]:
+    shares = ("p5", "p10", "p25", "p50", "answered", "right", "brier", "calibration_error")
+    heading = row["heading_error"]
+    return [
+        *(str(row[name]) for name in ("method", "set", "detections", "n")),
+        *(_share(row[name]) for name in shares),
+        "" if heading is None else f"{heading:.1f}",
+        f"{row['seconds']:.3f}",
+    ]
+
+
+def _with_table(text: str, mark: str, table: str) -> str:
+    """Return a page with the table after a mark replaced."""
+    before, _, rest = text.partition(mark)
+    after = rest.partition(_END)[2]
+    return f"{before}{mark}\n{table}\n{_END}{after}"
 
 
 def soak_table(rows: Iterable[dict[str, Any]]) -> str:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import semsig_gis as sg
-from semsig_gis.reports import COLOURS, blank_figure, saved
+from semsig_gis.reports import COLOURS, Scene, SceneObject, blank_figure, draw_scenes, saved
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from semsig_gis.reports import Picture
 
@@ -41,11 +41,11 @@ def drawings() -> Iterable[sg.Plot]:
     for city in ("Paris-like", "Montpellier"):
         yield _rivals(_results("accuracy.json"), city)
     yield _chances(_results("chances.json"))
+    yield _photographs(_results("real_photographs.json"))
 
 
-def _results(name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads((RESULTS / name).read_text(encoding="utf-8"))
-    return rows
+def _results(name: str) -> Any:  # noqa: ANN401 - rows, or tables by name
+    return json.loads((RESULTS / name).read_text(encoding="utf-8"))
 
 
 def _paper_plot(
@@ -145,6 +145,69 @@ def _chances(rows: Sequence[dict[str, Any]]) -> sg.Plot:
     )
 
 
+def _photographs(result: Mapping[str, Any]) -> sg.Plot:
+    """Plot how often stated chances come true for single photographs, by method."""
+    parts = [row for row in result["calibration"] if row["set"] == "single" and row["n"]]
+    curves = tuple(
+        _curve(
+            method,
+            [(row["stated"], row) for row in parts if row["method"] == method],
+            *("true", "low", "high"),
+        )
+        for method in dict.fromkeys(row["method"] for row in parts)
+    )
+    return sg.Plot(
+        name="photographs",
+        title="Real photographs: stated chances, and how often they come true",
+        x_label="chance stated to be within 50 m (mean of a tenth)",
+        y_label="share within 50 m",
+        curves=curves,
+        diagonal=True,
+    )
+
+
+def failures() -> dict[str, Picture]:
+    """Draw the wrong answers with the largest chances: the true and the answered place of each."""
+    result = _results("real_photographs.json")
+    taxonomy = sg.Taxonomy.from_list(result["classes"])
+    pictures = {}
+    for number, failure in enumerate(result["failures"]["views"], start=1):
+        scenes = []
+        for name, title in (("true", "Where it was"), ("answered", "What it was mistaken for")):
+            place = failure[name]
+            detections = [row for row in place["rows"] if row["query_class"]]
+            there = [row for row in place["rows"] if row["object_class"]]
+            there.sort(key=lambda row: row["object_bearing"])
+            codes = [taxonomy.by_name(row["object_class"]).code for row in there]
+            angles = np.radians([row["object_bearing"] for row in there])
+            scenes.append(
+                Scene(
+                    name=f"failure-{number}-{name}",
+                    title=title,
+                    lon=place["lon"],
+                    lat=place["lat"],
+                    radius=result["radius"],
+                    types=taxonomy.decode(codes),
+                    taxonomy=taxonomy,
+                    objects=tuple(
+                        SceneObject(
+                            code=code,
+                            east=row["distance"] * np.sin(angle),
+                            north=row["distance"] * np.cos(angle),
+                        )
+                        for code, row, angle in zip(codes, there, angles, strict=True)
+                    ),
+                    asked=tuple(
+                        (taxonomy.by_name(row["query_class"]).code, row["query_bearing"])
+                        for row in detections
+                    ),
+                    error_m=failure["error_m"] if name == "answered" else None,
+                )
+            )
+        pictures[f"photograph-failure-{number}"] = draw_scenes(scenes)
+    return pictures
+
+
 def ages() -> Picture:
     """Draw the share of sure answers that are right on old maps, with and without their age."""
     rows = [
@@ -188,6 +251,7 @@ def write_drawings(folder: Path) -> None:
     pictures = {plot.name: sg.draw_plot(plot) for plot in drawings()} | {
         "times": times(),
         "ages": ages(),
+        **failures(),
     }
     for name, picture in pictures.items():
         path, svg = folder / f"{name}.svg", picture.svg

@@ -15,6 +15,7 @@ from semsig_gis.cli import (  # noqa: F401
     serve,
     learn,
     evaluate,
+    benchmark,
     export,
 )
 

@@ -75,7 +75,7 @@ def learn(
     city = open_city(database)
     rows = read_samples(samples, taxonomy=city.database.taxonomy, radius=city.database.spec.radius)
     with progress("learning"):
-        estimate = _estimate(city, rows, objects)
+        estimate = estimate_noise(city, rows, objects)
     # The uncertainty of the sample places is not an error of the detector.
     learnt = replace(estimate.spec, position_sigma=0.0, name=out.stem)
     noise = fresh_noise(learnt, map_age, database=city.database, drift=change)
@@ -107,7 +107,7 @@ def learn(
     say(f"noise model: {out}")
 
 
-def _estimate(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
+def estimate_noise(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
     """Estimate the noise from street objects if there are some, else from the cells."""
     import numpy as np
 

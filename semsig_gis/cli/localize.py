@@ -179,12 +179,12 @@ def localize(options: LocalizeOptions) -> None:
     if options.queries is None:
         query = options.query(city.dataset, others=", or --queries")
         others = options.unplaced(city.dataset)
-        locator = _locator(options, city, method, north)
+        locator = query_locator(options, city, method, north)
         locator = _with_unplaced(locator, query, *others, ranking=ranking)
         _answer(options, city, locator, query)
         return
     queries = options.read_queries(city.dataset)
-    _answer_lines(queries, _locator(options, city, method, north), options)
+    _answer_lines(queries, query_locator(options, city, method, north), options)
 
 
 def _with_unplaced(
@@ -210,7 +210,7 @@ def _with_unplaced(
     return with_unplaced(likelihood, query, unplaced, absent=absent)
 
 
-def _locator(
+def query_locator(
     options: LocalizeOptions, city: City, method: Method | None, north: North
 ) -> Locator[Any]:
     """Return the locator of the options, for a method by distance or by likelihood."""

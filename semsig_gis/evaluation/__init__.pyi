@@ -69,6 +69,16 @@ from .paper.reproduction import Reproduction as Reproduction
 from .paper.reproduction import paper_experiments as paper_experiments
 from .paper.reproduction import reproduce as reproduce
 from .paper.reproduction import time_queries as time_queries
+from .photographs import DETECTIONS as DETECTIONS
+from .photographs import PHOTOGRAPHS as PHOTOGRAPHS
+from .photographs import Photograph as Photograph
+from .photographs import PhotographData as PhotographData
+from .photographs import build_photographed_city as build_photographed_city
+from .photographs import photograph_calibration as photograph_calibration
+from .photographs import photograph_failures as photograph_failures
+from .photographs import photograph_table as photograph_table
+from .photographs import read_photographs as read_photographs
+from .photographs import score_photographs as score_photographs
 from .queries.distortion_text import NAMED_DISTORTIONS as NAMED_DISTORTIONS
 from .queries.distortion_text import QueryDistortion as QueryDistortion
 from .queries.distortion_text import chain_text as chain_text

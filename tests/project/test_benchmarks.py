@@ -158,6 +158,9 @@ def test_the_page_of_figures_is_current() -> None:
     trials = read_rows(FOLDER / "soak.json")
     page_of_trust = tables.TRUST.read_text(encoding="utf-8")
     assert page_of_trust == tables.trust_page(page_of_trust, trials)
+    result = json.loads((FOLDER / "real_photographs.json").read_text(encoding="utf-8"))
+    page_of_photographs = tables.PHOTOGRAPHS.read_text(encoding="utf-8")
+    assert page_of_photographs == tables.photographs_page(page_of_photographs, result)
 
 
 def test_accuracy_is_measured_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
