@@ -52,8 +52,8 @@ def view(
         list[str] | None,
         typer.Option(
             help="Map from labels to classes: coco, mapillary_vistas, cityscapes, panoramax or a "
-            ".toml file; repeat for several, best first.  [default: the four]  With --detector also "
-            "the names of its classes: coco, or a .txt, .yaml or .json file.  [default: from the "
+            ".toml file; repeat for several, best first.  [default: the four]  With --detector "
+            "also the names of its classes: coco, or a .txt, .yaml or .json file.  [default: from the "
             "model]"
         ),
     ] = None,
@@ -174,7 +174,7 @@ def view(
         shots={} if photos is None else read_shots(photos),
         folders=None if images is None else [images],
     )
-    unknown: Sequence[Path] = ()
+    unknown: list[Path] = []
     if detector is None:
         pictures, unknown = read_pictures(files)
     else:
