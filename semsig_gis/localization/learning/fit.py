@@ -26,10 +26,14 @@ from semsig_gis.core import (
     wilson_interval,
 )
 from semsig_gis.localization.likelihood.association import (
+    FARTHEST,
     Detections,
+    Pairs,
     associate,
     at_distances,
+    bearing_spreads,
     near_pairs,
+    sum_products,
 )
 from semsig_gis.localization.noise.table import NoiseTable
 from semsig_gis.observation import View
@@ -41,7 +45,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature, Taxonomy
     from semsig_gis.database import VisibleObjects
-    from semsig_gis.localization.likelihood.association import Association, Pairs
+    from semsig_gis.localization.likelihood.association import Association
 
 
 ALL = "all"
@@ -93,9 +97,37 @@ class Evidence:
         """The class of the object of each pair."""
         return self.kinds[self.pairs.objects]
 
-    def by_kind(self, amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sum amounts of pairs by the class of the object, shape (k,)."""
-        return np.asarray(np.bincount(self.pair_kinds, amounts, len(self.names)), np.float64)
+    def near(self, sigma: NDArray[np.float64]) -> Evidence:
+        """Return the evidence that matters if bearings of the k classes err by at most `sigma`.
+
+        Objects far outside the sectors of their photo, and pairs of bearings far apart, are left
+        out: they change no expected count.
+        """
+        table, views, pairs = replace(self.start, sigma=sigma), self.views, self.pairs
+        spreads = bearing_spreads(table, self.kinds, self.distances)
+        inside, _ = self.detections.inside(self.owners, views.bearings, spreads)
+        units = distance_units_of(self.distances, table.reach)
+        mask = (inside > 0) | (table.leaving[self.kinds, units] > 0)
+        close = np.abs(pairs.away) <= FARTHEST * spreads[pairs.objects]
+        mask[pairs.objects[close]] = True
+        rows, ends = np.append(0, np.cumsum(mask)), np.append(0, np.cumsum(close))
+        return replace(
+            self,
+            views=replace(
+                views,
+                offsets=rows[views.offsets],
+                objects=views.objects[mask],
+                codes=views.codes[mask],
+                bearings=views.bearings[mask],
+                distances=views.distances[mask],
+            ),
+            pairs=Pairs(
+                starts=ends[pairs.starts],
+                objects=rows[pairs.objects[close]],
+                detections=pairs.detections[close],
+                away=pairs.away[close],
+            ),
+        )
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:
@@ -114,7 +146,8 @@ class Counts:
     logarithms of ranges, and the number of errors that each counts for. By object and knot, `hits`
     of `trials` were detected. `false`, by detection and class, is the chance of clutter. `named`,
     shape (k, k), counts detected objects by class and label; `log_likelihood` is that of all
-    detections.
+    detections. `totals` are the sums by class, from which a model is estimated: in columns, those
+    of `named`, `false`, `turns`, `ranges`, `hits` and `trials`.
     """
 
     chances: NDArray[np.float64]
@@ -125,6 +158,7 @@ class Counts:
     trials: NDArray[np.float64]
     false: NDArray[np.float64]
     named: NDArray[np.float64]
+    totals: NDArray[np.float64]
     log_likelihood: float
 
 
@@ -193,7 +227,7 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     association = associate(model, evidence.views, detections, pairs, lengths=lengths)
     chances, kind = association.chances, evidence.pair_kinds
     # The scores of a detection may be those of several classes.
-    naming = (model.named[0] @ detections.scores)[kind, pairs.detections]
+    naming = sum_products("kc,cn->kn", model.named[0], detections.scores)[kind, pairs.detections]
     own = model.named[0].diagonal()[kind] * detections.scores[kind, pairs.detections]
     cells = kind * count + pairs.detections
     by_detection = np.bincount(cells, chances / naming, size * count).reshape(size, -1)
@@ -201,15 +235,22 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     clutter = detections.scores * model.clutter[:, None]
     false = np.clip(1.0 - true, 0.0, 1.0) * association.clutter * clutter / clutter.sum(axis=0)
     hits, trials = _detected_objects(evidence, association, model)
+    turns = _bearing_errors(evidence, association, model)
+    ranges = _range_errors(evidence, association, model)
+    names = model.named[0] * sum_products("kd,cd->kc", by_detection, detections.scores)
+    amounts = [(kind, row) for row in (*turns, *ranges)]
+    amounts += [(evidence.kinds, row) for row in (*hits.T, *trials.T)]
+    sums = [np.bincount(kinds, row, size) for kinds, row in amounts]
     return Counts(
         chances=chances,
         right=chances * own / naming,
-        turns=_bearing_errors(evidence, association, model),
-        ranges=_range_errors(evidence, association, model),
+        turns=turns,
+        ranges=ranges,
         hits=hits,
         trials=trials,
         false=false.T,
-        named=model.named[0] * (by_detection @ detections.scores.T),
+        named=names,
+        totals=np.column_stack([names, false.sum(axis=1), *sums]),
         log_likelihood=float(association.loglik.sum()),
     )
 
@@ -270,45 +311,49 @@ def _range_errors(
 
 
 def next_model(
-    evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool = False
+    evidence: Evidence, totals: NDArray[np.float64], model: NoiseTable, *, fading: bool = False
 ) -> NoiseTable:
-    """Return the model of the counts, class rates shrunk towards the overall rate: the M step.
+    """Return the model of the totals, class rates shrunk towards the overall rate: the M step.
 
     With `fading`, detection falls with distance.
     """
     size = len(evidence.names)
-    detected = counts.named.sum(axis=1)
-    wrong = counts.named * (1.0 - np.eye(size))
+    names, false, turns, ranges, hits, trials = _columns(totals)
+    detected = names.sum(axis=1)
+    wrong = names * (1.0 - np.eye(size))
     misnamed = np.clip(shrunk_rates(wrong.sum(axis=1), detected), LEAST, MOST)
     spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
-    false = counts.false.sum(axis=0)
-    shares = (false + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
-    rates = np.clip(_rates_by_knot(evidence, counts, fading=fading), LEAST, MOST)
+    shares = (false[:, 0] + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
+    rates = np.clip(_rates_by_knot(hits, trials, fading=fading), LEAST, MOST)
     metres = np.arange(DISTANCE_UNITS + 1) * (model.reach / DISTANCE_UNITS)
     faded = [
         np.interp(metres, KNOTS * limit, row / row[0])
         for limit, row in zip(model.ranges.tolist(), rates, strict=True)
     ]
-    turns, ranges = (
-        [evidence.by_kind(row) for row in part] for part in (counts.turns, counts.ranges)
-    )
     return replace(
         model,
         missed=1.0 - rates[None, :, 0],
         misnamed=misnamed[None] if size > 1 else np.zeros((1, 1)),
         others=spread / np.maximum(spread.sum(axis=1, keepdims=True), 1e-12),
         clutter=np.maximum(false.sum() / evidence.detections.turns.sum() * shares, LEAST / size),
-        sigma=np.clip(np.sqrt(shrunk_rates(*turns)), LEAST_SIGMA, MOST_SIGMA),
-        range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges)), LEAST_ERROR, MOST_ERROR)
-        if ranges[1].any()
+        sigma=np.clip(np.sqrt(shrunk_rates(*turns.T)), LEAST_SIGMA, MOST_SIGMA),
+        range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges.T)), LEAST_ERROR, MOST_ERROR)
+        if ranges[:, 1].any()
         else model.range_sigma,
         fading=np.stack(faded) if fading else model.fading,
     )
 
 
-def _rates_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArray[np.float64]:
+def _columns(totals: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the parts of `Counts.totals`: each of one column or more."""
+    widths = [len(totals), 1, 2, 2, len(KNOTS)]
+    return np.split(totals, np.cumsum(widths), axis=1)
+
+
+def _rates_by_knot(
+    hits: NDArray[np.float64], trials: NDArray[np.float64], *, fading: bool
+) -> NDArray[np.float64]:
     """Return the chance of detection by class and knot, shape (k, knots)."""
-    hits, trials = _by_knot(evidence, counts)
     if not fading:
         rates = shrunk_rates(hits.sum(axis=1), trials.sum(axis=1))
         return np.broadcast_to(rates[:, None], hits.shape)
@@ -320,17 +365,6 @@ def _rates_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArr
     prior = np.clip(level[:, None] * overall, LEAST, MOST)
     rows = zip(hits + PRIOR_SAMPLES * prior, trials + PRIOR_SAMPLES, strict=True)
     return np.stack([falling(*row) for row in rows])
-
-
-def _by_knot(evidence: Evidence, counts: Counts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the hits and trials by class and knot, shape (k, knots)."""
-    size = len(evidence.names)
-
-    def by_class(amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-        sums = [np.bincount(evidence.kinds, column, size) for column in amounts.T]
-        return np.stack(sums, axis=1).astype(np.float64)
-
-    return by_class(counts.hits), by_class(counts.trials)
 
 
 def falling(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -354,7 +388,7 @@ def detection_falls(evidence: Evidence, counts: Counts) -> bool:
     """
     if evidence.start.position_sigma > 0:
         return False
-    hits, trials = _by_knot(evidence, counts)
+    hits, trials = _columns(counts.totals)[-2:]
     rates = hits.sum(axis=1) / np.maximum(trials.sum(axis=1), 1e-9)
     places = KNOTS - (trials @ KNOTS / np.maximum(trials.sum(axis=1), 1e-9))[:, None]
     trend = ((hits - trials * rates[:, None]) * places).sum()

@@ -41,7 +41,9 @@ if TYPE_CHECKING:
     from semsig_gis.storage import Row
 
 MOST_ROUNDS = 500
-CONVERGED = 1e-4  # largest change of a log-odds or logarithm in the last round
+CONVERGED = 1e-5  # largest change of a log-odds or logarithm in the last round
+MEMORY = 8  # earlier rounds from which totals are extrapolated
+LARGEST_FALL = 0.01  # of the log-likelihood from one round to the next
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -252,11 +254,11 @@ def learn_noise(
     evidence = gather_evidence(
         views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
     )
-    model, rounds = _fit(evidence, evidence.start, fading=False)
+    model, rounds = fit_model(evidence, evidence.start, fading=False)
     counts = expected_counts(evidence, model)
     fading = detection_falls(evidence, counts)
     if fading:
-        model, more = _fit(evidence, model, fading=True)
+        model, more = fit_model(evidence, model, fading=True)
         counts, rounds = expected_counts(evidence, model), rounds + more
     rates = estimated_rates(evidence, counts, model, fading=fading)
     return NoiseEstimate(
@@ -272,15 +274,49 @@ def learn_noise(
     )
 
 
-def _fit(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
-    """Return the model after convergence, and the number of rounds."""
+def fit_model(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
+    """Return the model after convergence, and the number of rounds.
+
+    Anderson's method speeds up expectation-maximisation: each round starts from totals that are
+    extrapolated from those before and after the last rounds. If the likelihood falls, the round
+    starts from the last totals as they are.
+    """
+    before: list[NDArray[np.float64]] = []
+    after: list[NDArray[np.float64]] = []
+    totals, last, highest = None, np.zeros(0), -math.inf
+    near, sigma = evidence, np.zeros(0)
     rounds, change = 0, math.inf
     while change >= CONVERGED and rounds < MOST_ROUNDS:
-        counts = expected_counts(evidence, model)
-        old, model = model, next_model(evidence, counts, model, fading=fading)
-        change = model_change(old, model)
         rounds += 1
-    return model, rounds
+        if not len(sigma) or np.abs(np.log2(model.sigma / sigma)).max() > 1.0:
+            near, sigma = evidence.near(2.0 * model.sigma), model.sigma
+        counts = expected_counts(near, model)
+        if counts.log_likelihood < highest - LARGEST_FALL:
+            before, after, totals, highest = [], [], last, -math.inf
+        else:
+            last, highest = counts.totals, counts.log_likelihood
+            plain = next_model(evidence, counts.totals, model, fading=fading)
+            change = model_change(model, plain)
+            if totals is not None:
+                before, after = [*before[-MEMORY:], totals], [*after[-MEMORY:], last]
+            totals = extrapolated(before, after) if before else last
+        model = next_model(evidence, totals, model, fading=fading)
+    return plain, rounds
+
+
+def extrapolated(
+    before: Sequence[NDArray[np.float64]], after: Sequence[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return where a round would likely change nothing, given values before and after rounds.
+
+    The values are 0 or more. It is Anderson's method, of square roots, which have about the same
+    error for all counts: the combination of the rounds with the least change.
+    """
+    results = np.sqrt([value.ravel() for value in after])
+    changes = results - np.sqrt([value.ravel() for value in before])
+    weights, *_ = np.linalg.lstsq(np.diff(changes, axis=0).T, changes[-1])
+    new = results[-1] - weights @ np.diff(results, axis=0)
+    return np.asarray(np.maximum(new, 0.0) ** 2).reshape(after[-1].shape)
 
 
 def _true_views(

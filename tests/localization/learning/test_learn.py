@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_query
 from sentences import refused
+from view_oracle import random_view
 from worlds import CODES, World
 
 from semsig_gis.core import InputError, Signature, wilson_interval
@@ -21,6 +22,8 @@ from semsig_gis.localization import (
     Sample,
     estimated_rates,
     expected_counts,
+    extrapolated,
+    fit_model,
     gather_evidence,
     learn_noise,
     model_change,
@@ -329,9 +332,51 @@ def test_counts_add_up(seed: int) -> None:
     assert hits + counts.false.sum() <= len(evidence.detections.bearings) + 0.05
     assert (counts.named.sum(axis=1) <= counts.trials.sum() + 0.05).all()
     assert (counts.turns >= 0).all()
-    new = next_model(evidence, counts, model)
+    new = next_model(evidence, counts.totals, model)
     assert new.clutter.sum() * 20 == pytest.approx(counts.false.sum(), rel=0.02)
     assert new.named.sum(axis=2) == pytest.approx(1.0)
+
+
+@given(st.integers(0, 500), st.sampled_from([0.0, 2.5]), st.floats(0.5, 30.0))
+def test_what_is_far_away_changes_no_count(seed: int, position: float, sigma: float) -> None:
+    database = random_database(seed, cells=6, longest=8)
+    rng = np.random.default_rng(seed)
+    photos = (Photo.looking(heading=40, fov=60),)
+    detected = [random_view(database, rng, size=seed % 5, photos=photos) for _ in range(6)]
+    if not sum(map(len, detected)):
+        return
+    views = visible_objects_in(database, np.arange(6))
+    evidence = gather_evidence(views, detected, taxonomy=TAXONOMY, position_sigma=position)
+    model = replace(evidence.start, sigma=np.full(len(evidence.names), sigma))
+    near = evidence.near(model.sigma)
+    assert len(near.pairs.away) <= len(evidence.pairs.away)
+    counts, all_counts = expected_counts(near, model), expected_counts(evidence, model)
+    assert counts.totals == pytest.approx(all_counts.totals, rel=1e-4, abs=1e-6)
+    assert counts.log_likelihood == pytest.approx(all_counts.log_likelihood, abs=1e-5)
+
+
+def test_the_fast_fit_equals_many_plain_rounds() -> None:
+    database = random_database(3, cells=60, longest=5)
+    rng = np.random.default_rng(0)
+    detected = [distorted(database, cell, rng) for cell in range(60)]
+    evidence = gather_evidence(
+        visible_objects_in(database, np.arange(60)), detected, taxonomy=TAXONOMY
+    )
+    fast, rounds = fit_model(evidence, evidence.start, fading=False)
+    model = evidence.start
+    for _ in range(400):
+        model = next_model(evidence, expected_counts(evidence, model).totals, model)
+    assert rounds < 50
+    assert model_change(model, fast) < 1e-3
+
+
+@given(st.integers(0, 10_000))
+def test_an_extrapolation_of_linear_rounds_ends_where_nothing_changes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    matrix, end = rng.uniform(-0.25, 0.25, (3, 3)), rng.uniform(1.0, 2.0, 3)
+    before = [(end + matrix @ rng.normal(0.0, 0.3, 3)) ** 2 for _ in range(5)]
+    after = [(end + matrix @ (np.sqrt(value) - end)) ** 2 for value in before]
+    assert extrapolated(before, after) == pytest.approx(end**2, rel=1e-4)
 
 
 def test_rounds_of_the_fit_raise_the_likelihood() -> None:
@@ -347,7 +392,7 @@ def test_rounds_of_the_fit_raise_the_likelihood() -> None:
         counts = expected_counts(evidence, model)
         assert counts.log_likelihood > before - 0.1  # class rates are shrunk as well
         before = counts.log_likelihood
-        new = next_model(evidence, counts, model)
+        new = next_model(evidence, counts.totals, model)
         assert model_change(model, model) == 0.0
         assert model_change(model, new) > 0
         model = new
