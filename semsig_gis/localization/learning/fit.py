@@ -68,7 +68,9 @@ class Evidence:
 
     `names` are the k classes that occur, in the order of their codes in `start`, the first model.
     `views` are the objects visible in each photo, `detections` the detections, and `pairs` the
-    objects and detections that may be one thing.
+    objects and detections that may be one thing. A photo of uncertain north is there several
+    times, turned by different angles: `photos` are the numbers of the photos, and `log_weights` the
+    logarithm of the weight of each angle in the likelihood of the photo.
     """
 
     names: list[str]
@@ -76,6 +78,14 @@ class Evidence:
     views: VisibleObjects
     detections: Detections
     pairs: Pairs
+    photos: NDArray[np.int64]
+    log_weights: NDArray[np.float64]
+
+    @cached_property
+    def exposures(self) -> NDArray[np.float64]:
+        """The share of a full turn that each photo shows, counted once for all its angles."""
+        sums = np.bincount(self.photos, self.detections.turns)
+        return np.asarray(sums / np.bincount(self.photos))
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
@@ -193,6 +203,8 @@ def gather_evidence(
         views=views,
         detections=detections,
         pairs=near_pairs(views.offsets, views.bearings, starts, bearings, reach=PAIR_DEGREES),
+        photos=np.arange(len(views)),
+        log_weights=np.zeros(len(views)),
     )
 
 
@@ -225,18 +237,27 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     size, count = len(evidence.names), len(detections.bearings)
     lengths = np.zeros(len(evidence.views), np.int64)
     association = associate(model, evidence.views, detections, pairs, lengths=lengths)
-    chances, kind = association.chances, evidence.pair_kinds
+    kind = evidence.pair_kinds
+    # The chance of each angle of a photo, which all its counts are multiplied by.
+    logs = association.loglik + evidence.log_weights
+    logliks = np.full(len(evidence.exposures), -math.inf)
+    np.logaddexp.at(logliks, evidence.photos, logs)
+    angles = np.exp(logs - logliks[evidence.photos])
+    of_objects, of_detections = angles[evidence.owners], angles[detections.photo_rows]
+    of_pairs = of_detections[pairs.detections]
+    chances = association.chances * of_pairs
     # The scores of a detection may be those of several classes.
     naming = sum_products("kc,cn->kn", model.named[0], detections.scores)[kind, pairs.detections]
     own = model.named[0].diagonal()[kind] * detections.scores[kind, pairs.detections]
     cells = kind * count + pairs.detections
     by_detection = np.bincount(cells, chances / naming, size * count).reshape(size, -1)
-    true = np.bincount(pairs.detections, chances, count)
+    true = np.bincount(pairs.detections, association.chances, count)
     clutter = detections.scores * model.clutter[:, None]
     false = np.clip(1.0 - true, 0.0, 1.0) * association.clutter * clutter / clutter.sum(axis=0)
-    hits, trials = _detected_objects(evidence, association, model)
-    turns = _bearing_errors(evidence, association, model)
-    ranges = _range_errors(evidence, association, model)
+    false *= of_detections
+    hits, trials = of_objects[:, None] * _detected_objects(evidence, association, model)
+    turns = of_pairs * _bearing_errors(evidence, association, model)
+    ranges = of_pairs * _range_errors(evidence, association, model)
     names = model.named[0] * sum_products("kd,cd->kc", by_detection, detections.scores)
     amounts = [(kind, row) for row in (*turns, *ranges)]
     amounts += [(evidence.kinds, row) for row in (*hits.T, *trials.T)]
@@ -251,14 +272,14 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
         false=false.T,
         named=names,
         totals=np.column_stack([names, false.sum(axis=1), *sums]),
-        log_likelihood=float(association.loglik.sum()),
+        log_likelihood=float(logliks.sum()),
     )
 
 
 def _detected_objects(
     evidence: Evidence, association: Association, model: NoiseTable
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the expected hits and trials of the detection of each object, by knot."""
+) -> NDArray[np.float64]:
+    """Return the expected hits and trials of detection, shape (2, objects, knots)."""
     kinds, near = evidence.kinds, model.detected[0, evidence.kinds]
     units = distance_units_of(evidence.distances, model.reach)
     hits = np.bincount(evidence.pairs.objects, association.chances, len(kinds))
@@ -270,7 +291,8 @@ def _detected_objects(
     shares = near[:, None] * fading_at_knots(model)[kinds]
     of_hits, of_misses = (evidence.knots * part for part in (shares, 1.0 - shares))
     hit = hits[:, None] * of_hits / of_hits.sum(axis=1, keepdims=True)
-    return hit, hit + misses[:, None] * of_misses / of_misses.sum(axis=1, keepdims=True)
+    missed_shares = of_misses / of_misses.sum(axis=1, keepdims=True)
+    return np.stack([hit, hit + misses[:, None] * missed_shares])
 
 
 def fading_at_knots(model: NoiseTable) -> NDArray[np.float64]:
@@ -335,7 +357,7 @@ def next_model(
         missed=1.0 - rates[None, :, 0],
         misnamed=misnamed[None] if size > 1 else np.zeros((1, 1)),
         others=spread / np.maximum(spread.sum(axis=1, keepdims=True), 1e-12),
-        clutter=np.maximum(false.sum() / evidence.detections.turns.sum() * shares, LEAST / size),
+        clutter=np.maximum(false.sum() / evidence.exposures.sum() * shares, LEAST / size),
         sigma=np.clip(np.sqrt(shrunk_rates(*turns.T)), LEAST_SIGMA, MOST_SIGMA),
         range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges.T)), LEAST_ERROR, MOST_ERROR)
         if ranges[:, 1].any()
@@ -479,8 +501,8 @@ def _quantities(
     evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool
 ) -> list[_Quantity]:
     """Return all learnt quantities."""
-    size, photos = len(evidence.names), len(evidence.views)
-    sample = evidence.owners[evidence.pairs.objects]
+    size, photos = len(evidence.names), len(evidence.exposures)
+    photo_of_object = evidence.photos[evidence.owners]
 
     def by_photo(
         owner: NDArray[np.int64], group: NDArray[np.int64], amount: NDArray[np.float64]
@@ -510,7 +532,7 @@ def _quantities(
             distances=np.full(size, np.nan) if distances is None else distances,
         )
 
-    quantities, rows = [], (evidence.owners, evidence.kinds)
+    quantities, rows = [], (photo_of_object, evidence.kinds)
     chances = model.detected[0][:, None] * fading_at_knots(model)
     for number, knot in enumerate(KNOTS if fading else KNOTS[:1]):
         parts = slice(number, number + 1) if fading else slice(None)
@@ -520,11 +542,11 @@ def _quantities(
         metres = knot * model.ranges if fading else None
         name = "fading" if number else "detection"
         quantities.append(quantity(name, hits, trials, chances[:, number], distances=metres))
-    pairs = sample, evidence.pair_kinds
+    pairs = photo_of_object[evidence.pairs.objects], evidence.pair_kinds
     false = np.zeros((photos, size))
-    np.add.at(false, evidence.detections.photo_rows, counts.false)
-    turns = float(evidence.detections.turns.sum())
-    exposed = np.repeat(evidence.detections.turns[:, None], size, axis=1)
+    np.add.at(false, evidence.photos[evidence.detections.photo_rows], counts.false)
+    turns = float(evidence.exposures.sum())
+    exposed = np.repeat(evidence.exposures[:, None], size, axis=1)
     wrong = by_photo(*pairs, np.maximum(counts.chances - counts.right, 0.0))
     quantities += [
         quantity("misnamed", wrong, by_photo(*pairs, counts.chances), model.misnamed[0]),

@@ -23,8 +23,9 @@ from semsig_gis.localization.learning.fit import (
     model_change,
     next_model,
 )
+from semsig_gis.localization.learning.headings import turned_evidence
 from semsig_gis.localization.noise.model import NoiseSpec
-from semsig_gis.observation import RADIUS_M, SEEN, View, parse_view
+from semsig_gis.observation import RADIUS_M, SEEN, View, check_north, parse_view
 from semsig_gis.storage import read_rows, row_value
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from semsig_gis.storage import Row
 
 MOST_ROUNDS = 500
+SCANS = 4  # for the headings of photos of uncertain north, each with a better model
 CONVERGED = 1e-5  # largest change of a log-odds or logarithm in the last round
 MEMORY = 8  # earlier rounds from which totals are extrapolated
 LARGEST_FALL = 0.01  # of the log-likelihood from one round to the next
@@ -52,7 +54,7 @@ class Sample:
 
     The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
     `core.geometry.cell_ids`). The signature, which may be a `View`, must have types, all known, or
-    scores, and bearings; an error of its north counts as bearing noise.
+    scores, and bearings. The north of its photos may be uncertain or unknown.
     """
 
     signature: Signature
@@ -76,11 +78,6 @@ class Sample:
         if (view.class_scores()[:, WILDCARD] == 1).any():
             raise InputError(
                 "a sample has a detection of unknown class; give its class, or leave it out."
-            )
-        if any(math.isinf(photo.north_sigma or 0.0) for photo in view.photos):
-            raise InputError(
-                "a sample has a photo of unknown heading; give the heading, or leave the sample "
-                "out."
             )
 
 
@@ -191,6 +188,7 @@ def learn_noise(
     *,
     radius: float = 30.0,
     position_sigma: float = 0.0,
+    north_sigma: float = 0.0,
     footprints: Footprints | None = None,
     name: str = "learned",
 ) -> NoiseEstimate:
@@ -209,6 +207,9 @@ def learn_noise(
         Known standard deviation of the true places in metres, in x and y (with a database, of the
         place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). The differences of
         bearings that it causes are not counted as bearing noise.
+    north_sigma : float, default 0
+        Standard deviation of the north of photos without one of their own, in degrees, infinite if
+        unknown. Errors of north are not counted as bearing noise either.
     footprints : Footprints, optional
         Buildings that hide objects, for street objects.
     name : str, default "learned"
@@ -222,7 +223,8 @@ def learn_noise(
     Raises
     ------
     InputError
-        If there are no samples, none can be used, or there is no visible object or no detection.
+        If there are no samples, none can be used, there is no visible object or no detection, or a
+        deviation is out of range.
 
     Notes
     -----
@@ -248,13 +250,23 @@ def learn_noise(
         raise InputError(
             f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
         )
+    check_north(north_sigma)
     views, used = _true_views(samples, city, radius, footprints)
     detected = [samples[row].signature for row in used]
     reach = city.spec.radius if isinstance(city, SignatureDatabase) else radius
     evidence = gather_evidence(
         views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
     )
-    model, rounds = fit_model(evidence, evidence.start, fading=False)
+    known, model, rounds = evidence, evidence.start, 0
+    looks = [photo for view in detected for photo in View.of(view).photos]
+    uncertain = any(
+        north_sigma if photo.north_sigma is None else photo.north_sigma for photo in looks
+    )
+    for _ in range(SCANS if uncertain else 1):
+        if uncertain:
+            evidence = turned_evidence(known, detected, model, north_sigma=north_sigma)
+        model, more = fit_model(evidence, model, fading=False)
+        rounds += more
     counts = expected_counts(evidence, model)
     fading = detection_falls(evidence, counts)
     if fading:
@@ -267,7 +279,7 @@ def learn_noise(
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
         samples=len(used),
         objects=len(views.codes),
-        detections=len(evidence.detections.bearings),
+        detections=sum(map(len, detected)),
         skipped=len(samples) - len(used),
         rounds=rounds,
         log_likelihood=counts.log_likelihood,
