@@ -56,6 +56,7 @@ LEAST, MOST = 1e-3, 1.0 - 1e-3
 LEAST_SIGMA, MOST_SIGMA = 0.05, 60.0
 LEAST_ERROR, MOST_ERROR = 0.01, 3.0  # of ranges
 LEAST_INFORMATION = 0.05
+LEAST_TRIALS = 1e-9  # fewer are none
 PERCENTS = (90, 95)  # of the intervals
 KNOTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 """Distances at which a falling chance of detection is learnt: shares of the range of a class."""
@@ -565,6 +566,8 @@ def _row(
     quantity: _Quantity, name: str, hits: float, trials: float, deviation: float
 ) -> dict[str, Any]:
     """Return a rate with its intervals; `deviation` is that of its log-odds or logarithm."""
+    if trials < LEAST_TRIALS:
+        hits = trials = 0.0
     rate = hits / trials if trials > 0 else 0.0
     if quantity.name in {"bearing_sigma", "range_sigma"}:
         own = math.sqrt(rate)

@@ -15,6 +15,7 @@ from semsig_gis.localization.learning.fit import (
     ALL,
     KNOTS,
     LEAST,
+    PRIOR_SAMPLES,
     detection_falls,
     estimated_rates,
     expected_counts,
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
     from semsig_gis.storage import Row
 
 MOST_ROUNDS = 500
+# Samples suffice if the 90 % interval of a quantity is within a factor, or as narrow as this.
+NARROW_FACTOR, NARROW = 1.5, 0.05
 SCANS = 4  # for the headings of photos of uncertain north, each with a better model
 CONVERGED = 1e-5  # largest change of a log-odds or logarithm in the last round
 MEMORY = 8  # earlier rounds from which totals are extrapolated
@@ -171,6 +174,23 @@ class NoiseEstimate(Displayed):
             "bearing": f"±{self.spec.bearing_sigma:.3g}°",
         }
 
+    @property
+    def verdicts(self) -> dict[str, dict[str, Any]]:
+        """Whether the samples suffice, by quantity.
+
+        They are ``enough`` if the 90 % interval of all classes together is within a factor of 1.5,
+        or at most 0.05 wide; ``few`` are the classes with fewer than 8 samples of their own, which
+        depend more on the rate of all classes than on these.
+        """
+        verdicts = {}
+        for quantity, rows in self.rates.groupby("quantity", sort=False):
+            low, high = rows.loc[rows["class"] == ALL, ["low_90", "high_90"]].to_numpy().T
+            narrow = (high <= NARROW_FACTOR * low) | (high - low <= NARROW)
+            own = rows[rows["class"] != ALL].groupby("class", sort=False)["samples"].sum()
+            few = own.index[own < PRIOR_SAMPLES].tolist()
+            verdicts[str(quantity)] = {"enough": bool(narrow.all()), "few": few}
+        return verdicts
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -179,6 +199,7 @@ class NoiseEstimate(Displayed):
             "spec": self.spec.to_dict(),
             "rates": plain.to_dict("records"),
             "confusion": self.confusion.to_dict("index"),
+            "verdicts": self.verdicts,
         }
 
 

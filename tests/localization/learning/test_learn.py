@@ -260,6 +260,51 @@ def test_photos_recover_rates_ranges_and_fading() -> None:
     assert np.mean(inside) >= 0.87
 
 
+@pytest.mark.parametrize("sigma", [10.0, math.inf])
+def test_photos_of_uncertain_heading_recover_the_same_model(
+    estimate: NoiseEstimate, sigma: float
+) -> None:
+    rng = np.random.default_rng(0)
+    samples = []
+    for number, sample in enumerate(simulated(DATABASE, 500)):
+        # Every third heading is known; the others have an error of their own, or that of all.
+        photo = Photo(north_sigma=(0.0, sigma, None)[number % 3])
+        turn = 0.0 if number % 3 == 0 else rng.uniform(0, 360)
+        if math.isfinite(sigma):
+            turn = rng.normal(0.0, sigma) if number % 3 else 0.0
+        view = View.of(sample.signature, photos=(photo,)).turned(turn)
+        samples.append(Sample(signature=view, cell_id=sample.cell_id))
+    uncertain = learn_noise(samples, DATABASE, north_sigma=sigma)
+    assert sum(in_intervals(uncertain)) >= 13
+    rows, known = uncertain.rates, estimate.rates
+    assert (rows["value"].between(known["low_95"], known["high_95"])).all()
+    assert (uncertain.samples, uncertain.objects) == (estimate.samples, estimate.objects)
+    assert uncertain.detections == estimate.detections
+
+
+def test_photos_of_a_place_have_headings_of_their_own() -> None:
+    database = random_database(1, cells=100, longest=14)
+    rng, samples = np.random.default_rng(0), []
+    for sample in simulated(database, 300, seed=1, observe=photographer):
+        parts = [part.turned(rng.normal(0.0, 15.0)) for part in View.of(sample.signature).split()]
+        photos = [replace(part.photos[0], north_sigma=15.0) for part in parts]
+        views = [View.of(part, photos=(photo,)) for part, photo in zip(parts, photos, strict=True)]
+        samples.append(Sample(signature=View.joined(views), cell_id=sample.cell_id))
+    inside = in_intervals(learn_noise(samples, database), photo_truth)
+    assert len(inside) == 4 * (5 + 4)
+    assert np.mean(inside) >= 0.85
+
+
+def test_verdicts_say_which_samples_suffice(estimate: NoiseEstimate) -> None:
+    assert all(verdict == {"enough": True, "few": []} for verdict in estimate.verdicts.values())
+    few = learn_noise(simulated(DATABASE, 3), DATABASE)
+    assert not few.verdicts["clutter"]["enough"]
+    for quantity, verdict in few.verdicts.items():
+        rows = few.rates[(few.rates["quantity"] == quantity) & (few.rates["class"] != ALL)]
+        assert verdict["few"] == rows[rows["samples"] < 8]["class"].tolist()
+    assert few.to_dict()["verdicts"] == few.verdicts
+
+
 def test_csv_and_json_lines_give_equal_samples(tmp_path: Path) -> None:
     (tmp_path / "seen.CSV").write_text(
         'note,cell_id,types,bearings,x,y\nfirst,7,DB,"10, 350",,\nnothing,8,,,,\n,,D,-10,1.5,2\n'
