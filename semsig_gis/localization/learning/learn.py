@@ -278,14 +278,14 @@ def learn_noise(
     evidence = gather_evidence(
         views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
     )
-    known, model, rounds = evidence, evidence.start, 0
+    first, model, rounds = evidence, evidence.start, 0
     looks = [photo for view in detected for photo in View.of(view).photos]
     uncertain = any(
         north_sigma if photo.north_sigma is None else photo.north_sigma for photo in looks
     )
     for _ in range(SCANS if uncertain else 1):
         if uncertain:
-            evidence = turned_evidence(known, detected, model, north_sigma=north_sigma)
+            evidence = turned_evidence(first, detected, model, north_sigma=north_sigma)
         model, more = fit_model(evidence, model, fading=False)
         rounds += more
     counts = expected_counts(evidence, model)

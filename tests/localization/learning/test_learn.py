@@ -276,8 +276,8 @@ def test_photos_of_uncertain_heading_recover_the_same_model(
         samples.append(Sample(signature=view, cell_id=sample.cell_id))
     uncertain = learn_noise(samples, DATABASE, north_sigma=sigma)
     assert sum(in_intervals(uncertain)) >= 13
-    rows, known = uncertain.rates, estimate.rates
-    assert (rows["value"].between(known["low_95"], known["high_95"])).all()
+    rows, bounds = uncertain.rates, estimate.rates
+    assert (rows["value"].between(bounds["low_95"], bounds["high_95"])).all()
     assert (uncertain.samples, uncertain.objects) == (estimate.samples, estimate.objects)
     assert uncertain.detections == estimate.detections
 
