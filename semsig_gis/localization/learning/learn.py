@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 MOST_ROUNDS = 500
 # Samples suffice if the 90 % interval of a quantity is within a factor, or as narrow as this.
 NARROW_FACTOR, NARROW = 1.5, 0.05
+SCAN_ROUNDS = 20  # of the fit after each scan but the last
 SCANS = 4  # for the headings of photos of uncertain north, each with a better model
 CONVERGED = 1e-5  # largest change of a log-odds or logarithm in the last round
 MEMORY = 8  # earlier rounds from which totals are extrapolated
@@ -283,10 +284,12 @@ def learn_noise(
     uncertain = any(
         north_sigma if photo.north_sigma is None else photo.north_sigma for photo in looks
     )
-    for _ in range(SCANS if uncertain else 1):
+    # The headings of all scans but the last are only a beginning.
+    limits = [SCAN_ROUNDS] * (SCANS - 1) if uncertain else []
+    for most_rounds in (*limits, MOST_ROUNDS):
         if uncertain:
             evidence = turned_evidence(first, detected, model, north_sigma=north_sigma)
-        model, more = fit_model(evidence, model, fading=False)
+        model, more = fit_model(evidence, model, fading=False, most_rounds=most_rounds)
         rounds += more
     counts = expected_counts(evidence, model)
     fading = detection_falls(evidence, counts)
@@ -307,8 +310,10 @@ def learn_noise(
     )
 
 
-def fit_model(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
-    """Return the model after convergence, and the number of rounds.
+def fit_model(
+    evidence: Evidence, model: NoiseTable, *, fading: bool, most_rounds: int = MOST_ROUNDS
+) -> tuple[NoiseTable, int]:
+    """Return the model after convergence, or after the most rounds, and the number of rounds.
 
     Anderson's method speeds up expectation-maximisation: each round starts from totals that are
     extrapolated from those before and after the last rounds. If the likelihood falls, the round
@@ -319,7 +324,7 @@ def fit_model(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[N
     totals, last, highest = None, np.zeros(0), -math.inf
     near, sigma = evidence, np.zeros(0)
     rounds, change = 0, math.inf
-    while change >= CONVERGED and rounds < MOST_ROUNDS:
+    while change >= CONVERGED and rounds < most_rounds:
         rounds += 1
         if not len(sigma) or np.abs(np.log2(model.sigma / sigma)).max() > 1.0:
             near, sigma = evidence.near(2.0 * model.sigma), model.sigma
