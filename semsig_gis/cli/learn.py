@@ -16,18 +16,23 @@ from semsig_gis.cli.console import (
     print_json,
     print_rows,
     progress,
+    remark,
     say,
 )
 from semsig_gis.cli.options import (
+    Day,
     DriftReport,
     Heading,
     MapAge,
     NoiseName,
+    NorthName,
     Objects,
     OnGrid,
     Refine,
     SearchOptions,
+    north_sigma,
     object_store,
+    query_north,
     read_drift,
 )
 from semsig_gis.core import percent
@@ -57,6 +62,9 @@ def learn(
     out: Annotated[Path, typer.Option(help="Noise model to write (.toml or .json), for --noise.")],
     map_age: MapAge = 0.0,
     drift_report: DriftReport = None,
+    heading: Heading = "known",
+    north: NorthName = "grid",
+    date: Day = None,
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
@@ -73,9 +81,15 @@ def learn(
     check_map_age(map_age)
     change = read_drift(drift_report, map_age)
     city = open_city(database)
-    rows = read_samples(samples, taxonomy=city.database.taxonomy, radius=city.database.spec.radius)
+    bearing_north, sigma = query_north(city, north, date), north_sigma(heading)
+    rows = [
+        replace(sample, signature=bearing_north.to_grid(sample.signature))
+        for sample in read_samples(
+            samples, taxonomy=city.database.taxonomy, radius=city.database.spec.radius
+        )
+    ]
     with progress("learning"):
-        estimate = estimate_noise(city, rows, objects)
+        estimate = estimate_noise(city, rows, objects, sigma)
     # The uncertainty of the sample places is not an error of the detector.
     learnt = replace(estimate.spec, position_sigma=0.0, name=out.stem)
     noise = fresh_noise(learnt, map_age, database=city.database, drift=change)
@@ -104,10 +118,34 @@ def learn(
             f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects per full turn (was "
             f"{learnt.clutter:.3f})."
         )
+    for note in bearing_north.notes:
+        remark(note)
+    say(_verdict(estimate))
     say(f"noise model: {out}")
 
 
-def estimate_noise(city: City, samples: Sequence[Sample], objects: Path | None) -> NoiseEstimate:
+def _verdict(estimate: NoiseEstimate) -> str:
+    """Return one sentence on whether the samples suffice."""
+    verdicts = estimate.verdicts
+    missing = [quantity for quantity, verdict in verdicts.items() if not verdict["enough"]]
+    few = dict.fromkeys(name for verdict in verdicts.values() for name in verdict["few"])
+    text = (
+        f"Give more samples for {', '.join(missing)} (the 90% interval of all classes together is "
+        "wider than a factor of 1.5)"
+        if missing
+        else "The samples suffice for all classes together"
+    )
+    if few:
+        text += (
+            f"; these classes have fewer than 8 samples for some quantity, where they are mostly "
+            f"given the values of all classes: {', '.join(few)}"
+        )
+    return f"{text}."
+
+
+def estimate_noise(
+    city: City, samples: Sequence[Sample], objects: Path | None, sigma: float = 0.0
+) -> NoiseEstimate:
     """Estimate the noise from street objects if there are some, else from the cells."""
     import numpy as np
 
@@ -119,15 +157,17 @@ def estimate_noise(city: City, samples: Sequence[Sample], objects: Path | None) 
     if store is None:
         # Each sample is compared with the centre of its cell, so this offset is an error as well.
         offsets = places - database.grid.viewpoints(*database.grid.cells_at(places))
-        sigma = math.sqrt(float(np.mean(offsets**2)))
-        return learn_noise(samples, database, position_sigma=sigma)
+        metres = math.sqrt(float(np.mean(offsets**2)))
+        return learn_noise(samples, database, position_sigma=metres, north_sigma=sigma)
     placed = [
         Sample(signature=sample.signature, xy=(x, y))
         for sample, (x, y) in zip(samples, places.tolist(), strict=True)
     ]
     footprints = store.buildings_around(places, distance=database.reach)
     radius = database.spec.radius
-    return learn_noise(placed, store.objects, radius=radius, footprints=footprints)
+    return learn_noise(
+        placed, store.objects, radius=radius, north_sigma=sigma, footprints=footprints
+    )
 
 
 def _places(database: SignatureDatabase, samples: Sequence[Sample]) -> NDArray[Any]:

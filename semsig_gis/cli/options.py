@@ -334,7 +334,7 @@ class SearchOptions:
                 f"--objects and {option} were given, but street objects are not used then; "
                 "leave out one."
             )
-        sigma = _north_sigma(self.heading)
+        sigma = north_sigma(self.heading)
         rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
         noise = read_noise(
             self.noise or usual_noise,
@@ -447,7 +447,7 @@ def object_store(city: City, objects: Path | None, *, needed: bool) -> ObjectSto
         return None
 
 
-def _north_sigma(heading: str) -> float:
+def north_sigma(heading: str) -> float:
     """Return the standard deviation of north in degrees from --heading."""
     if heading in {"known", "unknown"}:
         return 0.0 if heading == "known" else math.inf

@@ -53,8 +53,8 @@ def view(
         typer.Option(
             help="Map from labels to classes: coco, mapillary_vistas, cityscapes, panoramax or a "
             ".toml file; repeat for several, best first.  [default: the four]  With --detector "
-            "also the names of its classes: coco, or a .txt, .yaml or .json file.  [default: from the "
-            "model]"
+            "also the names of its classes: coco, or a .txt, .yaml or .json file.  [default: from "
+            "the model]"
         ),
     ] = None,
     database: Annotated[

@@ -33,6 +33,8 @@ from .learning.fit import next_model as next_model
 from .learning.fit import shrunk_rates as shrunk_rates
 from .learning.learn import NoiseEstimate as NoiseEstimate
 from .learning.learn import Sample as Sample
+from .learning.learn import extrapolated as extrapolated
+from .learning.learn import fit_model as fit_model
 from .learning.learn import learn_noise as learn_noise
 from .learning.learn import read_samples as read_samples
 from .learning.map_age import Drift as Drift

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime as dt
 import io
 import json
 import math
@@ -21,6 +22,7 @@ from semsig_gis.database import ObjectStore, save_database, save_with_store, vis
 from semsig_gis.evaluation import open_evaluation
 from semsig_gis.localization import open_noise, open_rule
 from semsig_gis.objects import save_objects
+from semsig_gis.observation import North
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -308,6 +310,30 @@ def test_noise_is_learnt_and_used(city: Path, run: Run) -> None:
     answer = json.loads(run(*query)[1])
     assert answer["noise"] == "noise"
     assert math.dist((answer["place"]["x"], answer["place"]["y"]), PLACE) < 1.0
+
+
+def test_noise_is_learnt_from_bearings_of_a_compass(city: Path, run: Run) -> None:
+    north = North.of("magnetic", CITY.crs, CITY.bounds, date=dt.date(2024, 5, 1))
+    rng, rows = np.random.default_rng(0), samples(150)
+    for row in rows:
+        turn = rng.normal(0.0, 10.0)
+        row["bearings"] = [(north.from_grid(angle) + turn) % 360.0 for angle in row["bearings"]]
+    file, out = written(city.with_name("s.jsonl"), rows), city.with_name("noise.toml")
+    learn = "learn", city, "--samples", file, "--out", out, "--north", "magnetic"
+    compass = "--date", "2024-05-01", "--heading", 10
+    code, printed, _ = run(*learn, *compass)
+    assert code == 0
+    assert "The samples suffice for all classes together" in printed
+    report = json.loads(run(*learn, *compass, "--json")[1])
+    assert report["verdicts"]["detection"]["enough"]
+    assert report["spec"]["bearing_sigma"] == pytest.approx(4.0, abs=0.6)
+    for row in rows:
+        row["heading_error"] = "unknown"
+    written(file, rows[:3])
+    code, printed, _ = run(*learn)
+    assert code == 0
+    assert "Give more samples for" in printed
+    assert "fewer than 8 samples" in printed
 
 
 def test_ranges_and_fading_are_learnt_and_printed(city: Path, run: Run) -> None:

@@ -26,10 +26,14 @@ from semsig_gis.core import (
     wilson_interval,
 )
 from semsig_gis.localization.likelihood.association import (
+    FARTHEST,
     Detections,
+    Pairs,
     associate,
     at_distances,
+    bearing_spreads,
     near_pairs,
+    sum_products,
 )
 from semsig_gis.localization.noise.table import NoiseTable
 from semsig_gis.observation import View
@@ -41,7 +45,7 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature, Taxonomy
     from semsig_gis.database import VisibleObjects
-    from semsig_gis.localization.likelihood.association import Association, Pairs
+    from semsig_gis.localization.likelihood.association import Association
 
 
 ALL = "all"
@@ -52,6 +56,7 @@ LEAST, MOST = 1e-3, 1.0 - 1e-3
 LEAST_SIGMA, MOST_SIGMA = 0.05, 60.0
 LEAST_ERROR, MOST_ERROR = 0.01, 3.0  # of ranges
 LEAST_INFORMATION = 0.05
+LEAST_TRIALS = 1e-9  # fewer are none
 PERCENTS = (90, 95)  # of the intervals
 KNOTS = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 """Distances at which a falling chance of detection is learnt: shares of the range of a class."""
@@ -64,7 +69,9 @@ class Evidence:
 
     `names` are the k classes that occur, in the order of their codes in `start`, the first model.
     `views` are the objects visible in each photo, `detections` the detections, and `pairs` the
-    objects and detections that may be one thing.
+    objects and detections that may be one thing. A photo of uncertain north is there several
+    times, turned by different angles: `photos` are the numbers of the photos, and `log_weights` the
+    logarithm of the weight of each angle in the likelihood of the photo.
     """
 
     names: list[str]
@@ -72,6 +79,14 @@ class Evidence:
     views: VisibleObjects
     detections: Detections
     pairs: Pairs
+    photos: NDArray[np.int64]
+    log_weights: NDArray[np.float64]
+
+    @cached_property
+    def exposures(self) -> NDArray[np.float64]:
+        """The share of a full turn that each photo shows, counted once for all its angles."""
+        sums = np.bincount(self.photos, self.detections.turns)
+        return np.asarray(sums / np.bincount(self.photos))
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
@@ -93,9 +108,37 @@ class Evidence:
         """The class of the object of each pair."""
         return self.kinds[self.pairs.objects]
 
-    def by_kind(self, amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sum amounts of pairs by the class of the object, shape (k,)."""
-        return np.asarray(np.bincount(self.pair_kinds, amounts, len(self.names)), np.float64)
+    def near(self, sigma: NDArray[np.float64]) -> Evidence:
+        """Return the evidence that matters if bearings of the k classes err by at most `sigma`.
+
+        Objects far outside the sectors of their photo, and pairs of bearings far apart, are left
+        out: they change no expected count.
+        """
+        table, views, pairs = replace(self.start, sigma=sigma), self.views, self.pairs
+        spreads = bearing_spreads(table, self.kinds, self.distances)
+        inside, _ = self.detections.inside(self.owners, views.bearings, spreads)
+        units = distance_units_of(self.distances, table.reach)
+        mask = (inside > 0) | (table.leaving[self.kinds, units] > 0)
+        close = np.abs(pairs.away) <= FARTHEST * spreads[pairs.objects]
+        mask[pairs.objects[close]] = True
+        rows, ends = np.append(0, np.cumsum(mask)), np.append(0, np.cumsum(close))
+        return replace(
+            self,
+            views=replace(
+                views,
+                offsets=rows[views.offsets],
+                objects=views.objects[mask],
+                codes=views.codes[mask],
+                bearings=views.bearings[mask],
+                distances=views.distances[mask],
+            ),
+            pairs=Pairs(
+                starts=ends[pairs.starts],
+                objects=rows[pairs.objects[close]],
+                detections=pairs.detections[close],
+                away=pairs.away[close],
+            ),
+        )
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:
@@ -114,7 +157,8 @@ class Counts:
     logarithms of ranges, and the number of errors that each counts for. By object and knot, `hits`
     of `trials` were detected. `false`, by detection and class, is the chance of clutter. `named`,
     shape (k, k), counts detected objects by class and label; `log_likelihood` is that of all
-    detections.
+    detections. `totals` are the sums by class, from which a model is estimated: in columns, those
+    of `named`, `false`, `turns`, `ranges`, `hits` and `trials`.
     """
 
     chances: NDArray[np.float64]
@@ -125,6 +169,7 @@ class Counts:
     trials: NDArray[np.float64]
     false: NDArray[np.float64]
     named: NDArray[np.float64]
+    totals: NDArray[np.float64]
     log_likelihood: float
 
 
@@ -159,6 +204,8 @@ def gather_evidence(
         views=views,
         detections=detections,
         pairs=near_pairs(views.offsets, views.bearings, starts, bearings, reach=PAIR_DEGREES),
+        photos=np.arange(len(views)),
+        log_weights=np.zeros(len(views)),
     )
 
 
@@ -191,33 +238,49 @@ def expected_counts(evidence: Evidence, model: NoiseTable) -> Counts:
     size, count = len(evidence.names), len(detections.bearings)
     lengths = np.zeros(len(evidence.views), np.int64)
     association = associate(model, evidence.views, detections, pairs, lengths=lengths)
-    chances, kind = association.chances, evidence.pair_kinds
+    kind = evidence.pair_kinds
+    # The chance of each angle of a photo, which all its counts are multiplied by.
+    logs = association.loglik + evidence.log_weights
+    logliks = np.full(len(evidence.exposures), -math.inf)
+    np.logaddexp.at(logliks, evidence.photos, logs)
+    angles = np.exp(logs - logliks[evidence.photos])
+    of_objects, of_detections = angles[evidence.owners], angles[detections.photo_rows]
+    of_pairs = of_detections[pairs.detections]
+    chances = association.chances * of_pairs
     # The scores of a detection may be those of several classes.
-    naming = (model.named[0] @ detections.scores)[kind, pairs.detections]
+    naming = sum_products("kc,cn->kn", model.named[0], detections.scores)[kind, pairs.detections]
     own = model.named[0].diagonal()[kind] * detections.scores[kind, pairs.detections]
     cells = kind * count + pairs.detections
     by_detection = np.bincount(cells, chances / naming, size * count).reshape(size, -1)
-    true = np.bincount(pairs.detections, chances, count)
+    true = np.bincount(pairs.detections, association.chances, count)
     clutter = detections.scores * model.clutter[:, None]
     false = np.clip(1.0 - true, 0.0, 1.0) * association.clutter * clutter / clutter.sum(axis=0)
-    hits, trials = _detected_objects(evidence, association, model)
+    false *= of_detections
+    hits, trials = of_objects[:, None] * _detected_objects(evidence, association, model)
+    turns = of_pairs * _bearing_errors(evidence, association, model)
+    ranges = of_pairs * _range_errors(evidence, association, model)
+    names = model.named[0] * sum_products("kd,cd->kc", by_detection, detections.scores)
+    amounts = [(kind, row) for row in (*turns, *ranges)]
+    amounts += [(evidence.kinds, row) for row in (*hits.T, *trials.T)]
+    sums = [np.bincount(kinds, row, size) for kinds, row in amounts]
     return Counts(
         chances=chances,
         right=chances * own / naming,
-        turns=_bearing_errors(evidence, association, model),
-        ranges=_range_errors(evidence, association, model),
+        turns=turns,
+        ranges=ranges,
         hits=hits,
         trials=trials,
         false=false.T,
-        named=model.named[0] * (by_detection @ detections.scores.T),
-        log_likelihood=float(association.loglik.sum()),
+        named=names,
+        totals=np.column_stack([names, false.sum(axis=1), *sums]),
+        log_likelihood=float(logliks.sum()),
     )
 
 
 def _detected_objects(
     evidence: Evidence, association: Association, model: NoiseTable
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the expected hits and trials of the detection of each object, by knot."""
+) -> NDArray[np.float64]:
+    """Return the expected hits and trials of detection, shape (2, objects, knots)."""
     kinds, near = evidence.kinds, model.detected[0, evidence.kinds]
     units = distance_units_of(evidence.distances, model.reach)
     hits = np.bincount(evidence.pairs.objects, association.chances, len(kinds))
@@ -229,7 +292,8 @@ def _detected_objects(
     shares = near[:, None] * fading_at_knots(model)[kinds]
     of_hits, of_misses = (evidence.knots * part for part in (shares, 1.0 - shares))
     hit = hits[:, None] * of_hits / of_hits.sum(axis=1, keepdims=True)
-    return hit, hit + misses[:, None] * of_misses / of_misses.sum(axis=1, keepdims=True)
+    missed_shares = of_misses / of_misses.sum(axis=1, keepdims=True)
+    return np.stack([hit, hit + misses[:, None] * missed_shares])
 
 
 def fading_at_knots(model: NoiseTable) -> NDArray[np.float64]:
@@ -270,45 +334,49 @@ def _range_errors(
 
 
 def next_model(
-    evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool = False
+    evidence: Evidence, totals: NDArray[np.float64], model: NoiseTable, *, fading: bool = False
 ) -> NoiseTable:
-    """Return the model of the counts, class rates shrunk towards the overall rate: the M step.
+    """Return the model of the totals, class rates shrunk towards the overall rate: the M step.
 
     With `fading`, detection falls with distance.
     """
     size = len(evidence.names)
-    detected = counts.named.sum(axis=1)
-    wrong = counts.named * (1.0 - np.eye(size))
+    names, false, turns, ranges, hits, trials = _columns(totals)
+    detected = names.sum(axis=1)
+    wrong = names * (1.0 - np.eye(size))
     misnamed = np.clip(shrunk_rates(wrong.sum(axis=1), detected), LEAST, MOST)
     spread = wrong + PRIOR_SAMPLES * misnamed[:, None] * _others(size)
-    false = counts.false.sum(axis=0)
-    shares = (false + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
-    rates = np.clip(_rates_by_knot(evidence, counts, fading=fading), LEAST, MOST)
+    shares = (false[:, 0] + PRIOR_SAMPLES / size) / (false.sum() + PRIOR_SAMPLES)
+    rates = np.clip(_rates_by_knot(hits, trials, fading=fading), LEAST, MOST)
     metres = np.arange(DISTANCE_UNITS + 1) * (model.reach / DISTANCE_UNITS)
     faded = [
         np.interp(metres, KNOTS * limit, row / row[0])
         for limit, row in zip(model.ranges.tolist(), rates, strict=True)
     ]
-    turns, ranges = (
-        [evidence.by_kind(row) for row in part] for part in (counts.turns, counts.ranges)
-    )
     return replace(
         model,
         missed=1.0 - rates[None, :, 0],
         misnamed=misnamed[None] if size > 1 else np.zeros((1, 1)),
         others=spread / np.maximum(spread.sum(axis=1, keepdims=True), 1e-12),
-        clutter=np.maximum(false.sum() / evidence.detections.turns.sum() * shares, LEAST / size),
-        sigma=np.clip(np.sqrt(shrunk_rates(*turns)), LEAST_SIGMA, MOST_SIGMA),
-        range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges)), LEAST_ERROR, MOST_ERROR)
-        if ranges[1].any()
+        clutter=np.maximum(false.sum() / evidence.exposures.sum() * shares, LEAST / size),
+        sigma=np.clip(np.sqrt(shrunk_rates(*turns.T)), LEAST_SIGMA, MOST_SIGMA),
+        range_sigma=np.clip(np.sqrt(shrunk_rates(*ranges.T)), LEAST_ERROR, MOST_ERROR)
+        if ranges[:, 1].any()
         else model.range_sigma,
         fading=np.stack(faded) if fading else model.fading,
     )
 
 
-def _rates_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArray[np.float64]:
+def _columns(totals: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the parts of `Counts.totals`: each of one column or more."""
+    widths = [len(totals), 1, 2, 2, len(KNOTS)]
+    return np.split(totals, np.cumsum(widths), axis=1)
+
+
+def _rates_by_knot(
+    hits: NDArray[np.float64], trials: NDArray[np.float64], *, fading: bool
+) -> NDArray[np.float64]:
     """Return the chance of detection by class and knot, shape (k, knots)."""
-    hits, trials = _by_knot(evidence, counts)
     if not fading:
         rates = shrunk_rates(hits.sum(axis=1), trials.sum(axis=1))
         return np.broadcast_to(rates[:, None], hits.shape)
@@ -320,17 +388,6 @@ def _rates_by_knot(evidence: Evidence, counts: Counts, *, fading: bool) -> NDArr
     prior = np.clip(level[:, None] * overall, LEAST, MOST)
     rows = zip(hits + PRIOR_SAMPLES * prior, trials + PRIOR_SAMPLES, strict=True)
     return np.stack([falling(*row) for row in rows])
-
-
-def _by_knot(evidence: Evidence, counts: Counts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the hits and trials by class and knot, shape (k, knots)."""
-    size = len(evidence.names)
-
-    def by_class(amounts: NDArray[np.float64]) -> NDArray[np.float64]:
-        sums = [np.bincount(evidence.kinds, column, size) for column in amounts.T]
-        return np.stack(sums, axis=1).astype(np.float64)
-
-    return by_class(counts.hits), by_class(counts.trials)
 
 
 def falling(hits: NDArray[np.float64], trials: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -354,7 +411,7 @@ def detection_falls(evidence: Evidence, counts: Counts) -> bool:
     """
     if evidence.start.position_sigma > 0:
         return False
-    hits, trials = _by_knot(evidence, counts)
+    hits, trials = _columns(counts.totals)[-2:]
     rates = hits.sum(axis=1) / np.maximum(trials.sum(axis=1), 1e-9)
     places = KNOTS - (trials @ KNOTS / np.maximum(trials.sum(axis=1), 1e-9))[:, None]
     trend = ((hits - trials * rates[:, None]) * places).sum()
@@ -445,8 +502,8 @@ def _quantities(
     evidence: Evidence, counts: Counts, model: NoiseTable, *, fading: bool
 ) -> list[_Quantity]:
     """Return all learnt quantities."""
-    size, photos = len(evidence.names), len(evidence.views)
-    sample = evidence.owners[evidence.pairs.objects]
+    size, photos = len(evidence.names), len(evidence.exposures)
+    photo_of_object = evidence.photos[evidence.owners]
 
     def by_photo(
         owner: NDArray[np.int64], group: NDArray[np.int64], amount: NDArray[np.float64]
@@ -476,7 +533,7 @@ def _quantities(
             distances=np.full(size, np.nan) if distances is None else distances,
         )
 
-    quantities, rows = [], (evidence.owners, evidence.kinds)
+    quantities, rows = [], (photo_of_object, evidence.kinds)
     chances = model.detected[0][:, None] * fading_at_knots(model)
     for number, knot in enumerate(KNOTS if fading else KNOTS[:1]):
         parts = slice(number, number + 1) if fading else slice(None)
@@ -486,11 +543,11 @@ def _quantities(
         metres = knot * model.ranges if fading else None
         name = "fading" if number else "detection"
         quantities.append(quantity(name, hits, trials, chances[:, number], distances=metres))
-    pairs = sample, evidence.pair_kinds
+    pairs = photo_of_object[evidence.pairs.objects], evidence.pair_kinds
     false = np.zeros((photos, size))
-    np.add.at(false, evidence.detections.photo_rows, counts.false)
-    turns = float(evidence.detections.turns.sum())
-    exposed = np.repeat(evidence.detections.turns[:, None], size, axis=1)
+    np.add.at(false, evidence.photos[evidence.detections.photo_rows], counts.false)
+    turns = float(evidence.exposures.sum())
+    exposed = np.repeat(evidence.exposures[:, None], size, axis=1)
     wrong = by_photo(*pairs, np.maximum(counts.chances - counts.right, 0.0))
     quantities += [
         quantity("misnamed", wrong, by_photo(*pairs, counts.chances), model.misnamed[0]),
@@ -509,6 +566,8 @@ def _row(
     quantity: _Quantity, name: str, hits: float, trials: float, deviation: float
 ) -> dict[str, Any]:
     """Return a rate with its intervals; `deviation` is that of its log-odds or logarithm."""
+    if trials < LEAST_TRIALS:
+        hits = trials = 0.0
     rate = hits / trials if trials > 0 else 0.0
     if quantity.name in {"bearing_sigma", "range_sigma"}:
         own = math.sqrt(rate)

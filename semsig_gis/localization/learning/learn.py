@@ -15,6 +15,7 @@ from semsig_gis.localization.learning.fit import (
     ALL,
     KNOTS,
     LEAST,
+    PRIOR_SAMPLES,
     detection_falls,
     estimated_rates,
     expected_counts,
@@ -23,8 +24,9 @@ from semsig_gis.localization.learning.fit import (
     model_change,
     next_model,
 )
+from semsig_gis.localization.learning.headings import turned_evidence
 from semsig_gis.localization.noise.model import NoiseSpec
-from semsig_gis.observation import RADIUS_M, SEEN, View, parse_view
+from semsig_gis.observation import RADIUS_M, SEEN, View, check_north, parse_view
 from semsig_gis.storage import read_rows, row_value
 
 if TYPE_CHECKING:
@@ -41,7 +43,13 @@ if TYPE_CHECKING:
     from semsig_gis.storage import Row
 
 MOST_ROUNDS = 500
-CONVERGED = 1e-4  # largest change of a log-odds or logarithm in the last round
+# Samples suffice if the 90 % interval of a quantity is within a factor, or as narrow as this.
+NARROW_FACTOR, NARROW = 1.5, 0.05
+SCAN_ROUNDS = 20  # of the fit after each scan but the last
+SCANS = 4  # for the headings of photos of uncertain north, each with a better model
+CONVERGED = 1e-5  # largest change of a log-odds or logarithm in the last round
+MEMORY = 8  # earlier rounds from which totals are extrapolated
+LARGEST_FALL = 0.01  # of the log-likelihood from one round to the next
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,7 +58,7 @@ class Sample:
 
     The place is either `xy`, in metres in the CRS of the city, or `cell_id` (see
     `core.geometry.cell_ids`). The signature, which may be a `View`, must have types, all known, or
-    scores, and bearings; an error of its north counts as bearing noise.
+    scores, and bearings. The north of its photos may be uncertain or unknown.
     """
 
     signature: Signature
@@ -74,11 +82,6 @@ class Sample:
         if (view.class_scores()[:, WILDCARD] == 1).any():
             raise InputError(
                 "a sample has a detection of unknown class; give its class, or leave it out."
-            )
-        if any(math.isinf(photo.north_sigma or 0.0) for photo in view.photos):
-            raise InputError(
-                "a sample has a photo of unknown heading; give the heading, or leave the sample "
-                "out."
             )
 
 
@@ -172,6 +175,23 @@ class NoiseEstimate(Displayed):
             "bearing": f"±{self.spec.bearing_sigma:.3g}°",
         }
 
+    @property
+    def verdicts(self) -> dict[str, dict[str, Any]]:
+        """Whether the samples suffice, by quantity.
+
+        They are ``enough`` if the 90 % interval of all classes together is within a factor of 1.5,
+        or at most 0.05 wide; ``few`` are the classes with fewer than 8 samples of their own, which
+        depend more on the rate of all classes than on these.
+        """
+        verdicts = {}
+        for quantity, rows in self.rates.groupby("quantity", sort=False):
+            low, high = rows.loc[rows["class"] == ALL, ["low_90", "high_90"]].to_numpy().T
+            narrow = (high <= NARROW_FACTOR * low) | (high - low <= NARROW)
+            own = rows[rows["class"] != ALL].groupby("class", sort=False)["samples"].sum()
+            few = own.index[own < PRIOR_SAMPLES].tolist()
+            verdicts[str(quantity)] = {"enough": bool(narrow.all()), "few": few}
+        return verdicts
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -180,6 +200,7 @@ class NoiseEstimate(Displayed):
             "spec": self.spec.to_dict(),
             "rates": plain.to_dict("records"),
             "confusion": self.confusion.to_dict("index"),
+            "verdicts": self.verdicts,
         }
 
 
@@ -189,6 +210,7 @@ def learn_noise(
     *,
     radius: float = 30.0,
     position_sigma: float = 0.0,
+    north_sigma: float = 0.0,
     footprints: Footprints | None = None,
     name: str = "learned",
 ) -> NoiseEstimate:
@@ -207,6 +229,9 @@ def learn_noise(
         Known standard deviation of the true places in metres, in x and y (with a database, of the
         place in its cell: ``step / 12 ** 0.5`` for places anywhere in it). The differences of
         bearings that it causes are not counted as bearing noise.
+    north_sigma : float, default 0
+        Standard deviation of the north of photos without one of their own, in degrees, infinite if
+        unknown. Errors of north are not counted as bearing noise either.
     footprints : Footprints, optional
         Buildings that hide objects, for street objects.
     name : str, default "learned"
@@ -220,7 +245,8 @@ def learn_noise(
     Raises
     ------
     InputError
-        If there are no samples, none can be used, or there is no visible object or no detection.
+        If there are no samples, none can be used, there is no visible object or no detection, or a
+        deviation is out of range.
 
     Notes
     -----
@@ -246,17 +272,29 @@ def learn_noise(
         raise InputError(
             f"the deviation of the places is {position_sigma} m; give metres, 0 or more."
         )
+    check_north(north_sigma)
     views, used = _true_views(samples, city, radius, footprints)
     detected = [samples[row].signature for row in used]
     reach = city.spec.radius if isinstance(city, SignatureDatabase) else radius
     evidence = gather_evidence(
         views, detected, taxonomy=city.taxonomy, radius=reach, position_sigma=position_sigma
     )
-    model, rounds = _fit(evidence, evidence.start, fading=False)
+    first, model, rounds = evidence, evidence.start, 0
+    looks = [photo for view in detected for photo in View.of(view).photos]
+    uncertain = any(
+        north_sigma if photo.north_sigma is None else photo.north_sigma for photo in looks
+    )
+    # The headings of all scans but the last are only a beginning.
+    limits = [SCAN_ROUNDS] * (SCANS - 1) if uncertain else []
+    for most_rounds in (*limits, MOST_ROUNDS):
+        if uncertain:
+            evidence = turned_evidence(first, detected, model, north_sigma=north_sigma)
+        model, more = fit_model(evidence, model, fading=False, most_rounds=most_rounds)
+        rounds += more
     counts = expected_counts(evidence, model)
     fading = detection_falls(evidence, counts)
     if fading:
-        model, more = _fit(evidence, model, fading=True)
+        model, more = fit_model(evidence, model, fading=True)
         counts, rounds = expected_counts(evidence, model), rounds + more
     rates = estimated_rates(evidence, counts, model, fading=fading)
     return NoiseEstimate(
@@ -265,22 +303,58 @@ def learn_noise(
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
         samples=len(used),
         objects=len(views.codes),
-        detections=len(evidence.detections.bearings),
+        detections=sum(map(len, detected)),
         skipped=len(samples) - len(used),
         rounds=rounds,
         log_likelihood=counts.log_likelihood,
     )
 
 
-def _fit(evidence: Evidence, model: NoiseTable, *, fading: bool) -> tuple[NoiseTable, int]:
-    """Return the model after convergence, and the number of rounds."""
+def fit_model(
+    evidence: Evidence, model: NoiseTable, *, fading: bool, most_rounds: int = MOST_ROUNDS
+) -> tuple[NoiseTable, int]:
+    """Return the model after convergence, or after the most rounds, and the number of rounds.
+
+    Anderson's method speeds up expectation-maximisation: each round starts from totals that are
+    extrapolated from those before and after the last rounds. If the likelihood falls, the round
+    starts from the last totals as they are.
+    """
+    before: list[NDArray[np.float64]] = []
+    after: list[NDArray[np.float64]] = []
+    totals, last, highest = None, np.zeros(0), -math.inf
+    near, sigma = evidence, np.zeros(0)
     rounds, change = 0, math.inf
-    while change >= CONVERGED and rounds < MOST_ROUNDS:
-        counts = expected_counts(evidence, model)
-        old, model = model, next_model(evidence, counts, model, fading=fading)
-        change = model_change(old, model)
+    while change >= CONVERGED and rounds < most_rounds:
         rounds += 1
-    return model, rounds
+        if not len(sigma) or np.abs(np.log2(model.sigma / sigma)).max() > 1.0:
+            near, sigma = evidence.near(2.0 * model.sigma), model.sigma
+        counts = expected_counts(near, model)
+        if counts.log_likelihood < highest - LARGEST_FALL:
+            before, after, totals, highest = [], [], last, -math.inf
+        else:
+            last, highest = counts.totals, counts.log_likelihood
+            plain = next_model(evidence, counts.totals, model, fading=fading)
+            change = model_change(model, plain)
+            if totals is not None:
+                before, after = [*before[-MEMORY:], totals], [*after[-MEMORY:], last]
+            totals = extrapolated(before, after) if before else last
+        model = next_model(evidence, totals, model, fading=fading)
+    return plain, rounds
+
+
+def extrapolated(
+    before: Sequence[NDArray[np.float64]], after: Sequence[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return where a round would likely change nothing, given values before and after rounds.
+
+    The values are 0 or more. It is Anderson's method, of square roots, which have about the same
+    error for all counts: the combination of the rounds with the least change.
+    """
+    results = np.sqrt([value.ravel() for value in after])
+    changes = results - np.sqrt([value.ravel() for value in before])
+    weights, *_ = np.linalg.lstsq(np.diff(changes, axis=0).T, changes[-1])
+    new = results[-1] - weights @ np.diff(results, axis=0)
+    return np.asarray(np.maximum(new, 0.0) ** 2).reshape(after[-1].shape)
 
 
 def _true_views(

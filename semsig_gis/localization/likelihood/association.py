@@ -44,8 +44,9 @@ if TYPE_CHECKING:
 WIDE = 45.0  # degrees of deviation from which on the tails meet behind the observer
 LAPS = 360.0 * np.arange(-3, 4)
 FARTHEST = 8.0  # deviations, beyond which a normal distribution is over
-LEAST_MASS = 1e-12
 ROOT = math.sqrt(2.0 * math.pi)
+# Without BLAS: on a busy machine its threads wait long for each other.
+sum_products = partial(np.einsum, optimize=False)
 
 
 def turn_logs(turns: NDArray[np.float64], step: float, north_sigma: float) -> NDArray[np.float64]:
@@ -134,6 +135,12 @@ class Detections:
         """The share of a full turn that each photo shows."""
         return np.array([photo.width for photo in self.photos])
 
+    @cached_property
+    def sectors(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The first sector of each photo and an end, shape (photos + 1,), and all sectors."""
+        counts = [len(photo.sectors) for photo in self.photos]
+        return np.cumsum([0, *counts]), np.concatenate([photo.sectors for photo in self.photos])
+
     def inside(
         self,
         owners: NDArray[np.int64],
@@ -145,33 +152,11 @@ class Detections:
         Object i, of photo ``owners[i]``, has a bearing and a spread in degrees. The second array is
         the mean square of the deviations inside, in squares of the spread.
         """
-        sectors = np.concatenate([photo.sectors for photo in self.photos])
-        counts = np.array([len(photo.sectors) for photo in self.photos])
-        many = counts[owners]
-        row = np.repeat(np.arange(len(owners)), many)
-        within = np.arange(len(row)) - np.repeat(np.cumsum(many) - many, many)
-        own = sectors[(np.cumsum(counts) - counts)[owners[row]] + within]
-        low = signed_degrees(own[:, 0] - bearings[row])[:, None] + LAPS
-        high = low + (own[:, 1] - own[:, 0])[:, None]
-        below, bent = _normal(np.stack([low, high]) / spreads[row, None])
-        sums, bend = (
-            np.bincount(row, (part[1] - part[0]).sum(axis=1), len(owners)) for part in (below, bent)
-        )
-        mass = np.where(many == 0, 1.0, np.clip(sums, 0.0, 1.0))
-        squares = np.maximum(1.0 - bend / np.maximum(mass, LEAST_MASS), 0.0)
-        return np.asarray(mass, np.float64), np.asarray(squares, np.float64)
+        from semsig_gis.localization.likelihood.association_kernels import sector_shares  # noqa: PLC0415 - numba, 0.25 s
 
-
-def _normal(
-    deviations: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the normal distribution function, and its density times the deviation."""
-    mass = (deviations > 0).astype(np.float64)
-    near = np.abs(deviations) < FARTHEST
-    mass[near] = [0.5 * math.erfc(-value * math.sqrt(0.5)) for value in deviations[near].tolist()]
-    bent = np.zeros(deviations.shape)
-    bent[near] = deviations[near] * np.exp(-0.5 * deviations[near] ** 2) / ROOT
-    return mass, bent
+        mass, squares = np.empty((2, len(owners)))
+        sector_shares(*self.sectors, owners, bearings, spreads, mass, squares)
+        return mass, squares
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -209,8 +194,7 @@ def associate(
     owners = np.repeat(np.arange(len(views)), views.lengths)
     distances = at_distances(table, views)
     units = distance_units_of(distances, table.reach)
-    spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
-    spreads = np.minimum(spreads, HALF_TURN)
+    spreads = bearing_spreads(table, kinds, distances)
     # By object: the chances of its detection and of a miss.
     inside, squares = photos.inside(owners, views.bearings, spreads)
     near = table.detected[rows[owners], kinds]
@@ -219,7 +203,7 @@ def associate(
     # By detection: the density of clutter, and of objects that come into range in any direction,
     # as many as leave it.
     used_rows, row = np.unique(rows, return_inverse=True)
-    name_chances = table.named[used_rows] @ photos.scores
+    name_chances = sum_products("lkc,cn->lkn", table.named[used_rows], photos.scores)
     leaving = np.zeros((len(views), len(table.codes)))
     np.add.at(leaving, (owners, kinds), near * table.leaving[kinds, units])
     names = name_chances[row[photos.photo_rows], :, np.arange(len(photos.photo_rows))]
@@ -253,6 +237,14 @@ def associate(
 def at_distances(table: NoiseTable, views: VisibleObjects) -> NDArray[np.float64]:
     """Return the distances of objects in metres; the nearest is above 0."""
     return np.asarray(np.maximum(views.distances, table.distances[0]))
+
+
+def bearing_spreads(
+    table: NoiseTable, kinds: NDArray[np.int64], distances: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the deviation of the bearing of objects in degrees, by class and distance."""
+    spreads = np.hypot(table.sigma[kinds], np.degrees(table.position_sigma / distances))
+    return np.minimum(spreads, HALF_TURN)
 
 
 def _bearing_densities(

@@ -24,6 +24,8 @@ _LEAST_WEIGHT = 1e-6  # pairs of a lower weight, against a miss and a false dete
 _WIDE = 45.0  # degrees of deviation above which the tails of a bearing meet behind the observer
 _LARGE = 1e200  # products beyond this, or below its inverse, become logarithms
 _ERF_IS_ONE = 6.0
+_LEAST_MASS = 1e-12
+_FARTHEST = 8.0  # deviations, beyond which a normal distribution is over
 # The most rounds of messages, and the relative change below which they have converged.
 _ROUNDS, _SETTLED = 30, 1e-2
 _PAIR_ROUNDS, _PAIR_SETTLED = 60, 1e-5
@@ -42,6 +44,43 @@ def _mass(start: float, width: float, spread: float) -> float:
         if low < _ERF_IS_ONE and high > -_ERF_IS_ONE:
             total += math.erf(high) - math.erf(low)
     return 0.5 * total
+
+
+@compiled
+def sector_shares(  # noqa: PLR0917 - a kernel takes no keywords
+    starts: NDArray[np.int64],
+    sectors: NDArray[np.float64],
+    owners: NDArray[np.int64],
+    bearings: NDArray[np.float64],
+    spreads: NDArray[np.float64],
+    mass: NDArray[np.float64],
+    squares: NDArray[np.float64],
+) -> None:
+    """Fill `mass` and `squares` as `Detections.inside` returns them.
+
+    The sectors of photo i are ``starts[i]:starts[i + 1]``.
+    """
+    for entry in range(len(owners)):
+        first, last = starts[owners[entry]], starts[owners[entry] + 1]
+        spread = spreads[entry]
+        total, bent = 0.0, 0.0
+        for sector in range(first, last):
+            start, width = sectors[sector, 0] - bearings[entry], sectors[sector, 1]
+            width -= sectors[sector, 0]
+            total += _mass(start, width, spread)
+            # The integral of the squares by parts: the density times the deviation at both ends.
+            start -= FULL_TURN * math.floor(start / FULL_TURN + 0.5)
+            for lap in range(-3, 4):
+                low = (start + FULL_TURN * lap) / spread
+                high = low + width / spread
+                if low > _FARTHEST or high < -_FARTHEST:
+                    continue
+                bent += high * math.exp(-0.5 * high * high) - low * math.exp(-0.5 * low * low)
+        if first == last:
+            mass[entry], squares[entry] = 1.0, 1.0
+        else:
+            mass[entry] = min(max(total, 0.0), 1.0)
+            squares[entry] = max(1.0 - bent / _ROOT / max(mass[entry], _LEAST_MASS), 0.0)
 
 
 @compiled

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from noisy_cells import TAXONOMY, distorted, parts_of, random_database, random_query
 from sentences import refused
+from view_oracle import random_view
 from worlds import CODES, World
 
 from semsig_gis.core import InputError, Signature, wilson_interval
@@ -21,6 +22,8 @@ from semsig_gis.localization import (
     Sample,
     estimated_rates,
     expected_counts,
+    extrapolated,
+    fit_model,
     gather_evidence,
     learn_noise,
     model_change,
@@ -257,6 +260,51 @@ def test_photos_recover_rates_ranges_and_fading() -> None:
     assert np.mean(inside) >= 0.87
 
 
+@pytest.mark.parametrize("sigma", [10.0, math.inf])
+def test_photos_of_uncertain_heading_recover_the_same_model(
+    estimate: NoiseEstimate, sigma: float
+) -> None:
+    rng = np.random.default_rng(0)
+    samples = []
+    for number, sample in enumerate(simulated(DATABASE, 500)):
+        # Every third heading is known; the others have an error of their own, or that of all.
+        photo = Photo(north_sigma=(0.0, sigma, None)[number % 3])
+        turn = 0.0 if number % 3 == 0 else rng.uniform(0, 360)
+        if math.isfinite(sigma):
+            turn = rng.normal(0.0, sigma) if number % 3 else 0.0
+        view = View.of(sample.signature, photos=(photo,)).turned(turn)
+        samples.append(Sample(signature=view, cell_id=sample.cell_id))
+    uncertain = learn_noise(samples, DATABASE, north_sigma=sigma)
+    assert sum(in_intervals(uncertain)) >= 13
+    rows, bounds = uncertain.rates, estimate.rates
+    assert (rows["value"].between(bounds["low_95"], bounds["high_95"])).all()
+    assert (uncertain.samples, uncertain.objects) == (estimate.samples, estimate.objects)
+    assert uncertain.detections == estimate.detections
+
+
+def test_photos_of_a_place_have_headings_of_their_own() -> None:
+    database = random_database(1, cells=100, longest=14)
+    rng, samples = np.random.default_rng(0), []
+    for sample in simulated(database, 300, seed=1, observe=photographer):
+        parts = [part.turned(rng.normal(0.0, 15.0)) for part in View.of(sample.signature).split()]
+        photos = [replace(part.photos[0], north_sigma=15.0) for part in parts]
+        views = [View.of(part, photos=(photo,)) for part, photo in zip(parts, photos, strict=True)]
+        samples.append(Sample(signature=View.joined(views), cell_id=sample.cell_id))
+    inside = in_intervals(learn_noise(samples, database), photo_truth)
+    assert len(inside) == 4 * (5 + 4)
+    assert np.mean(inside) >= 0.85
+
+
+def test_verdicts_say_which_samples_suffice(estimate: NoiseEstimate) -> None:
+    assert all(verdict == {"enough": True, "few": []} for verdict in estimate.verdicts.values())
+    few = learn_noise(simulated(DATABASE, 3), DATABASE)
+    assert not few.verdicts["clutter"]["enough"]
+    for quantity, verdict in few.verdicts.items():
+        rows = few.rates[(few.rates["quantity"] == quantity) & (few.rates["class"] != ALL)]
+        assert verdict["few"] == rows[rows["samples"] < 8]["class"].tolist()
+    assert few.to_dict()["verdicts"] == few.verdicts
+
+
 def test_csv_and_json_lines_give_equal_samples(tmp_path: Path) -> None:
     (tmp_path / "seen.CSV").write_text(
         'note,cell_id,types,bearings,x,y\nfirst,7,DB,"10, 350",,\nnothing,8,,,,\n,,D,-10,1.5,2\n'
@@ -329,9 +377,51 @@ def test_counts_add_up(seed: int) -> None:
     assert hits + counts.false.sum() <= len(evidence.detections.bearings) + 0.05
     assert (counts.named.sum(axis=1) <= counts.trials.sum() + 0.05).all()
     assert (counts.turns >= 0).all()
-    new = next_model(evidence, counts, model)
+    new = next_model(evidence, counts.totals, model)
     assert new.clutter.sum() * 20 == pytest.approx(counts.false.sum(), rel=0.02)
     assert new.named.sum(axis=2) == pytest.approx(1.0)
+
+
+@given(st.integers(0, 500), st.sampled_from([0.0, 2.5]), st.floats(0.5, 30.0))
+def test_what_is_far_away_changes_no_count(seed: int, position: float, sigma: float) -> None:
+    database = random_database(seed, cells=6, longest=8)
+    rng = np.random.default_rng(seed)
+    photos = (Photo.looking(heading=40, fov=60),)
+    detected = [random_view(database, rng, size=seed % 5, photos=photos) for _ in range(6)]
+    if not sum(map(len, detected)):
+        return
+    views = visible_objects_in(database, np.arange(6))
+    evidence = gather_evidence(views, detected, taxonomy=TAXONOMY, position_sigma=position)
+    model = replace(evidence.start, sigma=np.full(len(evidence.names), sigma))
+    near = evidence.near(model.sigma)
+    assert len(near.pairs.away) <= len(evidence.pairs.away)
+    counts, all_counts = expected_counts(near, model), expected_counts(evidence, model)
+    assert counts.totals == pytest.approx(all_counts.totals, rel=1e-4, abs=1e-6)
+    assert counts.log_likelihood == pytest.approx(all_counts.log_likelihood, abs=1e-5)
+
+
+def test_the_fast_fit_equals_many_plain_rounds() -> None:
+    database = random_database(3, cells=60, longest=5)
+    rng = np.random.default_rng(0)
+    detected = [distorted(database, cell, rng) for cell in range(60)]
+    evidence = gather_evidence(
+        visible_objects_in(database, np.arange(60)), detected, taxonomy=TAXONOMY
+    )
+    fast, rounds = fit_model(evidence, evidence.start, fading=False)
+    model = evidence.start
+    for _ in range(400):
+        model = next_model(evidence, expected_counts(evidence, model).totals, model)
+    assert rounds < 50
+    assert model_change(model, fast) < 1e-3
+
+
+@given(st.integers(0, 10_000))
+def test_an_extrapolation_of_linear_rounds_ends_where_nothing_changes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    matrix, end = rng.uniform(-0.25, 0.25, (3, 3)), rng.uniform(1.0, 2.0, 3)
+    before = [(end + matrix @ rng.normal(0.0, 0.3, 3)) ** 2 for _ in range(5)]
+    after = [(end + matrix @ (np.sqrt(value) - end)) ** 2 for value in before]
+    assert extrapolated(before, after) == pytest.approx(end**2, rel=1e-4)
 
 
 def test_rounds_of_the_fit_raise_the_likelihood() -> None:
@@ -347,7 +437,7 @@ def test_rounds_of_the_fit_raise_the_likelihood() -> None:
         counts = expected_counts(evidence, model)
         assert counts.log_likelihood > before - 0.1  # class rates are shrunk as well
         before = counts.log_likelihood
-        new = next_model(evidence, counts, model)
+        new = next_model(evidence, counts.totals, model)
         assert model_change(model, model) == 0.0
         assert model_change(model, new) > 0
         model = new

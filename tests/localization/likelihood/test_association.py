@@ -238,6 +238,28 @@ def test_deviations_inside_a_sector_equal_a_simulation() -> None:
     assert squares[4] == 1.0
 
 
+@given(
+    st.floats(-200, 400),
+    st.floats(1, 359),
+    st.floats(0, 360, exclude_max=True),
+    st.floats(0.5, 60.0),
+)
+def test_deviations_inside_a_sector_equal_an_integral(
+    start: float, width: float, bearing: float, spread: float
+) -> None:
+    photo = Photo(sectors=((start, start + width),))
+    query = View(np.array([3], np.uint8), np.array([photo.sectors[0][0]]), photos=(photo,))
+    detections = Detections.of([query], database_tables(random_database(0), NoiseSpec())[0][0])
+    row = np.zeros(1, np.int64), np.array([bearing]), np.array([spread])
+    (inside,), (squares,) = detections.inside(*row)
+    away = np.linspace(-7.0, 7.0, 200_001)
+    density = np.exp(-0.5 * away**2) * photo.sees(bearing + spread * away)
+    mass = density.sum() / math.sqrt(2.0 * math.pi) * (away[1] - away[0])
+    assert inside == pytest.approx(mass, abs=1e-4)
+    if mass > 0.01:
+        assert squares == pytest.approx((density * away**2).sum() / density.sum(), abs=0.01)
+
+
 @settings(max_examples=40)
 @given(SEEDS, mixtures(), st.integers(1, 5))
 def test_the_sum_over_associations_is_close_and_never_too_large(
