@@ -29,6 +29,7 @@ from semsig_gis.core import (
 from semsig_gis.localization.likelihood.photo import PhotoTable
 from semsig_gis.localization.likelihood.records import LANES, BinnedObjects, LevelModel, PhotoRows
 from semsig_gis.localization.likelihood.turns import TURNS, TurnPrior, TurnScores
+from semsig_gis.localization.noise.beyond import noise_with_objects_beyond
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
 from semsig_gis.localization.noise.table import database_tables, mean_table
 from semsig_gis.observation import View, check_north
@@ -188,6 +189,7 @@ class LikelihoodIndex(Displayed):
             scores, heading = score_photo(photo, own_sigma(photo, north_sigma))
             loglik += scores
             headings.append(heading)
+        loglik *= photo_power(len(headings), self.noise)
         return CellScores(loglik=loglik, headings=tuple(headings))
 
     def off_centre_scorer(
@@ -204,6 +206,7 @@ class LikelihoodIndex(Displayed):
         scorers = [
             photo_scorer(photo, levels, own_sigma(photo, north_sigma)) for photo in view.split()
         ]
+        power = photo_power(len(scorers), self.noise)
 
         def score(cells: NDArray[np.int64]) -> NDArray[np.float64]:
             loglik = np.empty(len(cells))
@@ -213,7 +216,7 @@ class LikelihoodIndex(Displayed):
                 bins = (views.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
                 units = distance_units_of(views.distances, levels.table.reach)
                 objects = levels.objects(views.offsets, views.codes, bins, units)
-                total = sum(scorer(objects)[0] for scorer in scorers)
+                total = sum(scorer(objects)[0] for scorer in scorers) * power
                 by_point = np.asarray(total, np.float64).reshape(-1, len(points))
                 mean = np.logaddexp.reduce(by_point, axis=1) - math.log(len(points))
                 loglik[slice(*part)] = mean
@@ -307,6 +310,11 @@ def photo_scorer(
         return scores, best * np.float32(FULL_TURN / TURNS)
 
     return score_turned
+
+
+def photo_power(photos: int, noise: Noise) -> float:
+    """Return the power of the likelihood of some photos of one place (see `NoiseSpec.repeat`)."""
+    return float(photos ** (noise.repeat - 1.0))
 
 
 def own_sigma(photo: View, north_sigma: float) -> float:
@@ -473,6 +481,7 @@ def build_index(database: SignatureDatabase, noise: Noise) -> LikelihoodIndex:
     >>> len(index.database) == len(demo_database)
     True
     """
+    noise = noise_with_objects_beyond(noise, database)
     index = LikelihoodIndex(database=database, noise=noise)
     _ = index.models
     return index

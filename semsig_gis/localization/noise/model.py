@@ -75,7 +75,14 @@ class NoiseSpec(Displayed):
     fading : mapping of str to sequence of (float, float), optional
         How the chance of detection falls with the distance, for classes by name, or ``all``
         others: pairs of metres, ascending, and the remaining share of `detection` there, 0 to 1;
-        linear between them, and the last share beyond.
+        linear between them, and the last share beyond. Objects that are seen from beyond the
+        visibility range of a database, up to the last distance, are false objects there.
+    repeat : float, default 1.0
+        How much photographs of one place add to each other, 0 to 1: n of them count as
+        ``n ** repeat``. What one photograph misses, the next one misses too, so their likelihoods
+        do not simply multiply, as they do with 1.
+    general : bool, default False
+        Whether the tables by class may name classes that a database does not have.
     name : str, default "custom"
         Name to print.
 
@@ -109,11 +116,15 @@ class NoiseSpec(Displayed):
     range_sigma: float = 0.25
     range_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
     fading: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
+    repeat: float = 1.0
+    general: bool = False
     name: str = "custom"
 
     def __post_init__(self) -> None:  # noqa: D105
         if not isinstance(self.name, str):
             raise InputError(f"name of the noise model is {self.name!r}; give a text.")
+        if not isinstance(self.general, bool):
+            raise InputError(f"general of the noise is {self.general!r}; give true or false.")
         for label, number in _NUMBERS.items():
             number.check(label, getattr(self, label))
         for label in BY_CLASS:
@@ -139,6 +150,7 @@ class NoiseSpec(Displayed):
             "range": f"±{100 * self.range_sigma:.3g} %",
             "missed each": f"{self.missed_each:.3g}",
             "misnamed each": f"{self.misnamed_each:.3g}",
+            "repeat": f"{self.repeat:.3g}",
             "by class": ", ".join(name for name in tables if getattr(self, name)) or "nothing",
         }
 
@@ -209,6 +221,13 @@ class NoiseMixture(Displayed):
             "name": self.name,
             "models": ", ".join(f"{spec.name} {percent(weight, 0)}" for spec, weight in models),
         }
+
+    @property
+    def repeat(self) -> float:
+        """How much photographs of one place add to each other, the mean of the models."""
+        return math.fsum(
+            weight * spec.repeat for weight, spec in zip(self.weights, self.specs, strict=True)
+        )
 
     def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseMixture:
         """Return the mixture after a change of each of its models."""
@@ -366,6 +385,7 @@ _NUMBERS = MappingProxyType(
     {
         "detection": _CHANCE,
         "misnamed": _CHANCE,
+        "repeat": _CHANCE,
         "clutter": _AMOUNT,
         "bearing_sigma": _DEGREES,
         "position_sigma": _AMOUNT,
