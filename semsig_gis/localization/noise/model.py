@@ -20,7 +20,6 @@ from semsig_gis.core import (
     HALF_TURN,
     Displayed,
     InputError,
-    UnknownNameError,
     nearest_name,
     percent,
 )
@@ -328,40 +327,6 @@ def place_noise(noise: Noise, step: float) -> Noise:
     return noise.changed(narrowed)
 
 
-def named_noise(name: str) -> Noise:
-    """Return a noise model by name.
-
-    Parameters
-    ----------
-    name : {"light", "medium", "strong", "generic", "by-hand"}
-        A level of the source's distortion, ``"generic"`` if the level is not known, or
-        ``"by-hand"`` for a person, who marks or names some of the visible objects: nine, six or
-        three in ten.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such model.
-
-    Examples
-    --------
-    >>> named_noise("medium").clutter
-    2.3333333333333335
-    """
-    if name not in NOISES:
-        *most, last = NOISES
-        hint = nearest_name(name, NOISES)
-        raise UnknownNameError(
-            f"{name!r} is not a noise model; give {', '.join(most)} or {last}{hint}."
-        )
-    return NOISES[name]
-
-
 @dataclass(frozen=True, slots=True)
 class _Number:
     """A kind of number: its description, and a test that NaN and infinity fail."""
@@ -440,36 +405,6 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     return value
-
-
-def _level(name: str, occurrences: int) -> NoiseSpec:
-    """Return the model of one of the source's levels: each occurrence is one of three kinds."""
-    each = occurrences / 3
-    sure = NoiseSpec(detection=1.0, misnamed=0.0, name=name)
-    return replace(sure, clutter=each, missed_each=each, misnamed_each=each)
-
-
-def _equal_mixture(name: str, specs: tuple[NoiseSpec, ...]) -> NoiseMixture:
-    """Return a mixture of models that are equally likely."""
-    return NoiseMixture(specs=specs, weights=(1 / len(specs),) * len(specs), name=name)
-
-
-_LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
-# A person leaves out many or few objects, rarely misnames the others, and invents almost none.
-_MARKED = tuple(
-    NoiseSpec(
-        detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:g} marked"
-    )
-    for share in (0.9, 0.6, 0.3)
-)
-NOISES: Mapping[str, Noise] = MappingProxyType(
-    {
-        **{spec.name: spec for spec in _LEVELS},
-        "generic": _equal_mixture("generic", _LEVELS),
-        "by-hand": _equal_mixture("by-hand", _MARKED),
-    }
-)
-"""The noise models by name."""
 
 
 def open_noise(path: str | Path) -> Noise:
