@@ -35,18 +35,16 @@ def detection_levels(evidence: Evidence, model: NoiseTable, *, fading: bool) -> 
     """
     grid = list(product(DETECTIONS, REACHES if fading else (1.0,)))
     lengths = np.zeros(len(evidence.views), np.int64)
-    logs = np.stack(
-        [
-            associate(
-                _at_level(model, *factors),
-                evidence.views,
-                evidence.detections,
-                evidence.pairs,
-                lengths=lengths,
-            ).loglik
-            for factors in grid
-        ]
-    )
+    logs = np.full((len(grid), len(evidence.exposures)), -np.inf)
+    for row, factors in enumerate(grid):
+        association = associate(
+            _at_level(model, *factors),
+            evidence.views,
+            evidence.detections,
+            evidence.pairs,
+            lengths=lengths,
+        )
+        np.logaddexp.at(logs[row], evidence.photos, association.loglik + evidence.log_weights)
     weights = np.full(len(grid), 1.0 / len(grid))
     for _ in range(ROUNDS):
         joint = logs + np.log(weights)[:, None]

@@ -355,7 +355,7 @@ class LikelihoodLocator:
         parts = None
         usable = self._usable_objects(query)
         if store is not None and len(usable):
-            parts = self._parts(usable, scores, posterior, store)
+            parts = self.parts(usable, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
         answer = self.rule.decide(posterior)
         radius, sigma = self.rule.radius, self.north_sigma
@@ -401,7 +401,7 @@ class LikelihoodLocator:
             north=self.north,
         )
 
-    def _parts(
+    def parts(
         self, query: Signature, scores: CellScores, posterior: Posterior, store: ObjectStore
     ) -> Refinement:
         """Return the chances of the parts of the likeliest cells."""
