@@ -7,20 +7,17 @@ and expectation-maximisation over these places gives the next model.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from semsig_gis.core import Displayed, InputError, each_in_order, percent
-from semsig_gis.database import visible_objects_at
-from semsig_gis.localization.learning.fit import gather_evidence
-from semsig_gis.localization.learning.learn import estimate_of, fit_model
+from semsig_gis.localization.learning.learn import Sample, learn_noise
 from semsig_gis.localization.likelihood.index import build_index
 from semsig_gis.localization.likelihood.locate import LikelihoodLocator
 from semsig_gis.localization.likelihood.posterior import posterior
 from semsig_gis.localization.noise.model import NoiseMixture, cell_noise
-from semsig_gis.localization.noise.table import mean_table, noise_tables
 from semsig_gis.observation import View
 
 if TYPE_CHECKING:
@@ -30,15 +27,13 @@ if TYPE_CHECKING:
 
     from semsig_gis.core import Signature
     from semsig_gis.database import ObjectStore, SignatureDatabase
-    from semsig_gis.localization.learning.learn import NoiseEstimate
     from semsig_gis.localization.noise.model import Noise
 
 FEWEST_VIEWS = 20
 FEWEST_DETECTIONS = 3  # of a view that is used
-PLACES = 24  # likely places of each view
+PLACES = 8  # likely places of each view
 START_SHARE = 0.2
 """Weight of the first model in the result, so that it does not become too sure of itself."""
-ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -119,10 +114,11 @@ def adapt_noise(
 
     Notes
     -----
-    Each view is a sum over 24 places, drawn from the chances by the first model and weighted by the
-    inverse of their chances (importance sampling), in the expectation-maximisation of
-    `learn_noise`. A model of one half of the views must raise the likelihood of the other half by
-    more than the standard deviation of the gain.
+    This is a round of stochastic expectation-maximisation (Celeux and Diebolt 1985): each view
+    stands at eight places, drawn by their chances under the first model, and `learn_noise` learns
+    from them. More rounds would make the model too sure of itself, because wrong places that fit
+    well count as right ones. A model of one half of the views must raise the likelihood of the
+    other half by more than the standard deviation of the gain.
 
     Examples
     --------
@@ -160,13 +156,10 @@ is too few to adapt a noise model to; give at least 20.
     result = noise
     if adapted:
         result = search.fitted(photos, places, noise, name)
-        for _ in range(ROUNDS - 1):
-            _, places = search.places(photos, result)
-            result = search.fitted(photos, places, noise, name)
     return Adaptation(noise=result, adapted=adapted, gain=gain, gain_sigma=sigma, views=len(photos))
 
 
-_Places = tuple["NDArray[np.float64]", "NDArray[np.float64]", "NDArray[np.float64]"]
+_Places = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -182,7 +175,8 @@ class _Search:
     ) -> tuple[NDArray[np.float64], list[_Places]]:
         """Return the log evidence of each photo, and its likely places by a noise model.
 
-        The places of a photo are coordinates, degrees to turn the photo by, and log weights.
+        The places of a photo are coordinates and degrees to turn the photo by, drawn by their
+        chances.
         """
         index = build_index(self.database, cell_noise(noise, self.database.grid.step))
         locator = LikelihoodLocator(index=index, north_sigma=self.north_sigma)
@@ -195,9 +189,8 @@ class _Search:
             ends = np.cumsum(parts.chances)
             shares = (np.arange(PLACES) + 0.5) / PLACES * ends[-1]
             rows = np.searchsorted(ends, shares)
-            logs = 2.0 * np.log(parts.sizes[rows]) - np.log(parts.chances[rows] * PLACES)
             evidence = float(np.logaddexp.reduce(scores.loglik) - math.log(len(self.database)))
-            return evidence, (parts.places[rows], parts.headings[rows], logs)
+            return evidence, (parts.places[rows], parts.headings[rows])
 
         evidence, places = zip(*each_in_order(find, photos), strict=True)
         return np.array(evidence), list(places)
@@ -206,8 +199,16 @@ class _Search:
         self, photos: Sequence[View], places: Sequence[_Places], noise: Noise, name: str
     ) -> Noise:
         """Return the model of photos at likely places, mixed with the first model."""
-        estimate = self._estimate(photos, places, noise, name)
-        learnt = estimate.noise
+        samples = [
+            Sample(signature=photo.turned(turn), xy=(x, y))
+            for photo, (points, turns) in zip(photos, places, strict=True)
+            for (x, y), turn in zip(points.tolist(), turns.tolist(), strict=True)
+        ]
+        points = np.concatenate([points for points, _ in places])
+        footprints = self.store.buildings_around(points, distance=self.database.reach)
+        radius = self.database.spec.radius
+        objects = self.store.objects
+        learnt = learn_noise(samples, objects, radius=radius, footprints=footprints).noise
         return NoiseMixture(
             specs=(*learnt.specs, *noise.specs),
             weights=tuple(
@@ -216,35 +217,3 @@ class _Search:
             ),
             name=name,
         )
-
-    def _estimate(
-        self, photos: Sequence[View], places: Sequence[_Places], noise: Noise, name: str
-    ) -> NoiseEstimate:
-        """Return the estimate from photos at likely places."""
-        objects, radius = self.store.objects, self.database.spec.radius
-        points = np.concatenate([xy for xy, _, _ in places])
-        footprints = self.store.buildings_around(points, distance=self.database.reach)
-        views = visible_objects_at(
-            objects, points, index=self.store.index, radius=radius, footprints=footprints
-        )
-        looks = [
-            photo.turned(turn)
-            for photo, (_, turns, _) in zip(photos, places, strict=True)
-            for turn in turns.tolist()
-        ]
-        evidence = gather_evidence(views, looks, taxonomy=objects.taxonomy, radius=radius)
-        tables, weights = noise_tables(
-            noise,
-            taxonomy=objects.taxonomy,
-            codes=evidence.start.codes,
-            longest=0,
-            radius=radius,
-        )
-        evidence = replace(
-            evidence,
-            photos=np.repeat(np.arange(len(photos)), [len(xy) for xy, _, _ in places]),
-            log_weights=np.concatenate([logs for _, _, logs in places]),
-        )
-        start = replace(mean_table(tables, weights), position_sigma=0.0)
-        model, rounds = fit_model(evidence, start, fading=True)
-        return estimate_of(evidence, model, rounds, name=name, radius=radius, skipped=0)

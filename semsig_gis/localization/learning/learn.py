@@ -304,20 +304,6 @@ def learn_noise(
             evidence = turned_evidence(first, detected, model, north_sigma=north_sigma)
         model, more = fit_model(evidence, model, fading=False, most_rounds=most_rounds)
         rounds += more
-    return estimate_of(
-        evidence,
-        model,
-        rounds,
-        name=name,
-        radius=reach,
-        skipped=len(samples) - len(used),
-    )
-
-
-def estimate_of(
-    evidence: Evidence, model: NoiseTable, rounds: int, *, name: str, radius: float, skipped: int
-) -> NoiseEstimate:
-    """Return the estimate from a fitted model, in which detection may fall with distance."""
     counts = expected_counts(evidence, model)
     fading = detection_falls(evidence, counts)
     if fading:
@@ -325,14 +311,14 @@ def estimate_of(
         counts, rounds = expected_counts(evidence, model), rounds + more
     rates = estimated_rates(evidence, counts, model, fading=fading)
     return NoiseEstimate(
-        spec=_spec(evidence, rates, model, name, radius=radius, fading=fading),
+        spec=_spec(evidence, rates, model, name, radius=reach, fading=fading),
         rates=rates,
         levels=detection_levels(evidence, model, fading=fading),
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
-        samples=len(evidence.exposures),
-        objects=len(evidence.views.codes),
-        detections=len(evidence.detections.bearings),
-        skipped=skipped,
+        samples=len(used),
+        objects=len(views.codes),
+        detections=sum(map(len, detected)),
+        skipped=len(samples) - len(used),
         rounds=rounds,
         log_likelihood=counts.log_likelihood,
     )
