@@ -93,8 +93,8 @@ def learn(
     # The uncertainty of the sample places is not an error of the detector.
     learnt = replace(estimate.spec, position_sigma=0.0, name=out.stem)
     noise = fresh_noise(learnt, map_age, database=city.database, drift=change)
-    save_noise(noise, out)
     estimate = replace(estimate, spec=noise)
+    save_noise(estimate.noise, out)
     if as_json:
         print_json(estimate.to_dict())
         return

@@ -9,7 +9,8 @@ import numpy as np
 from semsig_gis.core import DEFAULT_METHOD, LIKELIHOOD
 from semsig_gis.database import City, PartitionedDatabase, join_databases
 from semsig_gis.localization.answers import Answer
-from semsig_gis.localization.noise.model import NOISES, cell_noise
+from semsig_gis.localization.noise.model import cell_noise
+from semsig_gis.localization.noise.presets import NOISES
 from semsig_gis.observation import GRID_NORTH
 
 if TYPE_CHECKING:

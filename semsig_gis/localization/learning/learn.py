@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +25,8 @@ from semsig_gis.localization.learning.fit import (
     next_model,
 )
 from semsig_gis.localization.learning.headings import turned_evidence
+from semsig_gis.localization.learning.level_weights import detection_levels
+from semsig_gis.localization.noise.levels import level_mixture
 from semsig_gis.localization.noise.model import NoiseSpec
 from semsig_gis.observation import RADIUS_M, SEEN, View, check_north, parse_view
 from semsig_gis.storage import read_rows, row_value
@@ -38,10 +40,13 @@ if TYPE_CHECKING:
     from semsig_gis.core import Signature, Taxonomy
     from semsig_gis.database import Footprints, VisibleObjects
     from semsig_gis.localization.learning.fit import Evidence
+    from semsig_gis.localization.noise.levels import Level
+    from semsig_gis.localization.noise.model import Noise
     from semsig_gis.localization.noise.table import NoiseTable
     from semsig_gis.objects import StreetObjects
     from semsig_gis.storage import Row
 
+REPEAT = 0.5  # of photographs of one place (see `NoiseSpec.repeat`)
 MOST_ROUNDS = 500
 # Samples suffice if the 90 % interval of a quantity is within a factor, or as narrow as this.
 NARROW_FACTOR, NARROW = 1.5, 0.05
@@ -150,10 +155,12 @@ class NoiseEstimate(Displayed):
     with distance, it is the chance at ``distance`` metres, with rows ``fading`` for the chances
     farther away. `confusion` is the expected number of detected objects by true class (rows) and
     given class (columns). No object is visible from the places of `skipped` samples.
-    `log_likelihood` is that of all detections under the model.
+    `log_likelihood` is that of all detections under the model. `levels` are those at which the
+    detector works from view to view (see `level_mixture`); `noise` is the model with these levels.
     """
 
     spec: NoiseSpec
+    levels: tuple[Level, ...]
     rates: pd.DataFrame
     confusion: pd.DataFrame
     samples: int
@@ -192,12 +199,18 @@ class NoiseEstimate(Displayed):
             verdicts[str(quantity)] = {"enough": bool(narrow.all()), "few": few}
         return verdicts
 
+    @property
+    def noise(self) -> Noise:
+        """The model with its levels: a mixture, or `spec` if the levels explain hardly more."""
+        return level_mixture(self.spec, self.levels)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON; ``confusion`` is by true class, then given class."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         plain = self.rates.astype(object).where(self.rates.notna(), None)
         return values | {
             "spec": self.spec.to_dict(),
+            "levels": [asdict(level) for level in self.levels],
             "rates": plain.to_dict("records"),
             "confusion": self.confusion.to_dict("index"),
             "verdicts": self.verdicts,
@@ -300,6 +313,7 @@ def learn_noise(
     return NoiseEstimate(
         spec=_spec(evidence, rates, model, name, radius=reach, fading=fading),
         rates=rates,
+        levels=detection_levels(evidence, model, fading=fading),
         confusion=pd.DataFrame(counts.named, index=evidence.names, columns=evidence.names),
         samples=len(used),
         objects=len(views.codes),
@@ -439,6 +453,7 @@ def _spec(
         bearing_sigma=overall["bearing_sigma"],
         bearing_sigma_by_class=by_class(model.sigma),
         position_sigma=model.position_sigma,
+        repeat=REPEAT if (evidence.detections.turns < 1.0).any() else 1.0,
         name=name,
     )
     if "range_sigma" in overall:

@@ -22,7 +22,7 @@ import numpy as np
 
 from semsig_gis.core import FULL_TURN, HALF_TURN, InputError, distance_units_of, signed_degrees
 from semsig_gis.database import visible_objects_in
-from semsig_gis.localization.likelihood.index import CellScores, own_sigma
+from semsig_gis.localization.likelihood.index import CellScores, own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.noise.table import database_tables
 from semsig_gis.observation import View
@@ -506,4 +506,5 @@ def _score_cells(
         best = np.logaddexp.reduce(logliks, axis=1).argmax(axis=1)
         likeliest.append(turns[np.arange(len(cells)), best])
         total += np.logaddexp.reduce(logliks, axis=2)
+    total *= photo_power(len(likeliest), index.noise)
     return np.logaddexp.reduce(total, axis=1) - math.log(len(points)), likeliest

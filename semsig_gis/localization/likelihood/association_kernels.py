@@ -41,7 +41,9 @@ def _mass(start: float, width: float, spread: float) -> float:
     for lap in range(-laps - 1, laps + 1):
         low = (start + FULL_TURN * lap) * scale
         high = low + width * scale
-        if low < _ERF_IS_ONE and high > -_ERF_IS_ONE:
+        if low < -_ERF_IS_ONE and high > _ERF_IS_ONE:
+            total += 2.0
+        elif low < _ERF_IS_ONE and high > -_ERF_IS_ONE:
             total += math.erf(high) - math.erf(low)
     return 0.5 * total
 

@@ -29,6 +29,7 @@ from semsig_gis.core import (
 from semsig_gis.localization.likelihood.photo import PhotoTable
 from semsig_gis.localization.likelihood.records import LANES, BinnedObjects, LevelModel, PhotoRows
 from semsig_gis.localization.likelihood.turns import TURNS, TurnPrior, TurnScores
+from semsig_gis.localization.noise.beyond import noise_with_objects_beyond
 from semsig_gis.localization.noise.model import ROUNDING, cell_noise, place_noise
 from semsig_gis.localization.noise.table import database_tables, mean_table
 from semsig_gis.observation import View, check_north
@@ -51,6 +52,8 @@ BINS = 512
 """Bearing steps of an object."""
 FINE = 8 * BINS
 """Bearing steps of a detection."""
+EXACT_GROUPS = 4  # classes with more different errors are grouped by similar ones
+ERROR_RATIO = 1.3  # of errors that count as similar
 DISTANCE_LEVELS = 64
 """Distances at which errors are computed."""
 
@@ -188,6 +191,7 @@ class LikelihoodIndex(Displayed):
             scores, heading = score_photo(photo, own_sigma(photo, north_sigma))
             loglik += scores
             headings.append(heading)
+        loglik *= photo_power(len(headings), self.noise)
         return CellScores(loglik=loglik, headings=tuple(headings))
 
     def off_centre_scorer(
@@ -204,6 +208,7 @@ class LikelihoodIndex(Displayed):
         scorers = [
             photo_scorer(photo, levels, own_sigma(photo, north_sigma)) for photo in view.split()
         ]
+        power = photo_power(len(scorers), self.noise)
 
         def score(cells: NDArray[np.int64]) -> NDArray[np.float64]:
             loglik = np.empty(len(cells))
@@ -213,7 +218,7 @@ class LikelihoodIndex(Displayed):
                 bins = (views.bearings * (BINS / FULL_TURN)).astype(np.uint16) % np.uint16(BINS)
                 units = distance_units_of(views.distances, levels.table.reach)
                 objects = levels.objects(views.offsets, views.codes, bins, units)
-                total = sum(scorer(objects)[0] for scorer in scorers)
+                total = sum(scorer(objects)[0] for scorer in scorers) * power
                 by_point = np.asarray(total, np.float64).reshape(-1, len(points))
                 mean = np.logaddexp.reduce(by_point, axis=1) - math.log(len(points))
                 loglik[slice(*part)] = mean
@@ -309,6 +314,11 @@ def photo_scorer(
     return score_turned
 
 
+def photo_power(photos: int, noise: Noise) -> float:
+    """Return the power of the likelihood of some photos of one place (see `NoiseSpec.repeat`)."""
+    return float(photos ** (noise.repeat - 1.0))
+
+
 def own_sigma(photo: View, north_sigma: float) -> float:
     """Return the standard deviation of the north of a photo, its own or that of all."""
     own = photo.photos[0].north_sigma
@@ -375,6 +385,14 @@ class NoiseLevels:
         # Classes with the same errors share their rows.
         errors = np.stack([table.sigma, table.range_sigma], axis=1)
         groups, group_of = np.unique(errors, axis=0, return_inverse=True)
+        if len(groups) > EXACT_GROUPS:
+            # Each group takes time, and the best cells are ranked again by exact errors.
+            steps = np.rint(np.log(errors) / math.log(ERROR_RATIO))
+            _, group_of = np.unique(steps, axis=0, return_inverse=True)
+            members = np.bincount(group_of.reshape(-1))
+            groups = np.stack(
+                [np.bincount(group_of.reshape(-1), column) / members for column in errors.T], axis=1
+            )
         turned = np.degrees(table.position_sigma / distances)
         sigma = np.minimum(np.hypot(groups[:, :1], turned), FULL_TURN / 2.0)
         # The density of the wrapped normal distribution of a bearing.
@@ -473,6 +491,7 @@ def build_index(database: SignatureDatabase, noise: Noise) -> LikelihoodIndex:
     >>> len(index.database) == len(demo_database)
     True
     """
+    noise = noise_with_objects_beyond(noise, database)
     index = LikelihoodIndex(database=database, noise=noise)
     _ = index.models
     return index

@@ -420,7 +420,7 @@ class LikelihoodLocator:
         parts = None
         usable = self._usable_objects(query)
         if store is not None and len(usable):
-            parts = self._parts(usable, scores, posterior, store)
+            parts = self.parts(usable, scores, posterior, store)
             scores, posterior = _with_parts(parts, scores, posterior)
         places = posterior.places(top, radius=self.rule.radius)
         answer = self.rule.decide(posterior, places=places)
@@ -467,7 +467,7 @@ class LikelihoodLocator:
             north=self.north,
         )
 
-    def _parts(
+    def parts(
         self, query: Signature, scores: CellScores, posterior: Posterior, store: ObjectStore
     ) -> Refinement:
         """Return the chances of the parts of the likeliest cells."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from semsig_gis.core import LIKELIHOOD, InputError, UnknownNameError, nearest_name
-from semsig_gis.localization.noise.model import NOISES
+from semsig_gis.localization.noise.presets import NOISES
 from semsig_gis.observation import check_north
 
 if TYPE_CHECKING:

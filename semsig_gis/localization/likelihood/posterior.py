@@ -17,7 +17,7 @@ import numpy as np
 from semsig_gis.core import Displayed, InputError, cell_ids, percent, signed_degrees
 from semsig_gis.database import visible_objects_at
 from semsig_gis.localization.likelihood.association import turn_logs
-from semsig_gis.localization.likelihood.index import own_sigma
+from semsig_gis.localization.likelihood.index import own_sigma, photo_power
 from semsig_gis.localization.likelihood.photo import PhotoTable, photo_loglik
 from semsig_gis.localization.noise.table import LONGEST_TABLE, noise_tables
 from semsig_gis.observation import View, check_north
@@ -470,7 +470,7 @@ def refine(
             shares = np.exp(by_turn - own[:, None])
             turned[number] = (shares * turns).sum(axis=1)
             sigmas = np.sqrt((shares * (turns - turned[number][:, None]) ** 2).sum(axis=1))
-            loglik += own
+            loglik += own * photo_power(len(photos), noise)
         # The likeliest parts are divided at the next level; the others are finished.
         total = loglik + prior
         divided = np.zeros(len(parts), np.bool_)

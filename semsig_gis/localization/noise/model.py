@@ -20,7 +20,6 @@ from semsig_gis.core import (
     HALF_TURN,
     Displayed,
     InputError,
-    UnknownNameError,
     nearest_name,
     percent,
 )
@@ -75,7 +74,14 @@ class NoiseSpec(Displayed):
     fading : mapping of str to sequence of (float, float), optional
         How the chance of detection falls with the distance, for classes by name, or ``all``
         others: pairs of metres, ascending, and the remaining share of `detection` there, 0 to 1;
-        linear between them, and the last share beyond.
+        linear between them, and the last share beyond. Objects that are seen from beyond the
+        visibility range of a database, up to the last distance, are false objects there.
+    repeat : float, default 1.0
+        How much photographs of one place add to each other, 0 to 1: n of them count as
+        ``n ** repeat``. What one photograph misses, the next one misses too, so their likelihoods
+        do not simply multiply, as they do with 1.
+    general : bool, default False
+        Whether the tables by class may name classes that a database does not have.
     name : str, default "custom"
         Name to print.
 
@@ -109,11 +115,15 @@ class NoiseSpec(Displayed):
     range_sigma: float = 0.25
     range_sigma_by_class: Mapping[str, float] = field(default_factory=dict)
     fading: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
+    repeat: float = 1.0
+    general: bool = False
     name: str = "custom"
 
     def __post_init__(self) -> None:  # noqa: D105
         if not isinstance(self.name, str):
             raise InputError(f"name of the noise model is {self.name!r}; give a text.")
+        if not isinstance(self.general, bool):
+            raise InputError(f"general of the noise is {self.general!r}; give true or false.")
         for label, number in _NUMBERS.items():
             number.check(label, getattr(self, label))
         for label in BY_CLASS:
@@ -139,6 +149,7 @@ class NoiseSpec(Displayed):
             "range": f"±{100 * self.range_sigma:.3g} %",
             "missed each": f"{self.missed_each:.3g}",
             "misnamed each": f"{self.misnamed_each:.3g}",
+            "repeat": f"{self.repeat:.3g}",
             "by class": ", ".join(name for name in tables if getattr(self, name)) or "nothing",
         }
 
@@ -209,6 +220,13 @@ class NoiseMixture(Displayed):
             "name": self.name,
             "models": ", ".join(f"{spec.name} {percent(weight, 0)}" for spec, weight in models),
         }
+
+    @property
+    def repeat(self) -> float:
+        """How much photographs of one place add to each other, the mean of the models."""
+        return math.fsum(
+            weight * spec.repeat for weight, spec in zip(self.weights, self.specs, strict=True)
+        )
 
     def changed(self, change: Callable[[NoiseSpec], NoiseSpec]) -> NoiseMixture:
         """Return the mixture after a change of each of its models."""
@@ -309,40 +327,6 @@ def place_noise(noise: Noise, step: float) -> Noise:
     return noise.changed(narrowed)
 
 
-def named_noise(name: str) -> Noise:
-    """Return a noise model by name.
-
-    Parameters
-    ----------
-    name : {"light", "medium", "strong", "generic", "by-hand"}
-        A level of the source's distortion, ``"generic"`` if the level is not known, or
-        ``"by-hand"`` for a person, who marks or names some of the visible objects: nine, six or
-        three in ten.
-
-    Returns
-    -------
-    NoiseSpec or NoiseMixture
-        The model.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such model.
-
-    Examples
-    --------
-    >>> named_noise("medium").clutter
-    2.3333333333333335
-    """
-    if name not in NOISES:
-        *most, last = NOISES
-        hint = nearest_name(name, NOISES)
-        raise UnknownNameError(
-            f"{name!r} is not a noise model; give {', '.join(most)} or {last}{hint}."
-        )
-    return NOISES[name]
-
-
 @dataclass(frozen=True, slots=True)
 class _Number:
     """A kind of number: its description, and a test that NaN and infinity fail."""
@@ -366,6 +350,7 @@ _NUMBERS = MappingProxyType(
     {
         "detection": _CHANCE,
         "misnamed": _CHANCE,
+        "repeat": _CHANCE,
         "clutter": _AMOUNT,
         "bearing_sigma": _DEGREES,
         "position_sigma": _AMOUNT,
@@ -420,36 +405,6 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     return value
-
-
-def _level(name: str, occurrences: int) -> NoiseSpec:
-    """Return the model of one of the source's levels: each occurrence is one of three kinds."""
-    each = occurrences / 3
-    sure = NoiseSpec(detection=1.0, misnamed=0.0, name=name)
-    return replace(sure, clutter=each, missed_each=each, misnamed_each=each)
-
-
-def _equal_mixture(name: str, specs: tuple[NoiseSpec, ...]) -> NoiseMixture:
-    """Return a mixture of models that are equally likely."""
-    return NoiseMixture(specs=specs, weights=(1 / len(specs),) * len(specs), name=name)
-
-
-_LEVELS = (_level("light", 1), _level("medium", 7), _level("strong", 13))
-# A person leaves out many or few objects, rarely misnames the others, and invents almost none.
-_MARKED = tuple(
-    NoiseSpec(
-        detection=share, misnamed=0.02, clutter=0.1, bearing_sigma=4.0, name=f"{share:g} marked"
-    )
-    for share in (0.9, 0.6, 0.3)
-)
-NOISES: Mapping[str, Noise] = MappingProxyType(
-    {
-        **{spec.name: spec for spec in _LEVELS},
-        "generic": _equal_mixture("generic", _LEVELS),
-        "by-hand": _equal_mixture("by-hand", _MARKED),
-    }
-)
-"""The noise models by name."""
 
 
 def open_noise(path: str | Path) -> Noise:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from semsig_gis.core import DISTANCE_UNITS, WILDCARD, InputError, nearest_name
-from semsig_gis.localization.noise.model import ALL
+from semsig_gis.localization.noise.model import ALL, BY_CLASS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -274,6 +275,9 @@ def _table(  # noqa: PLR0917 - a private helper of one caller
 ) -> NoiseTable:
     """Return the table of one model, given the row of each class of the taxonomy."""
     count = len(codes)
+    if spec.general:
+        tables = (*(getattr(spec, name) for name in BY_CLASS), spec.clutter_shares, spec.fading)
+        rows = dict.fromkeys(chain(*tables), count) | dict(rows)
 
     def by_class(overall: float, special: Mapping[str, float]) -> NDArray[np.float64]:
         values = np.full(count + 1, float(overall))
