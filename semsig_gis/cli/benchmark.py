@@ -63,9 +63,21 @@ def _learnt(task: _Task) -> dict[str, Any]:
         task.folder / task.data.learning, taxonomy=database.taxonomy, radius=database.spec.radius
     )
     with progress("learning"):
-        spec = estimate_noise(task.city, samples, None).spec
+        estimate = estimate_noise(task.city, samples, None)
     path = task.scratch / "learned.toml"
-    save_noise(replace(spec, position_sigma=0.0, name=path.stem), path)
+    spec = replace(estimate.spec, position_sigma=0.0, name=path.stem)
+    save_noise(replace(estimate, spec=spec).noise, path)
+    return {"noise": str(path)}
+
+
+def _adapted(task: _Task) -> dict[str, Any]:
+    """Return the options for errors of the detector that are learnt from the measured views."""
+    from semsig_gis.localization import save_noise
+
+    (first, *_) = task.views.values()
+    views = [view for _, view in first]
+    path = task.scratch / "adapted.toml"
+    save_noise(adapted_noise(task.city, views, "photo", None, "known"), path)
     return {"noise": str(path)}
 
 

@@ -30,12 +30,13 @@ from semsig_gis.cli.options import (
     OnGrid,
     Refine,
     SearchOptions,
+    adapted_noise,
     north_sigma,
     object_store,
     query_north,
     read_drift,
 )
-from semsig_gis.core import percent
+from semsig_gis.core import InputError, percent
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -58,7 +59,23 @@ Samples = Annotated[
 def learn(
     database: Database,
     *,
-    samples: Samples,
+    samples: Annotated[
+        Path | None,
+        typer.Option(
+            help="Detections of known places: a CSV or JSON lines file of views with x and y "
+            "(metres) or cell_id (its centre)."
+        ),
+    ] = None,
+    unlabelled: Annotated[
+        Path | None,
+        typer.Option(
+            help="Views of one camera and detector at unknown places, instead of --samples: a CSV "
+            "or JSON lines file, as of semsig localize --queries."
+        ),
+    ] = None,
+    noise: Annotated[
+        str, typer.Option(help="First noise model for --unlabelled, a name or a file.")
+    ] = "photo",
     out: Annotated[Path, typer.Option(help="Noise model to write (.toml or .json), for --noise.")],
     map_age: MapAge = 0.0,
     drift_report: DriftReport = None,
@@ -68,7 +85,7 @@ def learn(
     objects: Objects = None,
     as_json: AsJson = False,
 ) -> None:
-    """Learn the errors of a detector from detections of known places.
+    """Learn the errors of a detector from detections of known places, or only from its views.
 
     Missed and false objects that the age of the map explains do not count.
     """
@@ -77,10 +94,18 @@ def learn(
     from semsig_gis.database import open_city
     from semsig_gis.localization import ALL, check_map_age, fresh_noise, read_samples, save_noise
 
-    keep_inputs(out, read=(database, samples, objects, drift_report))
+    keep_inputs(out, read=(database, samples, unlabelled, objects, drift_report))
     check_map_age(map_age)
+    if (samples is None) == (unlabelled is None):
+        raise InputError(
+            "the noise is learnt either from --samples, views of known places, or from "
+            "--unlabelled, views of unknown places; give one of the two."
+        )
     change = read_drift(drift_report, map_age)
     city = open_city(database)
+    if samples is None:
+        _learn_unlabelled(city, unlabelled, noise, out, objects, heading, north, date, as_json)
+        return
     bearing_north, sigma = query_north(city, north, date), north_sigma(heading)
     rows = [
         replace(sample, signature=bearing_north.to_grid(sample.signature))
@@ -92,8 +117,8 @@ def learn(
         estimate = estimate_noise(city, rows, objects, sigma)
     # The uncertainty of the sample places is not an error of the detector.
     learnt = replace(estimate.spec, position_sigma=0.0, name=out.stem)
-    noise = fresh_noise(learnt, map_age, database=city.database, drift=change)
-    estimate = replace(estimate, spec=noise)
+    fresh = fresh_noise(learnt, map_age, database=city.database, drift=change)
+    estimate = replace(estimate, spec=fresh)
     save_noise(estimate.noise, out)
     if as_json:
         print_json(estimate.to_dict())
@@ -114,14 +139,48 @@ def learn(
     if map_age:
         say(
             f"Corrected for what a map of {map_age:g} years explains: detection "
-            f"{noise.detection:.3f} "
-            f"(was {learnt.detection:.3f}), {noise.clutter:.3f} false objects per full turn (was "
+            f"{fresh.detection:.3f} "
+            f"(was {learnt.detection:.3f}), {fresh.clutter:.3f} false objects per full turn (was "
             f"{learnt.clutter:.3f})."
         )
     for note in bearing_north.notes:
         remark(note)
     say(_verdict(estimate))
     say(f"noise model: {out}")
+
+
+def _learn_unlabelled(  # noqa: PLR0917 - the options of the command
+    city: City,
+    unlabelled: Path | None,
+    noise: str,
+    out: Path,
+    objects: Path | None,
+    heading: str,
+    north: NorthName,
+    date: Day,
+    as_json: bool,  # noqa: FBT001 - as above
+) -> None:
+    """Write a noise model that is learnt from views of unknown places."""
+    from dataclasses import replace
+
+    from semsig_gis.localization import save_noise
+    from semsig_gis.observation import read_queries
+
+    database, bearing_north = city.database, query_north(city, north, date)
+    views = []
+    for line in read_queries(
+        str(unlabelled), taxonomy=database.taxonomy, radius=database.spec.radius
+    ):
+        if isinstance(line.query, InputError):
+            raise line.query
+        views.append(bearing_north.to_grid(line.query))
+    with progress("learning"):
+        model = replace(adapted_noise(city, views, noise, objects, heading), name=out.stem)
+    save_noise(model, out)
+    if as_json:
+        print_json(model.to_dict())
+    else:
+        say(f"noise model: {out}")
 
 
 def _verdict(estimate: NoiseEstimate) -> str:

@@ -31,6 +31,7 @@ from semsig_gis.cli.options import (
     QueryOptions,
     SearchOptions,
     Top,
+    adapted_noise,
     command,
     query_north,
 )
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from semsig_gis.localization import (
         Answer,
         Explanation,
+        LikelihoodLocator,
         Localization,
         Location,
         Locator,
@@ -63,6 +65,14 @@ class RankedOptions(QueryOptions):
             "standard input. Prints a line of JSON for each: an answer or an error."
         ),
     ] = None
+    adapt: Annotated[
+        bool,
+        typer.Option(
+            "--adapt",
+            help="Adapt the noise to all --queries first, which are views of one camera and "
+            "detector.",
+        ),
+    ] = False
     method: MethodText = None
     paper: Paper = False
 
@@ -138,6 +148,10 @@ class LocalizeOptions(SearchOptions, RankedOptions):
             )
         if self.ranking != LIKELIHOOD:
             self._refuse_likelihood()
+        if self.adapt and self.queries is None:
+            raise InputError(
+                "--adapt learns from many views; give their file with --queries, or leave it out."
+            )
 
     @property
     def writes_chances(self) -> bool:
@@ -149,7 +163,7 @@ class LocalizeOptions(SearchOptions, RankedOptions):
         names = [field.name for field in fields(SearchOptions) if field.name != "require"]
         options = [
             f"--{name.replace('_', '-')}"
-            for name in (*names, "explain", "share")
+            for name in (*names, "explain", "share", "adapt")
             if getattr(self, name) != getattr(LocalizeOptions, name)  # the default
         ]
         if options:
@@ -179,12 +193,24 @@ def localize(options: LocalizeOptions) -> None:
     if options.queries is None:
         query = options.query(city.dataset, others=", or --queries")
         others = options.unplaced(city.dataset)
-        locator = query_locator(options, city, method, north)
+        locator = query_locator(options, city, method, north, query)
         locator = _with_unplaced(locator, query, *others, ranking=ranking)
         _answer(options, city, locator, query)
         return
     queries = options.read_queries(city.dataset)
-    _answer_lines(queries, query_locator(options, city, method, north), options)
+    if not options.adapt:
+        _answer_lines(queries, query_locator(options, city, method, north), options)
+        return
+    lines = list(queries)
+    views = [north.to_grid(line.query) for line in lines if not isinstance(line.query, InputError)]
+    with progress("adapting"):
+        noise = adapted_noise(
+            city, views, options.noise or "photo", options.objects, options.heading
+        )
+    locator = options.locator(
+        city, north, usual_noise=noise, top=options.top, explain=options.explain
+    )
+    _answer_lines(lines, locator, options)
 
 
 def _with_unplaced(
@@ -211,13 +237,29 @@ def _with_unplaced(
 
 
 def query_locator(
-    options: LocalizeOptions, city: City, method: Method | None, north: North
+    options: LocalizeOptions,
+    city: City,
+    method: Method | None,
+    north: North,
+    query: View | None = None,
 ) -> Locator[Any]:
-    """Return the locator of the options, for a method by distance or by likelihood."""
+    """Return the locator of the options, for a method by distance or by likelihood.
+
+    The default noise is that of the query or, without a query, that of each query to come.
+    """
     taxonomy, top = city.dataset.taxonomy, options.top
     if method is None:
-        usual = options.usual_noise(taxonomy)
-        return options.locator(city, north, usual_noise=usual, top=top, explain=options.explain)
+
+        def make(noise: str) -> LikelihoodLocator:
+            return options.locator(city, north, usual_noise=noise, top=top, explain=options.explain)
+
+        if query is not None:
+            return make(options.usual_noise(query, taxonomy))
+        if options.noise is not None:
+            return make(options.noise)
+        from semsig_gis.localization import UsualLocator
+
+        return UsualLocator(make=make)
     from semsig_gis.localization import Requirement, make_locator
 
     require = options.require
@@ -233,6 +275,7 @@ def _answer_lines(
     Queries of a file are answered in parallel, queries of standard input one by one.
     """
     from semsig_gis.core import each_in_order
+    from semsig_gis.localization import UsualLocator
 
     source, first_error, answered, failed = options.source, "", 0, 0
 
@@ -241,7 +284,8 @@ def _answer_lines(
             if isinstance(line.query, InputError):
                 raise line.query
             others = line.unplaced, line.absent
-            line_locator = _with_unplaced(locator, line.query, *others, ranking=options.ranking)
+            own = locator.of(line.query) if isinstance(locator, UsualLocator) else locator
+            line_locator = _with_unplaced(own, line.query, *others, ranking=options.ranking)
             return line, line_locator.locate(line.query).to_dict()
         except (EmptyResultError, InputError, UnknownNameError) as error:
             return line, {"error": str(error)}

@@ -14,7 +14,7 @@ from semsig_gis.cli.console import Database, app, numbers, remark
 from semsig_gis.core import CrsError, DatabaseError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Sequence, Callable
 
     from numpy.typing import NDArray
 
@@ -230,12 +230,14 @@ class QueryOptions:
             row |= text_row(sentence, taxonomy)
         return parse_view(row, taxonomy=taxonomy, radius=dataset.spec.radius)
 
-    def usual_noise(self, taxonomy: Taxonomy) -> str:
+    def usual_noise(self, query: View, taxonomy: Taxonomy) -> str:
         """Return the default noise: "by-hand" for a view in words, since people leave out much."""
+        from semsig_gis.localization import usual_noise
         from semsig_gis.observation import text_row
 
         sentence = self._sentence
-        return "by-hand" if sentence and "see" in text_row(sentence, taxonomy) else "generic"
+        in_words = sentence and "see" in text_row(sentence, taxonomy)
+        return "by-hand" if in_words else usual_noise(query)
 
     def unplaced(
         self, dataset: SignatureDatabase | PartitionedDatabase
@@ -269,8 +271,9 @@ class SearchOptions:
         str | None,
         typer.Option(
             help="Errors of the detector or person: light, medium, strong, generic (any of "
-            "them), by-hand, or a file written by `semsig learn`.  [default: by-hand for a view "
-            "in words, otherwise generic]",
+            "them), by-hand, photo, panorama, or a file written by `semsig learn`.  [default: "
+            "by-hand for a view in words, photo for a view of sectors, panorama for a full turn "
+            "with scores, otherwise generic]",
             show_default=False,
         ),
     ] = None
@@ -310,13 +313,13 @@ class SearchOptions:
         city: City,
         north: North | None = None,
         *,
-        usual_noise: str = "generic",
+        usual_noise: str | Noise = "generic",
         top: int = 1,
         explain: bool = False,
     ) -> LikelihoodLocator:
         """Return the locator by likelihood for queries with bearings from `north`.
 
-        The noise is `usual_noise` without --noise.
+        The noise is `usual_noise` if it is a model or if --noise was not given.
         """
         from semsig_gis.localization import DEFAULT_RULE, LikelihoodMethod, make_locator, open_rule
         from semsig_gis.observation import GRID_NORTH
@@ -337,7 +340,7 @@ class SearchOptions:
         sigma = north_sigma(self.heading)
         rule = DEFAULT_RULE if self.rule is None else open_rule(self.rule)
         noise = read_noise(
-            self.noise or usual_noise,
+            (self.noise or usual_noise) if isinstance(usual_noise, str) else usual_noise,
             city.database,
             map_age=self.map_age,
             drift_report=self.drift_report,
@@ -393,22 +396,46 @@ class SearchOptions:
 
 
 def read_noise(
-    noise: str,
+    noise: str | Noise,
     database: SignatureDatabase,
     *,
     map_age: float = 0.0,
     drift_report: Path | None = None,
 ) -> Noise:
-    """Return the noise model of a name or file, for a map of some age."""
+    """Return a noise model, or that of a name or file, for a map of some age."""
     from semsig_gis.localization import NOISES, named_noise, open_noise
 
-    by_file = noise not in NOISES and Path(noise).suffix
-    model = open_noise(noise) if by_file else named_noise(noise)
+    if not isinstance(noise, str):
+        model = noise
+    elif noise not in NOISES and Path(noise).suffix:
+        model = open_noise(noise)
+    else:
+        model = named_noise(noise)
     if map_age == 0 and drift_report is None:
         return model
     from semsig_gis.localization import aged_noise  # slow to import
 
     return aged_noise(model, map_age, database=database, drift=read_drift(drift_report, map_age))
+
+
+def adapted_noise(
+    city: City, views: Sequence[Signature], noise: str | Noise, objects: Path | None, heading: str
+) -> Noise:
+    """Return a noise model adapted to views from grid north; say what the views show."""
+    from semsig_gis.localization import adapt_noise
+
+    store = object_store(city, objects, needed=True)
+    if store is None:  # not with `needed`
+        raise InputError("the noise cannot be adapted without street objects; give --objects.")
+    adaptation = adapt_noise(
+        views,
+        city.database,
+        read_noise(noise, city.database),
+        store=store,
+        north_sigma=north_sigma(heading),
+    )
+    remark(adaptation.sentence)
+    return adaptation.noise
 
 
 def read_drift(drift_report: Path | None, map_age: float) -> Drift | None:

@@ -28,7 +28,7 @@ def suggest(options: SuggestOptions) -> None:
     query = options.query(city.dataset)
     unplaced, absent = options.unplaced(city.dataset)
     locator = with_unplaced(
-        options.locator(city, north, usual_noise=options.usual_noise(city.dataset.taxonomy)),
+        options.locator(city, north, usual_noise=options.usual_noise(query, city.dataset.taxonomy)),
         query,
         unplaced,
         absent=absent,

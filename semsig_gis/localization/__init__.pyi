@@ -24,6 +24,8 @@ from .distance.ties import expected_best as expected_best
 from .distance.ties import expected_recall as expected_recall
 from .distance.ties import rank_range as rank_range
 from .distance.ties import top_candidates as top_candidates
+from .learning.adapt import Adaptation as Adaptation
+from .learning.adapt import adapt_noise as adapt_noise
 from .learning.fit import ALL as ALL
 from .learning.fit import estimated_rates as estimated_rates
 from .learning.fit import expected_counts as expected_counts
@@ -97,10 +99,14 @@ from .likelihood.route import route_posteriors as route_posteriors
 from .likelihood.turns import TURNS as TURNS
 from .locator import AnyMethod as AnyMethod
 from .locator import Locator as Locator
+from .locator import UsualLocator as UsualLocator
 from .locator import localize as localize
 from .locator import make_locator as make_locator
 from .locator import method_index as method_index
 from .locator import parse_method as parse_method
+from .locator import usual_noise as usual_noise
+from .noise.levels import Level as Level
+from .noise.levels import level_mixture as level_mixture
 from .noise.model import Noise as Noise
 from .noise.model import NoiseMixture as NoiseMixture
 from .noise.model import NoiseSpec as NoiseSpec

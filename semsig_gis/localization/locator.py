@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar, Unpack, overload
 
 import numpy as np
@@ -11,10 +12,10 @@ from semsig_gis.database import City, PartitionedDatabase, join_databases
 from semsig_gis.localization.answers import Answer
 from semsig_gis.localization.noise.model import cell_noise
 from semsig_gis.localization.noise.presets import NOISES
-from semsig_gis.observation import GRID_NORTH
+from semsig_gis.observation import GRID_NORTH, View
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from semsig_gis.core import Signature
     from semsig_gis.database import SignatureDatabase
@@ -165,6 +166,48 @@ def make_locator(
     return LikelihoodLocator(index=index or method_index(database, method), **options)
 
 
+def usual_noise(view: Signature) -> str:
+    """Return the name of the noise model for a view if none is given.
+
+    It is ``photo`` for a view of photographs or sectors, ``panorama`` for a full turn with scores
+    of a detector, and otherwise ``generic``.
+    """
+    if not isinstance(view, View):
+        return "generic"
+    if any(photo.sectors for photo in view.photos):
+        return "photo"
+    return "generic" if view.scores is None else "panorama"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UsualLocator:
+    """The locator of views with the usual noise of each (see `usual_noise`).
+
+    `make` returns the locator for the name of a noise model.
+    """
+
+    make: Callable[[str], LikelihoodLocator]
+    _locators: dict[str, LikelihoodLocator] = field(default_factory=dict, init=False)
+
+    def of(self, view: Signature) -> LikelihoodLocator:
+        """Return the locator for a view."""
+        name = usual_noise(view)
+        if name not in self._locators:
+            self._locators[name] = self.make(name)
+        return self._locators[name]
+
+    def locate(self, query: Signature, *, top: int | None = None) -> Location:
+        """Return the answer to a query; see `Locator`."""
+        return self.of(query).locate(query, top=top)
+
+    def rankings(
+        self, queries: Sequence[Signature], *, memo: DistanceMemo | None = None
+    ) -> Iterator[Ranking]:
+        """Rank all cells for each query; see `Locator`."""
+        for query in queries:
+            yield from self.of(query).rankings([query], memo=memo)
+
+
 def method_index(database: SignatureDatabase, method: LikelihoodMethod) -> LikelihoodIndex:
     """Return the index of a database for a method: from cell centres or from anywhere in a cell."""
     from semsig_gis.localization.likelihood.index import build_index  # noqa: PLC0415 - above
@@ -224,7 +267,9 @@ def localize(
         unknown. Objects of a class that no cell sees are not used, with a note in the answer.
     method : str, Method or LikelihoodMethod, default "likelihood"
         How the cells are ranked, or its text (see `parse_method`), such as ``"edit+edit:5%"``. A
-        fusion uses one part if the query has only this one.
+        fusion uses one part if the query has only this one. The noise of ``"likelihood"`` depends
+        on the query: that of photographs for a view of sectors, that of panoramas for a full turn
+        with scores of a detector, and otherwise ``"generic"``.
     requirement : Requirement, optional
         The objects that a candidate cell must see; none by default.
     top : int, default 10
@@ -259,6 +304,8 @@ def localize(
     >>> answer.used, answer.candidates["distance"][0]
     ('types+angles', np.float64(0.0))
     """
+    if method == LIKELIHOOD:
+        method = f"{LIKELIHOOD}:{usual_noise(query)}"
     if isinstance(method, str):
         method = parse_method(method)
     locator = make_locator(database, method, requirement=requirement, top=top, north=north)

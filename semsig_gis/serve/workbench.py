@@ -83,8 +83,7 @@ if TYPE_CHECKING:
 
 MOST_UPLOAD = 25 * 2**20
 """Most bytes of a request: a picture or a question."""
-PAGE_NOISE, COMMAND_NOISE = "by-hand", "generic"
-"""Default noise models of the page and of `semsig localize`."""
+PAGE_NOISE = "by-hand"
 FORMATS = {
     "gpkg": "application/geopackage+sqlite3",
     "geojson": "application/geo+json",
@@ -314,7 +313,7 @@ class Workbench:
         )
         noise = self._noise(question)
         options = [*(self.options or [str(self.city.path)])]
-        options += [] if noise == COMMAND_NOISE else ["--noise", noise]
+        options += ["--noise", noise]
         return drawing | {
             "command": question.command(self.taxonomy, options=options),
             "views": question.rows(self.taxonomy),

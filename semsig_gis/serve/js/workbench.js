@@ -118,7 +118,7 @@ semsig.readBoxes = async (session, files) => {
     semsig.notice(read.notes.join(" "));
   }
   const noise = semsig.element("noise");
-  if (noise.value === "by-hand") session.noise = noise.value = "generic";
+  if (noise.value === "by-hand") session.noise = noise.value = "photo";
   session.show(session.scene);
   session.changed();
 };
@@ -394,7 +394,10 @@ semsig.start = semsig.trying(async () => {
   semsig.element("about").textContent = city.licences.join(" · ");
   semsig.palette(session);
   const noise = semsig.element("noise");
-  const observers = {"by-hand": "a person, who misses some", generic: "any detector"};
+  const observers = {
+    "by-hand": "a person, who misses some", generic: "any detector",
+    photo: "a person or a detector, in photographs",
+    panorama: "a person or a detector, in panoramas"};
   noise.append(...city.noise.map(
     (name) => new Option(observers[name] ?? `a detector with ${name} noise`, name)));
   session.noise = noise.value;
