@@ -54,6 +54,9 @@ from .likelihood.association import associate_pairs as associate_pairs
 from .likelihood.association import near_pairs as near_pairs
 from .likelihood.association import rerank as rerank
 from .likelihood.association import score_associations as score_associations
+from .likelihood.elsewhere import background_loglik as background_loglik
+from .likelihood.elsewhere import elsewhere_chance as elsewhere_chance
+from .likelihood.elsewhere import goodness_of_fit as goodness_of_fit
 from .likelihood.estimate import PlaceEstimate as PlaceEstimate
 from .likelihood.estimate import cell_estimate as cell_estimate
 from .likelihood.estimate import refined_estimate as refined_estimate
