@@ -85,7 +85,9 @@ def test_answer_and_priors_are_printed(city: Path, run: Run) -> None:
     out = run(*query, "--noise", "medium", "--heading", "unknown", "--top", 2)[1]
     for words in ("2 best places in", "Position: x", "North of the query: ", "over 99 %"):
         assert words in out
-    code, out, _ = run("localize", city, "--types", VIEW["types"][:1])
+    short = "localize", city, "--types", VIEW["types"][:1]
+    assert "90 % region, if it is from this area: " in run(*short)[1]
+    code, out, _ = run(*short, "--surely-here")
     assert code == 0
     assert "Cannot tell. 90 % region: " in out
     assert out.index("Cannot tell") < out.index("Best place: ") < out.index("If it is there: x ")

@@ -306,8 +306,12 @@ def test_stated_probabilities_are_calibrated_if_the_model_is_right() -> None:
     noise = NoiseSpec(detection=0.8, misnamed=0.1, clutter=0.7, bearing_sigma=12.0, name="mine")
     detector = SimulatedDetector(noise=noise)
     method = build_index(cells, noise)
-    evaluation = evaluate(cells, queries=300, method=method, distortion=detector)
+    evaluation, doubted = (
+        evaluate(cells, queries=300, method=method, distortion=detector, surely_here=surely)
+        for surely in (True, False)
+    )
     answers = evaluation.queries.dropna(subset=["chance"])
+    assert (doubted.queries["chance"].dropna() <= answers["chance"] + 1e-9).all()
     spread = math.sqrt(float((answers["chance"] * (1.0 - answers["chance"])).sum()))
     assert abs(float((answers["right"] - answers["chance"]).sum())) < 4.0 * spread
     assert 0.2 < answers["chance"].mean() < 0.95

@@ -23,32 +23,46 @@ from semsig_gis.observation import View
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from semsig_gis.core import Signature
+    from semsig_gis.database import SignatureDatabase
     from semsig_gis.localization.likelihood.index import LikelihoodIndex
+    from semsig_gis.localization.noise.table import NoiseTable
 
 PRIOR = 0.5
 """Chance that a view is from elsewhere before its objects are compared."""
 MEAN_OBJECTS = 10.0
 CLUMPING = 4.0
-LARGEST_LOG = 700.0  # its exponential is finite
+LOG_PRIOR = math.log(PRIOR)
 SIMULATED = 1000
 """Simulated views of a goodness of fit."""
 ROUNDING = 1e-9
+BINS = np.arange(FULL_TURN) + 0.5  # middles of degrees
 
 
-def elsewhere_chance(
+def area_chances(log_ratios: Sequence[float]) -> NDArray[np.float64]:
+    """Return the chance that a view is from each of some areas, and at last from elsewhere.
+
+    `log_ratios` are those of `evidence_ratio`. Before the objects are compared, the areas together
+    have the chance that `PRIOR` leaves, in equal parts.
+    """
+    logs = np.append(np.asarray(log_ratios) + math.log((1.0 - PRIOR) / len(log_ratios)), LOG_PRIOR)
+    chances = np.exp(logs - logs.max())
+    return np.asarray(chances / chances.sum())
+
+
+def evidence_ratio(
     index: LikelihoodIndex, views: Sequence[Signature], log_evidence: float
 ) -> float:
-    """Return the chance that some views, all of one area, are not from the area of a database.
+    """Return the log of the likelihood of some views in the area of a database over elsewhere.
 
-    `log_evidence` is the logarithm of their likelihood in the database (`Posterior.log_evidence`).
-    Views without objects leave the chance before, `PRIOR`.
+    `log_evidence` is that of all of them in the area (`Posterior.log_evidence`). Views without
+    objects give 0.
     """
     if not any(map(len, views)):
-        return PRIOR
-    ratio = log_evidence - sum(background_loglik(index, view) for view in views)
-    odds = math.exp(min(max(ratio, -LARGEST_LOG), LARGEST_LOG)) * (1.0 - PRIOR) / PRIOR
-    return 1.0 / (1.0 + odds)
+        return 0.0
+    return log_evidence - sum(background_loglik(index, view) for view in views)
 
 
 def background_loglik(index: LikelihoodIndex, query: Signature) -> float:
@@ -97,40 +111,46 @@ def goodness_of_fit(
 ) -> float | None:
     """Return the share of simulated views from a cell that fit it worse than a view, or equally.
 
-    They have as many objects in each photo, are `SIMULATED` in number, and are drawn from the mean
-    noise model. `headings` are the degrees to add to the bearings of each photo. Types and bearings
-    are compared, each object for itself. None without objects or bearings.
+    They have as many objects in each photo, and are `SIMULATED` in number. `headings` are the
+    degrees to add to the bearings of each photo. Types and bearings are compared, each object for
+    itself. None without objects or bearings.
     """
-    view, table, database = View.of(query), index.table, index.database
+    view = View.of(query)
     if view.bearings is None or not len(view):
         return None
-    part = slice(database.offsets[cell], database.offsets[cell + 1])
-    kinds = table.row_of[database.codes[part]]
-    units = database.distance_units[part]
-    length = min(len(kinds), len(table.detected) - 1)
-    near = table.detected[length, kinds]
-    expected = near * table.remaining[kinds, units]
-    # Density by direction and name: of the objects, of others that come into range, and of clutter.
-    bins = np.arange(FULL_TURN) + 0.5
-    away = signed_degrees(bins - database.bearing_units[part, None] * (FULL_TURN / BEARING_UNITS))
-    spread = table.sigmas[kinds, units][:, None]
-    peaks = np.exp(-0.5 * (away / spread) ** 2)
-    peaks *= (expected / peaks.sum(axis=1))[:, None]
-    names = table.named[length, kinds]
-    floor = table.clutter + (near * table.leaving[kinds, units]) @ names
-    density = names.T @ peaks + floor[:, None] / len(bins)
+    models, weights = index.models
+    densities = [_density(index.database, table, cell) for table in models]
+    mean = np.tensordot(weights, densities, axes=1)
+    counts = np.diff(np.rint(SIMULATED * np.cumsum([0.0, *weights])).astype(np.int64))
     total, simulated = 0.0, np.zeros(SIMULATED)
     random = np.random.default_rng(0)
     for photo, heading in zip(view.split(), headings, strict=True):
-        detections = PhotoTable.of(photo, table)
-        (look,) = photo.photos
-        seen = np.flatnonzero(look.turned(heading).sees(bins)) if look.sectors else slice(None)
+        detections = PhotoTable.of(photo, index.table)
+        look = photo.photos[0].turned(heading)
+        seen = look.sees(BINS) if look.sectors else np.ones(len(BINS), np.bool_)
         rows = ((detections.bearings + heading) % FULL_TURN).astype(np.int64)
         for row, scores in zip(rows.tolist(), detections.scores.T, strict=True):
+            total += math.log(scores @ mean[:, row])
+            drawn = []
+            for density, count in zip(densities, counts.tolist(), strict=True):
+                chances = np.cumsum(density[:, seen])
+                drawn.append(np.searchsorted(chances, random.random(count) * chances[-1]))
             # Of an object of unknown class, only the direction is compared.
-            named = density if not scores.all() else density.sum(axis=0, keepdims=True)
-            total += math.log(scores @ density[:, row])
-            logs = np.log(named[:, seen].ravel())
-            chances = np.cumsum(np.exp(logs))
-            simulated += logs[np.searchsorted(chances, random.random(SIMULATED) * chances[-1])]
+            logs = np.log(mean.sum(axis=0) + 0.0 * mean if scores.all() else mean)
+            simulated += logs[:, seen].ravel()[np.concatenate(drawn)]
     return float(np.mean(simulated <= total + ROUNDING))
+
+
+def _density(database: SignatureDatabase, table: NoiseTable, cell: int) -> NDArray[np.float64]:
+    """Return the expected detections in a cell, by name and degree, of a full turn."""
+    part = slice(database.offsets[cell], database.offsets[cell + 1])
+    kinds, units = table.row_of[database.codes[part]], database.distance_units[part]
+    length = min(len(kinds), len(table.detected) - 1)
+    near, names = table.detected[length, kinds], table.named[length, kinds]
+    bearings = database.bearing_units[part, None] * (FULL_TURN / BEARING_UNITS)
+    away = signed_degrees(BINS - bearings) / table.sigmas[kinds, units][:, None]
+    peaks = np.exp(-0.5 * away**2)
+    peaks *= (near * table.remaining[kinds, units] / peaks.sum(axis=1))[:, None]
+    # Clutter, and objects that come into range in any direction.
+    others = table.clutter + (near * table.leaving[kinds, units]) @ names
+    return np.asarray(names.T @ peaks + others[:, None] / len(BINS))

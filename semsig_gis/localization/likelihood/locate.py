@@ -28,7 +28,11 @@ from semsig_gis.localization.answers import (
 )
 from semsig_gis.localization.likelihood.answer_rule import DEFAULT_RULE
 from semsig_gis.localization.likelihood.association import QUICK_SAMPLE, SAMPLE, rerank
-from semsig_gis.localization.likelihood.elsewhere import elsewhere_chance, goodness_of_fit
+from semsig_gis.localization.likelihood.elsewhere import (
+    area_chances,
+    evidence_ratio,
+    goodness_of_fit,
+)
 from semsig_gis.localization.likelihood.estimate import cell_estimate, refined_estimate
 from semsig_gis.localization.likelihood.explain import explain, explain_cell
 from semsig_gis.localization.likelihood.index import CellScores
@@ -418,8 +422,12 @@ class LikelihoodLocator:
         """Return the chance that some views, all from one area, are not from that of the cells."""
         if self.surely_here:
             return 0.0
+        return float(area_chances([self.evidence_ratio(queries, posterior)])[-1])
+
+    def evidence_ratio(self, queries: Sequence[Signature], posterior: Posterior) -> float:
+        """Return how much likelier some views are in this area than elsewhere, as a logarithm."""
         usable = list(map(self._usable_objects, queries))
-        return elsewhere_chance(self.index, usable, posterior.log_evidence)
+        return evidence_ratio(self.index, usable, posterior.log_evidence)
 
     def _location(
         self,
@@ -600,6 +608,33 @@ def locate(index: LikelihoodIndex, query: Signature, **options: Unpack[LocateOpt
     True
     """
     return LikelihoodLocator(index=index, **options).locate(query)
+
+
+def locate_in_areas(
+    locators: Sequence[LikelihoodLocator],
+    queries: Sequence[Signature],
+    *,
+    surely_here: bool = False,
+) -> tuple[tuple[Location, ...], float]:
+    """Locate a query in several areas: return the answer of each, and the chance of elsewhere.
+
+    `queries` is the query for each locator, in the classes of its database. The chances of places
+    in all areas and of elsewhere add up to 1; `surely_here` is whether the query is surely from one
+    of the areas, whatever the locators have.
+    """
+    views = list(zip(locators, queries, strict=True))
+    locations = [replace(locator, surely_here=True).locate(query) for locator, query in views]
+    chances = area_chances(
+        [
+            locator.evidence_ratio([query], location.posterior)
+            for (locator, query), location in zip(views, locations, strict=True)
+        ]
+    )
+    if surely_here:
+        chances = np.append(chances[:-1] / chances[:-1].sum(), 0.0)
+    *areas, elsewhere = chances.tolist()
+    answers = zip(locations, areas, strict=True)
+    return tuple(place.doubted(1.0 - area, place.fit) for place, area in answers), elsewhere
 
 
 def locate_route(

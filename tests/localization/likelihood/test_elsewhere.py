@@ -18,9 +18,10 @@ from semsig_gis.localization import (
     NoiseSpec,
     background_loglik,
     build_index,
-    elsewhere_chance,
+    evidence_ratio,
     goodness_of_fit,
     locate,
+    locate_in_areas,
     locate_route,
     named_noise,
     posterior,
@@ -100,7 +101,7 @@ def test_views_with_sectors_and_ranges_have_a_likelihood_elsewhere() -> None:
 
 def test_views_without_objects_say_nothing() -> None:
     for views in ([NOTHING], [NOTHING, NOTHING]):
-        assert elsewhere_chance(INDEX, views, -3.0) == 0.5
+        assert evidence_ratio(INDEX, views, -3.0) == 0.0
     assert locate(INDEX, NOTHING).elsewhere == 0.5
     # Nor does a view of nothing but classes that the map lacks.
     poor = build_index(random_town(codes=CODES[1:]).database, NOISE)
@@ -123,6 +124,26 @@ def test_views_of_another_city_are_recognized(north_sigma: float) -> None:
     assert (own[:, None] < foreign).mean() > 0.9
     assert np.median(own) < 0.05
     assert np.median(foreign) > 0.5
+
+
+@pytest.mark.parametrize("surely_here", [False, True])
+def test_a_view_is_located_in_several_cities(surely_here: bool) -> None:  # noqa: FBT001
+    cities = [random_town(seed, count=150).database for seed in (1, 2, 3)]
+    locators = [LikelihoodLocator(index=build_index(city, NOISE), top=5000) for city in cities]
+    query = cities[1].signature(int(cities[1].lengths.argmax()))
+    locations, elsewhere = locate_in_areas(locators, [query] * 3, surely_here=surely_here)
+    total = sum(location.candidates["chance"].sum() for location in locations)
+    assert total + elsewhere == pytest.approx(1.0, abs=1e-6)
+    assert (elsewhere == 0.0) == surely_here
+    assert [location.answer.given for location in locations] == [False, True, False]
+    # In one city, the answer is that of the locator.
+    (alone,), elsewhere = locate_in_areas(locators[1:2], [query])
+    assert elsewhere == pytest.approx(alone.elsewhere)
+    assert alone.elsewhere == pytest.approx(locators[1].locate(query).elsewhere)
+    # Without objects, cities share the chance of a view from any of them.
+    locations, elsewhere = locate_in_areas(locators, [NOTHING] * 3)
+    assert elsewhere == pytest.approx(0.5)
+    assert [location.elsewhere for location in locations] == pytest.approx([5 / 6] * 3)
 
 
 def test_a_route_is_from_one_area() -> None:
